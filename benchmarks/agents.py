@@ -115,7 +115,8 @@ def vectors(table: Table) -> None:
         environments.reset(seed=0)
         return lambda: [environments.step(actions) for _ in range(count)]
 
-    a, b = steps(theirs), steps(ours)
+    a = steps(theirs)
+    b = steps(ours)
     compare(
         table,
         f"SyncVectorEnv / ours, {COPIES} copies, per step of a copy",

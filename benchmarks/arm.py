@@ -17,7 +17,8 @@ from speed import BARE, STEPS, batch_of, plain_steps, ratio, stepping
 import smc_mujoco as smc
 from smc_mujoco.simulation.run import cores
 
-ARMS, TARGET = 64, 1.5
+ARMS = 64
+TARGET = 1.5
 LAWS = ("observer_free_joint", "time_delay_sliding", "computed_torque_sliding", "passivity_based")
 
 

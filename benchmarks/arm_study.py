@@ -100,7 +100,8 @@ def search(name: str, draws: int = arms.DRAWS) -> tuple[dict[str, float], float]
     """Return the best of random gains of a law, uniform in their logarithms, of two digits, and
     their cost.
     """
-    rng, ranges = np.random.default_rng(SEARCH_SEED), RANGES[name]
+    rng = np.random.default_rng(SEARCH_SEED)
+    ranges = RANGES[name]
     tried = []
     for _ in range(draws):
         tried.append(
@@ -123,7 +124,8 @@ def measured(trace: smc.Trace) -> tuple[float, ...]:
     """The numbers of a run, NaN for one that failed."""
     if trace.failure is not None:
         return (float("nan"),) * len(COLUMNS)
-    tip, joints = smc.metrics.tip_scores(trace), smc.metrics.joint_scores(trace).values()
+    tip = smc.metrics.tip_scores(trace)
+    joints = smc.metrics.joint_scores(trace).values()
     bound, rate, work = (
         max(scores[name] for scores in joints) for name in ("ultimate_bound", "tv_rate", "work")
     )

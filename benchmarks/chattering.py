@@ -50,7 +50,9 @@ def halving(plant: str) -> None:
     """Print the laws with tuned gains whose cycles half the step or a nudge changes, behind each
     drive.
     """
-    marked, cases, laws = Counter(), Counter(), gain_sets.general_laws([plant], "tuned")
+    marked = Counter()
+    cases = Counter()
+    laws = gain_sets.general_laws([plant], "tuned")
     for name, drive in DRIVES.items():
         changes = {} if drive is None else {"actuator": drive}
         runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in laws])
@@ -85,7 +87,10 @@ def main() -> None:
     if given.halving:
         halving(given.halving)
         return
-    rng, rows, samples, none = np.random.default_rng(given.seed), [], [], 0
+    rng = np.random.default_rng(given.seed)
+    rows = []
+    samples = []
+    none = 0
     while len(rows) < given.loops:
         loop = random_loop(rng)
         amplitude, frequency = loop.cycle()
@@ -126,7 +131,8 @@ def main() -> None:
         ("more", np.array(samples) >= MANY),
     ):
         ratio, low, high = np.array(rows)[which, :3].T
-        errors, widths = np.abs(ratio[~np.isnan(ratio)] - 1.0), high / low
+        errors = np.abs(ratio[~np.isnan(ratio)] - 1.0)
+        widths = high / low
         print(
             f"{words}: {which.sum()} loops, {np.isnan(ratio).sum()} without a prediction; the median error of the "
             f"amplitude is {100 * np.median(errors):.2g} %, {100 * np.mean(errors < 0.05):.0f} % err by less than 5 %; "

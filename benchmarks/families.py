@@ -97,7 +97,8 @@ SURE = {
     "implicit_first_order": "d",
     "super_twisting": "d'",
 }  # laws whose theorem bounds the load, or its rate
-SCORES, KINDS = ("error", "cost"), ("switching", "smoothed")
+SCORES = ("error", "cost")
+KINDS = ("switching", "smoothed")
 COLOURS = "#0072B2", "#7CC0E8", "#D55E00", "#F0B080"
 FIGURE_WIDTH, ROW_HEIGHT, LIMIT = 7.0, 1.75, 1e3  # inches; largest lead that is drawn
 FAILED = 1e3  # score of a run that fails: chosen, beyond all others
@@ -123,9 +124,11 @@ class Subject(NamedTuple):
     def load(self, axis: str, level: float) -> tuple[float, float]:
         """Return the force of a load, N or N m, and its frequency, rad/s."""
         if axis == FORCE:
-            force, omega = (level, FORCE_AT)
+            force = level
+            omega = FORCE_AT
         else:
-            force, omega = (LOAD, level)
+            force = LOAD
+            omega = level
         return force * self.bound / U_MAX, omega * self.wc
 
     def changes(self, axis: str, level: float, run: int) -> dict:
@@ -205,7 +208,8 @@ def by_lot(seed: int) -> dict[str, list[float]]:
     """Return levels of each axis, drawn within the range of each sentence; equal ratios are equally
     likely.
     """
-    rng, levels = np.random.default_rng(seed), {axis: [] for axis in LEVELS}
+    rng = np.random.default_rng(seed)
+    levels = {axis: [] for axis in LEVELS}
     for axis, lowest, highest, *_ in SENTENCES:
         first = lowest or LEVELS[axis][1]  # no delay has no ratio to others
         levels[axis] += np.exp(rng.uniform(math.log(first), math.log(highest), DRAWN)).tolist()
@@ -214,7 +218,8 @@ def by_lot(seed: int) -> dict[str, list[float]]:
 
 def scores(made: Sequence[Scenario]) -> np.ndarray:
     """Return the rms error and the cost of each run, (2, runs)."""
-    values, cost = np.full((2, len(made)), FAILED), Objective(duration=DURATION)
+    values = np.full((2, len(made)), FAILED)
+    cost = Objective(duration=DURATION)
     for i, trace in stream(made):
         if trace.failure is None:
             tracking, variation = cost.terms_of_run(trace)
@@ -236,7 +241,9 @@ def cells(
     values = {law: scores(its) for law, its in made.items()}
     fine: dict[str, np.ndarray] = {}
     for k, score in enumerate(SCORES):
-        family_scores, best, fine_scores = {}, {}, {}
+        family_scores = {}
+        best = {}
+        fine_scores = {}
         for family, laws in families.items():
             family_scores[family], picked = told_by(np.array([values[law][k] for law in laws]))
             best[family] = [laws[i] for i in picked]
@@ -333,7 +340,8 @@ def judged(known: Sequence[dict]) -> Iterator[str]:
     """Yield for each sentence and plant how many of its levels stand, are open, and are
     contradicted.
     """
-    counts, most = np.zeros(3, int), {"trails": 1.0, "is level at best": 1.0 / (1.0 - LEVEL_SHARE)}
+    counts = np.zeros(3, int)
+    most = {"trails": 1.0, "is level at best": 1.0 / (1.0 - LEVEL_SHARE)}
     for axis, lowest, highest, score, kind, does in SENTENCES:
         for plant in dict.fromkeys(one["plant"] for one in known):
             wanted = {"plant": plant, "axis": axis, "score": score, "kind": kind}

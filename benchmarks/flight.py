@@ -27,7 +27,8 @@ FAMILIES = {
     "sliding": ("quaternion_sliding", "adaptive_quaternion_sliding", "super_twisting_attitude"),
     "rivals": ("geometric", "cascaded_pid", "indi_attitude", "adrc_attitude"),
 }
-DRONE, MEASURE = smc.plant("quadrotor"), "ultimate_bound"
+DRONE = smc.plant("quadrotor")
+MEASURE = "ultimate_bound"
 
 
 def conditions() -> list[Any]:

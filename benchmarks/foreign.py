@@ -60,7 +60,8 @@ class Adrc:
         self.wc, w, self.b = gains
         p = np.exp(-w * H)
         self.gain = np.array([1 - p**3, 1.5 * (1 - p) ** 2 * (1 + p) / H, (1 - p) ** 3 / H**2])
-        self.z, self.last = np.zeros((0, RUNS)), np.zeros(RUNS)
+        self.z = np.zeros((0, RUNS))
+        self.last = np.zeros(RUNS)
 
     def __call__(self, x: np.ndarray, v: np.ndarray) -> np.ndarray:
         if not len(self.z):
@@ -81,9 +82,13 @@ def simulate(
     plant: str, law: Callable, x: np.ndarray, omega: float, load: float, noise: float
 ) -> np.ndarray:
     """Return the rms error and the cost of twelve runs, (2, runs)."""
-    f, rng, steps = PLANTS[plant], np.random.default_rng(0), round(SECONDS / H)
+    f = PLANTS[plant]
+    rng = np.random.default_rng(0)
+    steps = round(SECONDS / H)
     phase = 2 * np.pi * np.arange(RUNS) / RUNS
-    v, xs, us = np.zeros(RUNS), np.empty((steps + 1, RUNS)), np.empty((steps + 1, RUNS))
+    v = np.zeros(RUNS)
+    xs = np.empty((steps + 1, RUNS))
+    us = np.empty((steps + 1, RUNS))
     for k in range(steps + 1):
         seen = (
             x + noise * rng.normal(size=RUNS),
@@ -102,7 +107,8 @@ def simulate(
         k2 = rate(H / 2, state + H / 2 * k1)
         k3 = rate(H / 2, state + H / 2 * k2)
         x, v = state + H / 6 * (k1 + 2 * k2 + 2 * k3 + rate(H, state + H * k3))
-    t, start = H * np.arange(steps + 1), np.abs(xs[0])
+    t = H * np.arange(steps + 1)
+    start = np.abs(xs[0])
     error = np.maximum(np.sqrt(np.mean(xs[t >= SECONDS / 4 - H / 2] ** 2, axis=0)), 1e-4 * start)
     variation = np.abs(np.diff(us, axis=0)).sum(axis=0) / (BOUND * SECONDS)
     return np.array(
@@ -115,7 +121,8 @@ def leads(subject: families.Subject, axis: str, level: float) -> tuple[np.ndarra
     each.
     """
     plant = subject.plant.name
-    ours, theirs = {}, {}
+    ours = {}
+    theirs = {}
     for name, law in LAWS.items():
         made = subject.scenarios(axis, level, name)
         ours[name] = families.scores(made)
@@ -126,7 +133,8 @@ def leads(subject: families.Subject, axis: str, level: float) -> tuple[np.ndarra
         if axis.startswith("load"):
             load, omega = subject.load(axis, level)
         else:
-            load, omega = (0.0, 0.0)
+            load = 0.0
+            omega = 0.0
         if load:
             noise = 0.0
         else:

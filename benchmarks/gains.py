@@ -122,16 +122,20 @@ def main() -> None:
     parser.add_argument("laws", nargs="*", help="only these laws")
     parser.add_argument("--all", action="store_true", help="tune again what is there")
     asked = parser.parse_args()
-    todo, start, done = wanted(asked.laws, asked.all), time.monotonic(), 0
+    todo = wanted(asked.laws, asked.all)
+    start = time.monotonic()
+    done = 0
     whole = sum(task.work for task in todo)
     with ProcessPoolExecutor(PROCESSES) as pool:
         running = {pool.submit(tune, task): task for task in todo}
         for count, future in enumerate(as_completed(running), 1):
-            task, record = running[future], future.result()
+            task = running[future]
+            record = future.result()
             store(task, record)
             done += task.work
             left = (time.monotonic() - start) / 60.0 * (whole / done - 1.0)
-            least, most = min(record["objectives"]), max(record["objectives"])
+            least = min(record["objectives"])
+            most = max(record["objectives"])
             words = f"{task.gains}: {task.plant}, {task.law}: J {least:.4g} to {most:.4g} s²"
             print(f"{count}/{len(todo)} {words}; about {left:.0f} min left", flush=True)
 

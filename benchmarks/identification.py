@@ -40,7 +40,8 @@ def unrecorded(rng, u, share):
     """Return a random force, (K,), of a share of the command's deviation: an Ornstein-Uhlenbeck
     process.
     """
-    kept, force = math.exp(-STEP / FORCE_TIME), np.zeros(len(u))
+    kept = math.exp(-STEP / FORCE_TIME)
+    force = np.zeros(len(u))
     if share:
         for k, z in enumerate(
             share * u.std() * math.sqrt(1.0 - kept**2) * rng.normal(size=len(u) - 1)
@@ -52,12 +53,15 @@ def unrecorded(rng, u, share):
 def carriage(u):
     """Return the positions of the axis under a held force, (K,), in closed form between its stops."""
     M, b, dry, constant = AXIS.values()
-    x, v, found = 0.0, 0.0, np.zeros(len(u))
+    x = 0.0
+    v = 0.0
+    found = np.zeros(len(u))
     for k, force in enumerate(u - constant):
         found[k], left = x, STEP
         while left > 1e-15 and (v or abs(force) > dry):
             sign = math.copysign(1.0, v or force)
-            final, lag = (force - dry * sign) / b, M / b
+            final = (force - dry * sign) / b
+            lag = M / b
             if v and final * sign < 0.0:
                 stop = lag * math.log((v - final) / -final)
             else:
@@ -74,7 +78,8 @@ def carriage(u):
 
 def smooth(acceleration, x0, u):
     """Return the positions of a machine x'' = acceleration(x, v, u) under a held command, (K,)."""
-    state, found = np.array([x0, 0.0]), np.zeros(len(u))
+    state = np.array([x0, 0.0])
+    found = np.zeros(len(u))
     for k, force in enumerate(u):
         found[k] = state[0]
         slope = lambda t, z, f=force: (z[1], acceleration(z[0], z[1], f))  # noqa: E731
@@ -116,7 +121,8 @@ def main(seeds, share):
     residuals.
     """
     z: dict[str, list[list[float]]] = {}
-    slow, fits = 0, []
+    slow = 0
+    fits = []
     begin = time.process_time()
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
@@ -133,7 +139,8 @@ def main(seeds, share):
     )
     for name, each in z.items():
         values = np.array(each)
-        rms, within = np.sqrt(np.mean(values**2, axis=0)), np.mean(np.abs(values) < 2.0)
+        rms = np.sqrt(np.mean(values**2, axis=0))
+        within = np.mean(np.abs(values) < 2.0)
         print(f"{name}: rms {np.round(rms, 2)}, {100 * within:.0f} % within two, {seeds} seeds")
     print(f"{time.process_time() - begin:.0f} s of CPU")
 

@@ -39,20 +39,26 @@ from smc_mujoco.simulation.state import FINE
 
 QUICK = "--quick" in sys.argv
 if QUICK:
-    CALLS, ROUNDS = (50_000, 5)
+    CALLS = 50_000
+    ROUNDS = 5
 else:
-    CALLS, ROUNDS = (200_000, 15)
+    CALLS = 200_000
+    ROUNDS = 15
 if QUICK:
-    SAMPLES, PENDULUMS = (200, 100)
+    SAMPLES = 200
+    PENDULUMS = 100
 else:
-    SAMPLES, PENDULUMS = (500, 100)
+    SAMPLES = 500
+    PENDULUMS = 100
 MOST, SOLVERS, MOST_OF_PID = (
     3.0,
     ("mpc",),
     4.0,
 )  # times the classical law; other laws; times pid, in a run
 AT = {name: i for i, name in enumerate(Measurement._fields)}
-E, DE, A = AT["e"], AT["de"], AT["a"]
+E = AT["e"]
+DE = AT["de"]
+A = AT["a"]
 
 
 @njit
@@ -80,7 +86,8 @@ def read(function, y, gains, memory, out, states, addresses):
 def nanoseconds(component: Component, loop: Callable, model: float = 0.0) -> float:
     """Least time per call over the rounds, with the loop that calls."""
     function = cfunctions.compile_component(component)
-    y, out = np.zeros(len(AT)), np.zeros(3)
+    y = np.zeros(len(AT))
+    out = np.zeros(3)
     if loop is drive:
         for name, value in (("dt", 1e-3), ("g", 8.0), ("limit", 6.0), ("model", model), ("f", 1.0)):
             y[AT[name]] = value
@@ -113,12 +120,16 @@ def sample(law: str, velocity: str = "measured") -> float:
     )
     with installed():
         batch = ScenarioBatch([prepare(scenario)], 1)  # keeps what its record points to
-        data, record = mujoco.MjData(batch.model), batch.records.copy()
-        numbers, userdata = batch.packed[0].numbers.copy(), batch.batch.bind("userdata")[0].copy()
+        data = mujoco.MjData(batch.model)
+        record = batch.records.copy()
+        numbers = batch.packed[0].numbers.copy()
+        userdata = batch.batch.bind("userdata")[0].copy()
         phase = np.linspace(0.0, 40.0, PENDULUMS)
         data.qpos[:], data.qvel[:] = 0.3 * np.sin(phase), 2.1 * np.cos(phase)
         mujoco.mj_forward(batch.model, data)
-    function, model, at = callback().ctypes, batch.model._address, data._address
+    function = callback().ctypes
+    model = batch.model._address
+    at = data._address
     moved = phase + 7e-3 * np.arange(SAMPLES)[:, None]
     seen = np.empty((SAMPLES, len(data.sensordata)))  # position and velocity, channel by channel
     seen[:, 0::2], seen[:, 1::2] = 0.3 * np.sin(moved), 2.1 * np.cos(moved)
@@ -145,11 +156,13 @@ def general(name: str) -> bool:
 def main() -> None:
     """Print the two tables."""
     console = Console()
-    call_base, sample_base = nanoseconds(smc.law("classical"), drive), sample("classical")
+    call_base = nanoseconds(smc.law("classical"), drive)
+    sample_base = sample("classical")
     table = Table(box=box.SIMPLE_HEAD, title="Laws, ns", title_justify="left")
     for head in ("law", "call", "with model", "x classical", "sample", "x classical"):
         table.add_column(head, justify="left" if head == "law" else "right", no_wrap=True)
-    rows, worst = [], 0.0
+    rows = []
+    worst = 0.0
     for name in laws():
         blind, seeing = (nanoseconds(smc.law(name), drive, model) for model in (0.0, 1.0))
         whole = sample(name) if general(name) else np.nan
@@ -182,7 +195,8 @@ def main() -> None:
     for head in ("estimator", "call", "x classical", "sample", "x measured"):
         table.add_column(head, justify="left" if head == "estimator" else "right", no_wrap=True)
     for name in estimators():
-        spent, whole = nanoseconds(smc.estimator(name), read), sample("classical", name)
+        spent = nanoseconds(smc.estimator(name), read)
+        whole = sample("classical", name)
         table.add_row(
             name,
             f"{spent:.1f}",

@@ -122,7 +122,8 @@ def of_emps() -> Iterator[TwinFigure]:
     """Yield the tracking errors of the program, also with other instants of the reference's
     samples.
     """
-    rig, program = smc.rig("emps"), emps.program()
+    rig = smc.rig("emps")
+    program = emps.program()
     values = list(program.values)
     variants = {
         "": None,
@@ -175,7 +176,8 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
         published=size(arm(public)),
         **common,
     )
-    told, published = np.transpose([quanser.falls(one) for one in sets]), quanser.falls(public)
+    told = np.transpose([quanser.falls(one) for one in sets])
+    published = quanser.falls(public)
     for (figure, (unit, machine)), twins, of_public in zip(
         FALLS.items(), told.tolist(), published, strict=True
     ):
@@ -196,7 +198,8 @@ def of_stepper(told: Told) -> Iterator[TwinFigure | Order]:
     """Yield the figures of all laws, and the order of laws in all sets, without parts of the twin
     too.
     """
-    about, rig = told.prediction, smc.rig("stepper_furuta")
+    about = told.prediction
+    rig = smc.rig("stepper_furuta")
     for condition in about.conditions:
         for law in about.order:
             for figure in about.shown:

@@ -35,9 +35,11 @@ def main() -> None:
     many = []
     for seed in range(count):
         many.append(smc.Scenario(plant="duffing", law="super_twisting", duration=0.02, seed=seed))
-    held, start = peak(), time.perf_counter()
+    held = peak()
+    start = time.perf_counter()
     failed = sum(trace.failure is not None for _, trace in smc.stream(many))
-    spent, most = time.perf_counter() - start, peak()
+    spent = time.perf_counter() - start
+    most = peak()
     print(f"{count} runs of 20 ms in {spent:.0f} s, {failed} failed")
     print(
         f"{held:.0f} MB before, {most:.0f} MB at most, limit {LIMIT} MB: {'kept' if most < LIMIT else 'NOT KEPT'}"

@@ -84,7 +84,8 @@ def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[s
         done = json.loads(out.read_text())
     else:
         done = {"number": number, "runs": {}}
-    number, runs = done["number"], done["runs"]
+    number = done["number"]
+    runs = done["runs"]
     out.write_text(json.dumps(done))
     for name in (name for name in names if name not in runs):
         plant, condition, version = str(name).replace("@", "/").split("/")
@@ -95,7 +96,8 @@ def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[s
             id=name, plant=plant, condition=condition, version=int(version), rules=text
         )
         attacked = "/worst" in name
-        laws, count = laws_of(kind, one), min(instances, ATTACKED) if attacked else instances
+        laws = laws_of(kind, one)
+        count = min(instances, ATTACKED) if attacked else instances
         if not laws or (attacked and kind == "laws"):
             continue
         scenarios = []
@@ -151,7 +153,9 @@ def targets(
     `runs` are those of the controls on drawn instances, which get a margin, `seen` on the visible
     ones.
     """
-    rules, best, margin = problems.rules(int(name.partition("@")[2])), None, MARGIN if laws else 2.0
+    rules = problems.rules(int(name.partition("@")[2]))
+    best = None
+    margin = MARGIN if laws else 2.0
     for label, oracle in runs.items():
         if not label.startswith("oracle"):
             continue
@@ -197,10 +201,8 @@ def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
         for law, runs in visible.get(name, {}).items():
             if f"{cell.partition('/')[0]}/{law}" not in LATER:
                 laws[law] = runs
-        found, stored = (
-            targets(name, laws, of_controls[name], seen[name]),
-            rules["targets"].get(cell),
-        )
+        found = targets(name, laws, of_controls[name], seen[name])
+        stored = rules["targets"].get(cell)
         if found is not None:
             found |= {m: [float(f"{level:.3g}") for level in found[m]] for m in problems.MEASURES}
         differ += found != stored
@@ -222,7 +224,9 @@ def margins(
     of u = 0 is its least accuracy over the easiest level. A failure is a target that the oracle
     misses or u = 0 reaches.
     """
-    oracle, zero, failures = math.inf, math.inf, 0
+    oracle = math.inf
+    zero = math.inf
+    failures = 0
     for control, law in one.controls.items():
         for _, trace in stream(one.scenarios(law, instances, number)):
             values = one.measures(trace)
@@ -247,7 +251,8 @@ def hold(number: str, instances: int | None) -> bool:
     """
     names = sorted({name for each in suite.suites() for name in suite.suite(each)})
     table: dict[str, dict[str, str]] = {}
-    every, failing = [], []
+    every = []
+    failing = []
     for name in names:
         one = problems.problem(name)
         if instances:
@@ -281,7 +286,8 @@ def hold(number: str, instances: int | None) -> bool:
 def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str, version: int) -> None:
     """Write targets and what is left out below the mark in the rules."""
     path = problems.RULES / f"{version}.toml"
-    lines, left_out = ["[targets]"], []
+    lines = ["[targets]"]
+    left_out = []
     for name in cells(version):
         if (found := targets(name, visible.get(name, {}), of_controls[name], seen[name])) is None:
             left_out.append(name.partition("@")[0])
@@ -348,7 +354,8 @@ def agree(visible: Runs, hidden: Runs) -> None:
     """Print the rank correlations of boards, visible with hidden, and those of smc-30 with the
     problems left out.
     """
-    chosen, whole = suite.suite("smc-30@1"), suite.suite("smc-50@1")
+    chosen = suite.suite("smc-30@1")
+    whole = suite.suite("smc-50@1")
     others = [name for name in whole if name not in chosen]
     print("board | visible with hidden, tau (rho) | with the problems left out, tau (rho)")
     for question in BOARDS:
@@ -413,13 +420,15 @@ if __name__ == "__main__":
     elif given.command == "hold":
         sys.exit(not hold(number, given.instances))
     elif given.command == "repeat":
-        named, same = given.problems or cells(), []
+        named = given.problems or cells()
+        same = []
         for version in map(int, problems.versions()):
             if its := [name for name in named if name in cells(version)]:
                 same.append(repeat(given.folder / str(version), its, version))
         sys.exit(not all(same))
     elif given.command == "freeze":
-        controlled, seen = read(given.controls), read(given.seen)
+        controlled = read(given.controls)
+        seen = read(given.seen)
         number = json.loads(given.controls.read_text())["number"]
         freeze(read(given.visible), controlled, seen, number, given.version)
     elif given.command == "enter":

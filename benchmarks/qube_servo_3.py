@@ -34,10 +34,8 @@ SCALES = np.array(
     [10.0, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3]
 )  # ohm, kg m^2, N m s/rad, N m/rad, N m, N m/rad
 START = np.array([0.8, 0.8, 2.4, 2.3, 1.0, 4.0])  # of the search, in SCALES
-LOW, HIGH = (
-    [0.3, 0.1, 0.0, 0.0, 1e-3, 0.05, -3.0, -3.0],
-    [3.0, 5.0, 20.0, 10.0, 5.0, 100.0, 3.0, 3.0],
-)
+LOW = [0.3, 0.1, 0.0, 0.0, 1e-3, 0.05, -3.0, -3.0]
+HIGH = [3.0, 5.0, 20.0, 10.0, 5.0, 100.0, 3.0, 3.0]
 RIGID = 4  # quantities without the bristles
 STEP_END, RETURN = 0.8, (0.94, 1.66)  # s
 SPACING = 0.02  # s, between samples that are used
@@ -47,16 +45,16 @@ FREQUENCY, DAMPING = (
     (2.432, 4e-3),
     (0.0261, 6e-4),
 )  # of falls, Hz and "", and what a residual of one is
-ARM, MASS, LENGTH, GRAVITY, CONSTANT, ROTOR, DRY = (
-    0.085,
-    0.024,
-    0.12865,
-    9.7807,
-    0.0422,
-    1.4e-6,
-    6.1e-6,
-)
-INERTIA, PULL, MOMENT = MASS * LENGTH**2 / 3, MASS * ARM * LENGTH / 2, MASS * LENGTH / 2
+ARM = 0.085
+MASS = 0.024
+LENGTH = 0.12865
+GRAVITY = 9.7807
+CONSTANT = 0.0422
+ROTOR = 1.4e-6
+DRY = 6.1e-6
+INERTIA = MASS * LENGTH**2 / 3
+PULL = MASS * ARM * LENGTH / 2
+MOMENT = MASS * LENGTH / 2
 FALLS, FALL_TIME = np.radians((25.0, 19.0, 13.0)), 1.2  # rad, s
 SLOW = 0.05  # rad/s, at which the pendulum's dry friction reaches 76 % of its limit
 BLOCKS = 8
@@ -67,8 +65,10 @@ def rates(z, q, volts, motor):
     """Return the rates of theta, alpha, 0 hanging, their speeds, and the bend of the bristles."""
     x, a, v, w, bend = z
     R, J, b, cable, friction, stiffness = q
-    s, c = np.sin(a), np.cos(a)
-    around, lever = J + ROTOR + MASS * ARM**2 + INERTIA * s * s, -PULL * c
+    s = np.sin(a)
+    c = np.cos(a)
+    around = J + ROTOR + MASS * ARM**2 + INERTIA * s * s
+    lever = -PULL * c
     torque = CONSTANT / R * (volts - motor * CONSTANT * v) - b * v - cable * x - stiffness * bend
     arm = torque - PULL * s * w * w - 2 * INERTIA * s * c * v * w
     swing = INERTIA * s * c * v * v - GRAVITY * MOMENT * s - DRY * np.tanh(w / SLOW)
@@ -93,7 +93,8 @@ def motion(q, state, volts, duration, motor):
     """Return theta and alpha every STEP, (K, 2); `motor`: share of the back-EMF that flows, 0 for
     an open circuit.
     """
-    count, z = round(duration / STEP), state.copy()
+    count = round(duration / STEP)
+    z = state.copy()
     rows = np.zeros((count + 1, 2))
     for i in range(count + 1):
         rows[i] = z[:2]
@@ -127,7 +128,8 @@ def parts(record):
     theta here.
     """
     rows = record[np.round(record[:, 0] / SPACING, 6) % 1.0 == 0.0]
-    ahead, back = rows[:, 0] <= STEP_END, (rows[:, 0] >= RETURN[0]) & (rows[:, 0] <= RETURN[1])
+    ahead = rows[:, 0] <= STEP_END
+    back = (rows[:, 0] >= RETURN[0]) & (rows[:, 0] <= RETURN[1])
     return [np.array([one[:, 0], one[:, 1], -one[:, 2]]) for one in (rows[ahead], rows[back])]
 
 
@@ -170,7 +172,8 @@ def identified(step, back, weight=1.0, kept=None, rigid=False, motor=0.0):
             of_falls.append((one - value) / error)
         return np.concatenate([*map(np.ravel, rows), of_falls])
 
-    start, bounds = np.array([*START, 0.9, 0.1])[free], (np.array(LOW)[free], np.array(HIGH)[free])
+    start = np.array([*START, 0.9, 0.1])[free]
+    bounds = (np.array(LOW)[free], np.array(HIGH)[free])
     found = least_squares(residuals, start, diff_step=1e-3, bounds=bounds)
     return *split(found.x), 2.0 * found.cost
 

@@ -22,7 +22,8 @@ import smc_mujoco as smc
 from smc_mujoco.simulation.model import parts
 
 TARGET = 250_000  # steps a second, on two threads
-RUNS, THREADS = 32, 2
+RUNS = 32
+THREADS = 2
 console = Console(width=130)
 
 PARTS = {

@@ -20,7 +20,9 @@ from scipy.stats import sobol_indices
 
 from smc_mujoco.analysis import sensitivity
 
-SEEDS, TRUE_POINTS, TOLD = 60, 2**16, 0.02
+SEEDS = 60
+TRUE_POINTS = 2**16
+TOLD = 0.02
 WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0, 99.0, 99.0, 99.0])  # of Sobol's g
 
 
@@ -51,7 +53,9 @@ def row(name: str, n: int) -> str:
     k, function = FUNCTIONS[name]
     space: Any = SimpleNamespace(names=tuple(map(str, range(k))), ends=[(0.0, 1.0, "")] * k)
     true = np.maximum(known(function(sensitivity.designs(TRUE_POINTS, k, SEEDS)), TRUE_POINTS), 0.0)
-    ours, saltelli, held = [], [], []
+    ours = []
+    saltelli = []
+    held = []
     for seed in range(SEEDS):
         designs = sensitivity.designs(n, k, seed)
         scores = function(designs)
@@ -63,7 +67,8 @@ def row(name: str, n: int) -> str:
         saltelli.append(known(scores, n))
     told = f"{name}, {n} points: "
     for who, found in (("", np.array(ours)), ("Saltelli's ", np.array(saltelli))):
-        errors, sums = np.sqrt(np.square(found - true).mean(axis=(0, 2))), found.sum(2)
+        errors = np.sqrt(np.square(found - true).mean(axis=(0, 2)))
+        sums = found.sum(2)
         told += f"{who}errors {errors[0]:.3f} {errors[1]:.3f}, sums {sums[:, 0].max():.2f} {sums[:, 1].min():.2f}; "
     share = [np.array(held)[:, i, true[i] > TOLD].mean() for i in (0, 1)]
     return f"{told}held {share[0]:.2f} {share[1]:.2f}"

@@ -80,7 +80,8 @@ def stepping(
     within: Callable[[], contextlib.AbstractContextManager] = installed,
 ) -> Callable[[], None]:
     """Steps of a batch from its present state, with the callback or BARE."""
-    start, records = batch.batch.state.copy(), batch.records.copy()
+    start = batch.batch.state.copy()
+    records = batch.records.copy()
     numbers = [packed.numbers.copy() for packed in batch.packed]
 
     def action() -> None:

@@ -31,7 +31,11 @@ SEEDS = {
     False: ({11: 230, 12: 130, 13: 180}, {14: 240}),
     True: ({21: 240}, {22: 160}),
 }  # of rounds -> draws
-BATCH, NEAR, KEPT, TRIED, RUNS = 10, 24, 8, 16, 8
+BATCH = 10
+NEAR = 24
+KEPT = 8
+TRIED = 16
+RUNS = 8
 INERTIA = 1.0215e-4  # kg m^2, of the pendulum by formula: ten percent to either side
 PRIOR = {  # ends; True for a logarithmic prior
     "holding_torque": (0.08, 0.5, True),
@@ -109,7 +113,8 @@ def distance(figures):
     """Return the rms deviation of condition -> figures from the recorded ones, in spreads."""
     apart = []
     for condition, spreads in SPREADS.items():
-        found, recorded = figures[condition], PREDICTION.recorded[condition]
+        found = figures[condition]
+        recorded = PREDICTION.recorded[condition]
         for name, spread in spreads.items():
             if name in LINEAR:
                 off = found[name] - recorded[name]
@@ -124,7 +129,8 @@ def distance(figures):
 
 def recordings(pairs, condition):
     """Return the figures of a simulated recording for each pair of quantities and a seed."""
-    rig, fields = smc.rig("stepper_furuta"), PREDICTION.conditions[condition]
+    rig = smc.rig("stepper_furuta")
+    fields = PREDICTION.conditions[condition]
     scenarios = []
     for one, seed in pairs:
         scenarios.append(
@@ -175,7 +181,8 @@ def accepted(one, number):
 
 
 def main(second):
-    prior, rounds = WIDER if second else PRIOR, SEEDS[second]
+    prior = WIDER if second else PRIOR
+    rounds = SEEDS[second]
     first = explored(rounds[0], lambda random: random.random(len(prior)), prior)
     nearest = np.array([shares for _, shares in first[:NEAR]])
     both = [*first, *explored(rounds[1], lambda random: about(nearest, random), prior)]

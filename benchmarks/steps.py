@@ -54,12 +54,18 @@ def row(part: str) -> str:
         [score(trace) for trace in run([change(one) for one in made])]
         for change in (lambda one: one, halved, nudged, finest)
     )
-    off, marked, wandering, found, errors, laws = 0, 0, 0, 0, [0.0], set()
+    off = 0
+    marked = 0
+    wandering = 0
+    found = 0
+    errors = [0.0]
+    laws = set()
     order = first_order(made[0])
     for scenario, *its in zip(made, same, halves, moved, fine, strict=True):
         for name in SCORES:
             (value, half, nudge, truth), least = (one[name] for one in its), floor(scenario, name)
-            wrong, mark = apart((value, truth), least), apart((value, half, nudge), least, order)
+            wrong = apart((value, truth), least)
+            mark = apart((value, half, nudge), least, order)
             off, marked, found = off + wrong, marked + mark, found + (wrong and mark)
             wandering += apart((value, nudge), least)
             errors.append(relative_range((value, truth), least))

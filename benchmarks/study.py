@@ -73,7 +73,8 @@ def plain(scenarios: Sequence[smc.Scenario], threads: int) -> float:
 
 def main() -> None:
     """Print the ratio and the memory."""
-    threads, out = cores(), Path(tempfile.mkdtemp())
+    threads = cores()
+    out = Path(tempfile.mkdtemp())
     study(grid(paper.PLANTS, paper.LAWS, CONDITIONS, 1, "study", duration=5.1), out / "compiled")
     studied = simulated = 0.0
     grids = slices()

@@ -26,7 +26,8 @@ def off(trace):
 
 
 def answer(runs):
-    least, most = runs.least(off, unit="mm"), runs.most(off, unit="mm")
+    least = runs.least(off, unit="mm")
+    most = runs.most(off, unit="mm")
     return f"rms distance of the tip from its path: least with {least}, most with {most}"
 
 

@@ -12,7 +12,8 @@ import smc_mujoco as smc
 
 
 def answer(runs):
-    paper, settled = runs.only("observer_free"), runs.those()
+    paper = runs.only("observer_free")
+    settled = runs.those()
     return (
         f"of those that settle, u varies least at the end under {settled.least('tv_rate')}, and most under "
         f"{settled.most('tv_rate')}; TV rate from nominal to noise: {paper.changes('tv_rate', 'nominal', 'noise')}"

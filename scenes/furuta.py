@@ -36,7 +36,8 @@ def rocking(trace):
 def answer(runs):
     rubs = runs["arm rubs"]
     up = rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1)
-    least, most = rubs.least(rocking), rubs.most(rocking)
+    least = rubs.least(rocking)
+    most = rubs.most(rocking)
     upright = f"with friction in the arm, the pendulum stays up under {up.named}"
     return f"{upright}; the arm rocks least, in degrees, with {least}, most with {most}"
 

@@ -21,7 +21,8 @@ def swing(trace):
 
 
 def answer(runs):
-    least, most = runs.least(swing, unit="rad"), runs.most(swing, unit="rad")
+    least = runs.least(swing, unit="rad")
+    most = runs.most(swing, unit="rad")
     return (
         f"the load swings least with {least}, most with {most}; trolley and load are first at rest with "
         f"{runs.least('settling_time')}, last with {runs.most('settling_time')}"

@@ -32,11 +32,9 @@ def answer(runs):
     returned = runs.who(
         "returns within 20 mm", "return within 20 mm", lambda trace: back(trace) < 3.0
     )
-    low, high, first = (
-        runs.least(height, unit="m"),
-        runs.most(height, unit="m"),
-        runs.least(back, unit="s"),
-    )
+    low = runs.least(height, unit="m")
+    high = runs.most(height, unit="m")
+    first = runs.least(back, unit="s")
     return f"before the drop it is at {low} to {high}, not 1 m; 3 s after it, {returned}; first {first}"
 
 

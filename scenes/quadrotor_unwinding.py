@@ -25,9 +25,12 @@ GAINS = {
 
 @smc.law_function(joint=True, requires_model=True, plants=("a free body",), gains=GAINS, memory=2)
 def turning(y, gains, memory):
-    lam, last, s = gains.lam[5], memory[5], y.de + 5.0 * y.e
+    lam = gains.lam[5]
+    last = memory[5]
+    s = y.de + 5.0 * y.e
     u = y.h - y.M @ (20.0 * y.de + 100.0 * y.e)  # a PD law keeps the height, and the body level
-    q0, qz = math.cos(0.5 * y.e[5]), math.sin(0.5 * y.e[5])
+    q0 = math.cos(0.5 * y.e[5])
+    qz = math.sin(0.5 * y.e[5])
     if last[0] * q0 + last[1] * qz < 0.0 or (y.t == 0.0 and gains.first[5] < 0.0):
         q0, qz = -q0, -qz
     last[:] = q0, qz

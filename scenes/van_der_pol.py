@@ -12,7 +12,8 @@ import smc_mujoco as smc
 
 
 def answer(runs):
-    settled, metrics = runs.those(), ("settling_time", "itae", "tv_rate")
+    settled = runs.those()
+    metrics = ("settling_time", "itae", "tv_rate")
     time, error, effort = (settled.least(name) for name in metrics)
     leads = runs.only(*settled.leaders(*metrics)).named
     return f"best in all three: {leads}; first to settle: {time}; least ITAE: {error}; least variation of u: {effort}"

@@ -10,7 +10,8 @@ import smc_mujoco as smc
 
 
 def answer(runs):
-    paper, settled = runs.only("observer_free"), runs.those()
+    paper = runs.only("observer_free")
+    settled = runs.those()
     return (
         f"{paper.who('settles', 'settle')} (settling time {paper.size('settling_time')}, TV rate at the end "
         f"{paper.size('tv_rate')}); first of all: {settled.least('settling_time')}; least TV rate: "

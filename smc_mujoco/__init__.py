@@ -38,6 +38,8 @@ from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
 
 _SHELF = lazy.shelf(__name__)
-__getattr__, __dir__, __all__ = _SHELF.getattr, _SHELF.dir, [*_SHELF.origins]
+__getattr__ = _SHELF.getattr
+__dir__ = _SHELF.dir
+__all__ = list(_SHELF.origins)
 
 registration.register_when_imported()

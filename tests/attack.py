@@ -119,7 +119,9 @@ def sound(trace: smc.Trace) -> None:
     then NaN.
     """
     scenario = trace.scenario
-    samples, n, end = scenario.samples + 1, scenario.plant.n, scenario.samples + 1
+    samples = scenario.samples + 1
+    n = scenario.plant.n
+    end = scenario.samples + 1
     if (trace.diverged_at is None) != (trace.failure is None):
         raise Found(f"diverged_at {trace.diverged_at}, failure {trace.failure}")
     if trace.diverged_at is not None and trace.failure is not None:
@@ -384,7 +386,8 @@ class World:
 
     def right(self, name: str, call: Callable) -> dict[str, Any]:
         """The arguments with which the call is right, as far as they are known."""
-        named, own = {}, OWN.get(name, {})
+        named = {}
+        own = OWN.get(name, {})
         for parameter in inspect.signature(call).parameters.values():
             if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                 continue
@@ -478,7 +481,8 @@ def calls(random: Random) -> str:
 
 def _where(error: BaseException) -> str:
     """The type of an exception and the line of this package, or else of another, that it came from."""
-    step, files = error.__traceback__, []
+    step = error.__traceback__
+    files = []
     while step is not None:
         files.append(f"{step.tb_frame.f_code.co_filename}:{step.tb_lineno}")
         step = step.tb_next
@@ -677,7 +681,9 @@ def slice_of(part: str, seed: int, start: int, cases: int) -> Iterator[tuple[int
 
 def lines(process: subprocess.Popen) -> Iterator[bytes]:
     """The lines that a process writes, and after LIMIT without one b""."""
-    held, pipe, limit = b"", process.stdout, START
+    held = b""
+    pipe = process.stdout
+    limit = START
     assert pipe is not None
     while select.select([pipe], [], [], limit)[0]:
         limit = LIMIT
@@ -690,7 +696,9 @@ def lines(process: subprocess.Popen) -> Iterator[bytes]:
 
 def attacked(part: str, seed: int, start: int, cases: int, jobs: int) -> int:
     """Run a part in slices, print what was found; how many."""
-    begun, ends, kinds = time.monotonic(), Counter(), Counter()
+    begun = time.monotonic()
+    ends = Counter()
+    kinds = Counter()
     size = min(SLICE, -(-cases // jobs))
     slices = []
     for first in range(start, start + cases, size):

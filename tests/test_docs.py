@@ -21,7 +21,8 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 
 TEMPLATES = [template for known in law_pages.CATALOGUES.values() for template in known().values()]
-DOCS, CONFIGURATION = ROOT / "docs", ROOT / "docs" / "site" / "mkdocs.yml"
+DOCS = ROOT / "docs"
+CONFIGURATION = ROOT / "docs" / "site" / "mkdocs.yml"
 TUTORIAL = DOCS / "tutorial.md"
 NAV = re.findall(r"^ +- (\w+\.md)$", CONFIGURATION.read_text(), re.MULTILINE)
 INSTALLED = bool(importlib.metadata.entry_points(group="pytest11", name="smc_mujoco"))
@@ -97,7 +98,8 @@ def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
 
 @pytest.mark.slow
 def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, monkeypatch):
-    page, seen = DOCS / "mathematics.md", 0
+    page = DOCS / "mathematics.md"
+    seen = 0
     monkeypatch.chdir(tmp_path)
     for block in blocks(page.read_text(), "python"):
         (tmp_path / "block.py").write_text(block)

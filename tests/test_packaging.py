@@ -218,7 +218,8 @@ def test_models_are_found_from_the_wheel(binaries, tmp_path):
 
 @pytest.mark.slow
 def test_a_scene_runs_from_the_wheel_in_any_folder(binaries, tmp_path):
-    program, out = binaries / "smc-mujoco", tmp_path / "out"
+    program = binaries / "smc-mujoco"
+    out = tmp_path / "out"
     done = run(program, "run", "inverted_pendulum", "--no-film", "--out", out, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert list(tmp_path.iterdir()) == [out]
@@ -321,7 +322,8 @@ for code in {list(MISSING)}:
 
 @pytest.mark.parametrize("code", MISSING)
 def test_an_extra_that_is_missing_is_one_sentence_where_it_is_needed(refused, code):
-    line, words = refused[code], MISSING[code]
+    line = refused[code]
+    words = MISSING[code]
     assert line.startswith(f"True {words[0]} needs")
     assert all(word in line for word in words)
 
@@ -436,7 +438,8 @@ def test_set_up_without_a_fit_python_is_one_sentence(checkout, script, sentence)
 
 
 def test_packages_of_a_set_up_that_was_stopped_are_installed_again(checkout):
-    base, uv = checkout / ".venv" / "bin", checkout / "uv"
+    base = checkout / ".venv" / "bin"
+    uv = checkout / "uv"
     base.mkdir(parents=True)
     (base / "python").symlink_to(sys.executable)
     files = [(checkout / name).read_text() for name in ("pyproject.toml", "requirements.lock")]

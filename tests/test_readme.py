@@ -63,7 +63,8 @@ RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].start
 
 
 # What is asked for less of than a page does: as much code runs, in a tenth of the time.
-SHORTLY, BRIEFLY = Objective(duration=0.5), Objective(conditions=("nominal",), duration=0.25)
+SHORTLY = Objective(duration=0.5)
+BRIEFLY = Objective(conditions=("nominal",), duration=0.25)
 LITTLE = {
     "compare": {"seeds": 2, "duration": 0.3, "searches": 2, "budget": 4},
     "tune": {"objective": SHORTLY, "searches": 2},

@@ -423,7 +423,8 @@ def actuator(random: Random) -> list:
 
 def fields(random: Random) -> dict[str, Any]:
     """The arguments of a Scenario; one in forty is not sane."""
-    step, held = random.choice([1e-3, 5e-4, 2e-3, 1e-4, 1 / 3000, 0.01]), random.randint(1, 4)
+    step = random.choice([1e-3, 5e-4, 2e-3, 1e-4, 1 / 3000, 0.01])
+    held = random.randint(1, 4)
     if random.random() < 1 / 40:
         where = value(random)
     else:

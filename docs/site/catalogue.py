@@ -105,7 +105,8 @@ def stills() -> dict[str, bytes]:
 
 
 def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
-    parts, name = entry(template), template.name
+    parts = entry(template)
+    name = template.name
     shown = "".join(
         _figure(drawn["law_figure", name, plant], f"{_link_up(plant)}")
         for plant in figures.shown_on(template)
@@ -181,7 +182,8 @@ def _gain_table(template: Template) -> str:
     """Return a table of the gains: meaning, unit, default, range, and whether tuning changes it."""
     if not template.gains:
         return ""
-    said, rows = meanings(template), []
+    said = meanings(template)
+    rows = []
     for name, gain in template.gains.items():
         meaning, unit = said[name]
         if gain.positive:
@@ -225,7 +227,8 @@ def meanings(template: Template) -> dict[str, tuple[str, str]]:
         return found
     for part in " ".join(parts[1].split()).rstrip(".").split("; "):
         names = _names(part, template.gains)
-        rest, units = part, {}
+        rest = part
+        units = {}
         for name in names:  # `a [unit] and b [unit], meaning`
             rest = rest[re.match(rf"(?:,? and |, )?{re.escape(name)}", rest).end() :]  # pyright: ignore
             if unit := UNIT.match(rest):
@@ -240,7 +243,8 @@ def meanings(template: Template) -> dict[str, tuple[str, str]]:
 
 def _names(part: str, gains) -> list[str]:
     """Return the gains that a part of `Gains: ...` begins with."""
-    names, rest = [], part
+    names = []
+    rest = part
     while word := re.match(r"(?:,? and |, )?(\w+)(?:\s*\[[^\]]*\])?", rest):
         if (
             word[1] not in gains
@@ -472,9 +476,11 @@ def equation(doc: str) -> tuple[str, list[str], str]:
     words, rest = re.fullmatch(r"((?:[^=,]+, )*)(.*)", " ".join(rest.split())).groups()  # pyright: ignore
     end = re.search(r"\.\s|\.$|, |(?<=d)\s+\(", rest)
     if end:
-        formula, more = (rest[: end.start()], rest[end.end() :].rstrip(".").removesuffix(")"))
+        formula = rest[: end.start()]
+        more = rest[end.end() :].rstrip(".").removesuffix(")")
     else:
-        formula, more = (rest, "")
+        formula = rest
+        more = ""
     return title, [formula], f"{words.rstrip(', ') or more}.\n\n{others}"
 
 

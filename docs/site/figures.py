@@ -209,7 +209,9 @@ def figures(
       wanted: functions and their arguments.
       also: further files that the figures depend on.
     """
-    version, found, jobs = _version(also), {}, []
+    version = _version(also)
+    found = {}
+    jobs = []
     CACHE.mkdir(parents=True, exist_ok=True)
     for draw, arguments in wanted:
         key = draw.__name__, *arguments

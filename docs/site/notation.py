@@ -75,7 +75,8 @@ OPERATORS = {
     ">": r"\gt ",
     "%": r"\%",
 }
-OPEN, CLOSE = {"(": ")", "[": "]", "{": "}"}, {")": "(", "]": "[", "}": "{"}
+OPEN = {"(": ")", "[": "]", "{": "}"}
+CLOSE = {")": "(", "]": "[", "}": "{"}
 ARTICLES = ("a", "A", "I")
 TOKEN = re.compile(
     r"""(?P<space>\s+)
@@ -101,7 +102,8 @@ class Token(NamedTuple):
 
 def tokens(text: str) -> list[Token]:
     """Split a text."""
-    found, space = [], ""
+    found = []
+    space = ""
     for match in TOKEN.finditer(text):
         if match["space"]:
             space += match["space"]
@@ -144,7 +146,9 @@ def formula(text: str, gains: Collection[str] = ()) -> str:
 
 def clauses(text: str) -> list[str]:
     """Split a formula where a comma or a semicolon stands outside of brackets."""
-    parts, depth, start = [], 0, 0
+    parts = []
+    depth = 0
+    start = 0
     for i, letter in enumerate(text):
         depth += (letter in OPEN) - (letter in CLOSE)
         if depth == 0 and letter in ",;" and text[i + 1 : i + 2] == " ":
@@ -155,7 +159,9 @@ def clauses(text: str) -> list[str]:
 
 def sentence(text: str, gains: Collection[str] = ()) -> str:
     """Return a text with its formulas as $LaTeX$."""
-    found, parts, run = tokens(text), [], []
+    found = tokens(text)
+    parts = []
+    run = []
     for i, token in enumerate(found):
         after = found[i + 1] if i + 1 < len(found) else None
         ends = token.text in (",", ";") and (after is None or after.space != "")  # of a clause
@@ -236,7 +242,10 @@ class Parser:
     """Recursive descent over tokens: sums of products of factors."""
 
     def __init__(self, found: list[Token], gains: Collection[str], fractions: bool = True):
-        self.tokens, self.at, self.gains, self.fractions = found, 0, gains, fractions
+        self.tokens = found
+        self.at = 0
+        self.gains = gains
+        self.fractions = fractions
 
     def peek(self, ahead: int = 0) -> Token | None:
         at = self.at + ahead
@@ -301,7 +310,8 @@ class Parser:
                 and after.space
             ):
                 self.take()
-                over, under = self.bare(factors), self.bare([self.factor()])
+                over = self.bare(factors)
+                under = self.bare([self.factor()])
                 factors = [rf"\frac{{{over}}}{{{under}}}"]
             elif token.text == "/":
                 factors.append(self.take().text)

@@ -52,7 +52,9 @@ def _page(name: str, shown: list[list[dict[str, str]]]) -> tuple[list[str], dict
     films.
     """
     cells = json.loads((FOLDER / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
-    of_cell, files, parts = iter(shown), {}, []
+    of_cell = iter(shown)
+    files = {}
+    parts = []
     for cell in cells:
         text = "".join(cell["source"])
         if cell["cell_type"] != "code":

@@ -26,7 +26,8 @@ def cases() -> list[tuple[str, Comparison]]:
         "half the step undoes the lead": (0.04, 0.2, 0.3),
     }
     for name, (spread, lead, step) in particular.items():
-        a, b = np.exp(spread * drawn[len(made)]) * (1.0 - lead), np.ones(UNITS)
+        a = np.exp(spread * drawn[len(made)]) * (1.0 - lead)
+        b = np.ones(UNITS)
         sets = dict.fromkeys("AB", np.arange(UNITS))
         made.append(
             (name, Comparison({"A": a, "B": b}, halves={"A": a * (1 + step), "B": b}, sets=sets))

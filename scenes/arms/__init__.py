@@ -179,7 +179,8 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         there, and so does every seed at the wall, in front of which the tip must begin.
       payload: kg that the arm carries from the start, unknown to the law.
     """
-    panda, push = arm(), Push("link5", y=400.0, time=BLOW, width=0.02)
+    panda = arm()
+    push = Push("link5", y=400.0, time=BLOW, width=0.02)
     tasks: dict[str, tuple[Callable[[], tuple[Waypoints, ...]], dict[str, Any]]] = {
         "sway": (sway, {"duration": 3.5}),
         "blow": (sway, {"duration": 3.5, "disturbance": push}),

@@ -28,7 +28,8 @@ def relative_range(values: Sequence[float], least: float = 0.0, first_order: boo
     if any(missing):
         return 0.0 if all(missing) else math.inf
     beyond = [math.copysign(max(abs(value) - least, 0.0), value) for value in values]
-    smallest, width = max(min(map(abs, values)), least), max(beyond) - min(beyond)
+    smallest = max(min(map(abs, values)), least)
+    width = max(beyond) - min(beyond)
     # inf - inf is no change
     if not width > 0.0:
         return 0.0

@@ -70,7 +70,8 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
     lower, upper = np.empty((2, RESAMPLES, len(values)))
     for k, block in enumerate(values):
         order = np.argsort(block)[: (~np.isnan(block)).sum()]
-        counts, ordered = drawn[order], block[order]
+        counts = drawn[order]
+        ordered = block[order]
         counts[:, ~counts.any(axis=0)] = (
             1  # a resample that draws no run of the block takes each of them once
         )
@@ -89,7 +90,8 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
 
 def middle(values: np.ndarray) -> np.ndarray:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
-    ordered, n = np.sort(values, axis=-1), (~np.isnan(values)).sum(axis=-1, keepdims=True)
+    ordered = np.sort(values, axis=-1)
+    n = (~np.isnan(values)).sum(axis=-1, keepdims=True)
     low, high = (
         np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2)
     )
@@ -107,10 +109,8 @@ def share_interval(share: float, n: int) -> Interval:
     1 only 83 %, with 6 seeds as with 40.
     """
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
-    centre, half = (
-        share + z * z / (2 * n),
-        z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2),
-    )
+    centre = share + z * z / (2 * n)
+    half = z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((centre + side * half) / (1 + z * z / n) for side in (-1, 1))
     return Interval(
         share, max(min(low, share), 0.0), min(max(high, share), 1.0), n

@@ -71,7 +71,8 @@ DERIVATIVE_STEP = 1e-3
 STABILITY_STEP = 0.1  # relative, in Loeb's criterion: smaller ones see these jumps too; chosen
 # Factors on the ends of ranges. With them the ranges have the truth in 95 % of random loops:
 # benchmarks/chattering.py.
-AMPLITUDE_FACTOR, FREQUENCY_FACTOR = 1.01, 1.01
+AMPLITUDE_FACTOR = 1.01
+FREQUENCY_FACTOR = 1.01
 MAX_GAIN_DRIFT = 0.05  # relative: a law whose gain drifts more gets a remark; chosen
 RESONANCE_DAMPING = (
     0.01  # imaginary part of frequencies over the real one, so that resonances have a width; chosen
@@ -276,7 +277,8 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2
         cells = (cells[:, None] + side * CORNERS).reshape(-1, 2)
-    winding, around = np.zeros(CUTS * count), at_corners(cells, 1) - 1.0
+    winding = np.zeros(CUTS * count)
+    around = at_corners(cells, 1) - 1.0
     angles = np.angle(np.roll(around, -1, axis=1) * around.conj())
     winding[tuple(cells.T)] = np.round(angles.sum(axis=1) / math.tau)  # -1, 0 or 1 times around 1
     neighbours, groups = label(winding, np.ones((3, 3)))  # type: ignore[misc]
@@ -301,7 +303,8 @@ def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
     largest = np.take_along_axis(products, np.abs(products).argmax(axis=1)[:, None], axis=1)
     phases = np.angle(largest) + np.angle(np.where(products == 0.0, 1.0, products * largest.conj()))
     margins = CELL_MARGIN * np.maximum(np.ptp(phases, axis=1), max(sides[0], COARSE_NOISE))
-    lowest, highest = phases.min(axis=1) - margins, phases.max(axis=1) + margins
+    lowest = phases.min(axis=1) - margins
+    highest = phases.max(axis=1) + margins
     return near & (np.ceil(lowest / math.tau) * math.tau <= highest)
 
 
@@ -309,7 +312,8 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
     """Return the balance in a cell or near it, with all samples; None where N jumps across it."""
     from scipy.optimize import root
 
-    least, largest = low - MAX_SHIFT, high + MAX_SHIFT
+    least = low - MAX_SHIFT
+    largest = high + MAX_SHIFT
     largest[1] = min(largest[1], math.log(math.pi / loop.scenario.control_period))
 
     def excess(z: np.ndarray) -> np.ndarray:
@@ -477,7 +481,8 @@ def _prediction(
         )
     if wave.drift > MAX_GAIN_DRIFT:
         assumptions += ("gains or memories of the law drift: the prediction is a snapshot",)
-    sizes, omegas = [math.nan], [math.nan]
+    sizes = [math.nan]
+    omegas = [math.nan]
     if ranges:
         later, earlier = (_nearest_cycle(loop, sine, phase) for phase in loop.phases(*balance))
         waves = [one for one in (sine, later, earlier) if one]
@@ -485,7 +490,8 @@ def _prediction(
         omegas = [one.omega / sine.omega * wave.omega for one in waves] + [math.inf] * (
             earlier is None
         )
-    fastest, nyquist = max(omegas) * FREQUENCY_FACTOR / math.tau, 0.5 / loop.scenario.control_period
+    fastest = max(omegas) * FREQUENCY_FACTOR / math.tau
+    nyquist = 0.5 / loop.scenario.control_period
     return Chattering(
         amplitude=wave.s,
         amplitude_x=wave.amplitude,

@@ -113,7 +113,8 @@ def gains_for(
         speeds = {1.0: math.inf}
         if frequency is not None:
             speeds = _forces(lambda w: cycle(1.0, w), amplitude, frequency, headroom)
-        size, speed = 1.0, next(iter(speeds))
+        size = 1.0
+        speed = next(iter(speeds))
         if amplitude is not None:
             size, speed = _largest(
                 cycle, speeds, amplitude, math.inf if frequency is None else frequency, headroom
@@ -188,7 +189,9 @@ def _largest(
     The forces of a speed are known only with its size, so speeds are tried while they may allow
     larger ones.
     """
-    best, largest, refusals = (0.0, 0.0), 0.0, []
+    best = (0.0, 0.0)
+    largest = 0.0
+    refusals = []
 
     def within(size: float, speed: float) -> float:
         one = cycle(size, speed)
@@ -207,7 +210,8 @@ def _largest(
             refusals.append(error)
             continue
         if size * speed**2 > largest:
-            best, largest = (size, speed), size * speed**2
+            best = (size, speed)
+            largest = size * speed**2
     if not largest:
         raise refusals[0]
     return best
@@ -225,8 +229,12 @@ def _force_headroom(base: Scenario) -> float:
     """Return the factor by which the forces among the gains can grow, until the first reaches the
     actuator's limit.
     """
-    law, plant, u_max = base.law, base.plant, min(base.limits)
-    rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model != "none"
+    law = base.law
+    plant = base.plant
+    u_max = min(base.limits)
+    rest = np.zeros(plant.n)
+    p = plant.values({})
+    with_model = base.resolved.model != "none"
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
     force = min(accelerations) if with_model else u_max
     limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
@@ -252,7 +260,9 @@ def _largest_size(predicted: Callable[[float], float], wanted: float, limit: flo
     as too large.
     """
     limit = min(limit, MAX_SIZE_RATIO)
-    low, high, oscillates = 0.0, math.inf, False
+    low = 0.0
+    high = math.inf
+    oscillates = False
 
     def amplitude_at(size: float) -> float:
         nonlocal low, high, oscillates
@@ -260,7 +270,8 @@ def _largest_size(predicted: Callable[[float], float], wanted: float, limit: flo
         if amplitude > wanted or (oscillates and math.isnan(amplitude)):
             high = size
         else:
-            low, oscillates = size, not math.isnan(amplitude)
+            low = size
+            oscillates = not math.isnan(amplitude)
         return amplitude
 
     amplitude = amplitude_at(min(1.0, limit))

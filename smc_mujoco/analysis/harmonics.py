@@ -81,7 +81,10 @@ class Loop:
     """The law and the linearised mechanism of one driven channel of a scenario."""
 
     def __init__(self, scenario: Scenario, channel: int = 0):
-        self.scenario, self.channel, self.delay, s = scenario, channel, 0.0, scenario.resolved
+        self.scenario = scenario
+        self.channel = channel
+        self.delay = 0.0
+        s = scenario.resolved
         plant = s.plant
         if not s.clock.regular:
             cure = "leave the clock out, or measure it in a run"
@@ -151,7 +154,8 @@ class Loop:
             self.b = b[:, drive_ids(model)[self.channel]] * math.prod(
                 part.scale for part in s.actuator
             )
-            self.rows, self.nv = dof_ids(model), model.nv
+            self.rows = dof_ids(model)
+            self.nv = model.nv
             if gear is None:
                 self.gap = 0.0
             else:
@@ -160,11 +164,9 @@ class Loop:
     def _nominal_model(self, joint: int) -> tuple[float, ...]:
         """Return nominal f and g of a joint at rest, and the derivatives of f with its x and v."""
         plant = self.scenario.resolved.plant
-        zeros, step, p = (
-            np.zeros(plant.n),
-            np.eye(plant.n)[joint] * DIFFERENCE_STEP,
-            copy.copy(plant.values({})),
-        )
+        zeros = np.zeros(plant.n)
+        step = np.eye(plant.n)[joint] * DIFFERENCE_STEP
+        p = copy.copy(plant.values({}))
         f, g = plant.nominal(zeros, zeros, joint, p)
         fx, fv = (plant.nominal(x, v, joint, p)[0] for x, v in ((step, zeros), (zeros, step)))
         return f, g, (fx - f) / DIFFERENCE_STEP, (fv - f) / DIFFERENCE_STEP
@@ -265,7 +267,8 @@ class Loop:
     def _joint_gap(self, gear: Backlash, model: mujoco.MjModel, data: mujoco.MjData) -> float:
         """Return how far the joint moves while the rotor crosses its play, rad or m: see `play`."""
         dof = self.rows[self.channel]
-        mobility, force = np.zeros(model.nv), np.eye(model.nv)[dof]
+        mobility = np.zeros(model.nv)
+        force = np.eye(model.nv)[dof]
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, mobility[None], force[None])
         motors = [part for part in self.scenario.resolved.actuator if isinstance(part, DCMotor)]
@@ -281,8 +284,11 @@ class Loop:
         for _ in range(HARMONIC_PASSES):
             harmonics = self._harmonics_of_e(amplitude, omega, u, angles)
             angles, u, s = self._excited(harmonics, omega, MAX_SAMPLES_PER_PERIOD)
-        first, at, half = _harmonic(u, angles), _harmonic(s, angles), len(u) // 2
-        early, late = _harmonic(u[:half], angles[:half]), _harmonic(u[half:], angles[half:])
+        first = _harmonic(u, angles)
+        at = _harmonic(s, angles)
+        half = len(u) // 2
+        early = _harmonic(u[:half], angles[:half])
+        late = _harmonic(u[half:], angles[half:])
         return Wave(
             amplitude=amplitude,
             omega=omega,
@@ -337,7 +343,8 @@ class Loop:
                 turns *= clock.turns
                 if abs(amplitude) < NEGLIGIBLE_SHARE * abs(amplitudes[0]):
                     continue
-                answer, e = self._answer(n * omega), amplitude * turns
+                answer = self._answer(n * omega)
+                e = amplitude * turns
                 at = answer[self.rows[self.channel]]
                 x += (answer[self.rows[joint]] / at * e).real
                 v += (answer[self.nv + self.rows[joint]] / at * e).real
@@ -408,10 +415,12 @@ class Controller:
             x, v, q, dq = motion
         else:
             x, v, q, dq = (*motion, np.empty(0), np.empty(0))
-        start, of_joint = np.zeros(len(FIELDS)), models[1] if len(motion) == 4 else (0.0,) * 4
+        start = np.zeros(len(FIELDS))
+        of_joint = models[1] if len(motion) == 4 else (0.0,) * 4
         for field, value in fixed.items():
             start[field] = value
-        out, y = np.empty((len(x), 2)), np.empty(len(FIELDS))
+        out = np.empty((len(x), 2))
+        y = np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
         model = np.array([models[0], of_joint])
         done = _run(
@@ -449,10 +458,8 @@ def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.nda
     A motor's model has no inductance: the voltage V - gear k v becomes the state R i.
     """
     ids = drive_ids(model)
-    outputs, speeds = (
-        len(block) - model.nu + ids,
-        model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]],
-    )
+    outputs = len(block) - model.nu + ids
+    speeds = model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]]
     made = np.pad(block, (0, model.nu))
     if isinstance(drive, DCMotor):
         made[:, speeds] += drive.constant * made[:, outputs]
@@ -489,7 +496,8 @@ def describing_function(
     h = math.tau / omega / samples
     resolved = Scenario(plant="duffing", law=law, model="none").resolved
     controller = Controller(resolved.velocity, None, resolved.law.of_channel(0))
-    memories, total = controller.memories(), 0j
+    memories = controller.memories()
+    total = 0j
     for first in range(0, 2 * samples, CHUNK_SAMPLES):
         at = np.arange(first, min(first + CHUNK_SAMPLES, 2 * samples))
         turns = np.exp(1j * math.tau * (at + 0.5) / samples)
@@ -552,9 +560,14 @@ def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y,
 
     Return the number of samples before that, or -1 if one of the three raised.
     """
-    estimate, sliding, reading = np.empty(2), np.empty(2), np.empty(3)
-    at_reading, at_y, at_out = reading.ctypes.data, y.ctypes.data, out.ctypes.data
-    at_estimate, at_sliding = estimate.ctypes.data, sliding.ctypes.data
+    estimate = np.empty(2)
+    sliding = np.empty(2)
+    reading = np.empty(3)
+    at_reading = reading.ctypes.data
+    at_y = y.ctypes.data
+    at_out = out.ctypes.data
+    at_estimate = estimate.ctypes.data
+    at_sliding = sliding.ctypes.data
     gains = g0.ctypes.data, g1.ctypes.data, g2.ctypes.data
     memories = m0.ctypes.data, m1.ctypes.data, m2.ctypes.data
     for k in range(len(x)):

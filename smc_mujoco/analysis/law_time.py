@@ -44,7 +44,9 @@ class _Listener:
     """In place of a controller's law: keeps what channel 0 measures, and gives the u of a run."""
 
     def __init__(self, u: np.ndarray):
-        self.name, self.u, self.seen = "listener", u, list[Measurement]()
+        self.name = "listener"
+        self.u = u
+        self.seen = list[Measurement]()
 
     def __call__(self, i: int, y: Measurement) -> tuple[float, float]:
         if i == 0:
@@ -59,7 +61,8 @@ def law_time(scenario: Scenario) -> LawTime | None:
     of_channel = scenario.resolved.law
     if of_channel.joint:
         return None
-    timed, reference = of_channel.of_channel(0), law("pid")
+    timed = of_channel.of_channel(0)
+    reference = law("pid")
     try:
         cfunctions.compile_component(timed)
         seen = _measured(scenario)
@@ -79,7 +82,8 @@ def _measured(scenario: Scenario) -> np.ndarray:
     trace: Any = run(
         dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST))
     )
-    controller, listener = Controller(trace.scenario), _Listener(trace.u)
+    controller = Controller(trace.scenario)
+    listener = _Listener(trace.u)
     controller.law = listener  # pyright: ignore[reportAttributeAccessIssue]
     for k in np.flatnonzero(np.isfinite(trace.u).all(axis=1)).tolist():
         controller(k, float(trace.t[k]), trace.x[k], trace.v[k])
@@ -90,18 +94,16 @@ def _measured(scenario: Scenario) -> np.ndarray:
 
 def _round(timed: Law, seen: np.ndarray) -> np.ndarray:
     """Return the time of a law at each sample, s, (samples,)."""
-    function, copies = (
-        cfunctions.compile_component(timed),
-        max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1))),
-    )
-    gains, memory, out = (
-        np.array([*timed.gains.values(), 0.0]),
-        np.zeros((copies, timed.memory + 1)),
-        np.zeros(2),
-    )
-    own, stride = [a.ctypes.data for a in (gains, memory, out)], memory.strides[0]
+    function = cfunctions.compile_component(timed)
+    copies = max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1)))
+    gains = np.array([*timed.gains.values(), 0.0])
+    memory = np.zeros((copies, timed.memory + 1))
+    out = np.zeros(2)
+    own = [a.ctypes.data for a in (gains, memory, out)]
+    stride = memory.strides[0]
     rows = [row.ctypes.data for row in seen]
-    clock, spent = time.perf_counter_ns, np.empty(len(rows))
+    clock = time.perf_counter_ns
+    spent = np.empty(len(rows))
     empty = np.empty(len(rows))
     for k, row in enumerate(rows):
         start = clock()

@@ -67,7 +67,8 @@ def linear(plant: Plant) -> Linear:
     """
     if plant.unmodelled:
         raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
-    n, p = plant.n, SimpleNamespace(**plant.parameters)
+    n = plant.n
+    p = SimpleNamespace(**plant.parameters)
     rest = np.zeros(n)
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
     if (
@@ -92,7 +93,8 @@ def linear(plant: Plant) -> Linear:
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
-    d, small = damping[0, 0], EQUALITY_TOLERANCE * (1.0 + np.abs(stiffness).max())
+    d = damping[0, 0]
+    small = EQUALITY_TOLERANCE * (1.0 + np.abs(stiffness).max())
     if (
         np.abs(damping - d * np.eye(n)).max() > small
         or np.abs(stiffness - stiffness.T).max() > small
@@ -125,10 +127,8 @@ def sampled_mode(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np
     """
     from scipy.linalg import expm
 
-    rates, block = (
-        np.array([[0.0, 1.0], [-stiffness / at.inertia, -at.damping / at.inertia]]),
-        np.zeros((4, 4)),
-    )
+    rates = np.array([[0.0, 1.0], [-stiffness / at.inertia, -at.damping / at.inertia]])
+    block = np.zeros((4, 4))
     block[:2, :2], block[:2, 2:] = rates * h, np.eye(2) * h
     integral = expm(block)[:2, 2:]  # of exp(rates t) over h
     return rates @ integral, integral[:, 1] / at.inertia
@@ -174,7 +174,9 @@ def critical_delay(plant: Plant, lam: Natural, k1: Natural, control_period: Posi
 def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
     """Return the delay at which a sampled mode first becomes unstable, s."""
     e, gamma = sampled_mode(at, stiffness, h)
-    t, d, row = np.trace(e), np.linalg.det(e), lam * np.array([k1, 1.0])
+    t = np.trace(e)
+    d = np.linalg.det(e)
+    row = lam * np.array([k1, 1.0])
     adjugate = np.array([[e[1, 1], -e[0, 1]], [-e[1, 0], e[0, 0]]])
     n1, n0 = row @ gamma, -row @ adjugate @ gamma  # adj(w - E) = w - adj(E)
     trace, determinant = (
@@ -219,11 +221,13 @@ def restoring_force(
     """Return the force, N or N m, that pulls all channels back from the same x > 0, (k,), or None
     without theory.
     """
-    rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
+    rest = law.template and law.template.rest
+    gains = SimpleNamespace(**law.gains)
     if not rest:
         return None
     linear(plant)  # raises for a plant without linear theory
-    p, v = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
+    p = SimpleNamespace(**plant.parameters)
+    v = np.zeros(plant.n)
     ratios = [plant.nominal(np.full(plant.n, 1.0), v, i, p) for i in range(plant.n)]
     if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (
         1.0 + abs(ratios[0][0] / ratios[0][1])

@@ -367,7 +367,8 @@ def margins_of(
             cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
     searches = [kind.search(base, resolution) for base, kind in cells]
     going = dict(enumerate(searches))
-    done, broken = 0, {}
+    done = 0
+    broken = {}
 
     def tolerated(groups: Sequence[Sequence[Scenario]]) -> list[bool]:
         """Run groups of scenarios, and return whether all of a group are tolerated.

@@ -66,7 +66,8 @@ def values(table: Columns, metric: str) -> np.ndarray:
         name = metric
     scores = np.array(table.column(name), float)
     scores[np.isnan(scores)] = CATALOGUE[name].absent
-    plants, missing = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed(table)
+    plants = np.asarray(table.column("plant"), str)
+    missing = np.isnan(scores) & ~failed(table)
     without_metric = set(plants[missing]) - set(plants[~missing & ~failed(table)])
     scores[failed(table)] = np.inf
     scores[np.isin(plants, list(without_metric))] = np.nan
@@ -87,7 +88,8 @@ class ByRow(NamedTuple):
 
 def by_row(table: Columns, metric: str) -> ByRow:
     """Return a metric of the rows of a table, with what is charged to it."""
-    name, whole = "settling_time" if metric == SETTLES else metric, values(table, metric)
+    name = "settling_time" if metric == SETTLES else metric
+    whole = values(table, metric)
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
     halves = np.where(np.isnan(whole), np.nan, halves)
     if metric == SETTLES:
@@ -127,10 +129,13 @@ def failed(table: Columns) -> np.ndarray:
 
 def failures(table: Columns) -> list[str]:
     """Return a sentence for each law with failed runs: how many, and how the first one failed."""
-    laws, lost, how = np.asarray(table.column("law"), str), failed(table), table.column("failure")
+    laws = np.asarray(table.column("law"), str)
+    lost = failed(table)
+    how = table.column("failure")
     sentences = []
     for law in dict.fromkeys(laws[lost].tolist()):
-        its, runs = how[lost & (laws == law)], counted(int((laws == law).sum()), "run")
+        its = how[lost & (laws == law)]
+        runs = counted(int((laws == law).sum()), "run")
         sentences.append(
             f"{law} failed in {len(its)} of {runs}, the first: {one_line(its[0] or 'it diverged')}."
         )
@@ -205,13 +210,15 @@ class Group:
             return Scores([], {}, {}, {}, {}, {})
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
-            laws, where = ", ".join(self.laws), ", ".join(self.name.values())
+            laws = ", ".join(self.laws)
+            where = ", ".join(self.name.values())
             raise ScenarioError(
                 f"{laws} have no run of {where} in common: run them in the same conditions and seeds"
             )
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
-        blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
+        blocks = np.flatnonzero(common.any(axis=1))
+        seeds = np.flatnonzero(common.any(axis=0))
         cubes = cube, self.outcome, self.sets, *charged
         parts = (dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in cubes)
         return Scores(blocks.tolist(), *parts)
@@ -345,7 +352,8 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     if scenario is None or metric == SETTLES:
         return 0.0
     entry = CATALOGUE[metric]
-    driven, T = [group for group in channel_groups(scenario) if group.driven], scenario.duration
+    driven = [group for group in channel_groups(scenario) if group.driven]
+    T = scenario.duration
     # a free body may rest anywhere
     if scenario.plant.pose:
         rest = scenario.plant.rest

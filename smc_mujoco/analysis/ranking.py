@@ -144,7 +144,9 @@ class Comparison:
         def stacked(by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
             return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
 
-        self.laws, self.shares, self.relevant = tuple(sorted(scores)), shares, relevant
+        self.laws = tuple(sorted(scores))
+        self.shares = shares
+        self.relevant = relevant
         self.cells = cells = stacked(scores, float)  # (laws, blocks, seeds)
         unknown = np.full(cells.shape, math.nan)
         # as cells, at half the physics step
@@ -199,7 +201,8 @@ class Comparison:
             self._plain = cells
         else:
             self._plain = _logarithms(cells, self.floors)
-        self._gains, self._results = gains, results
+        self._gains = gains
+        self._results = results
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
@@ -234,7 +237,8 @@ class Comparison:
         """Whether the median of a law is lower than another's by what is relevant, (blocks, laws,
         laws).
         """
-        centre, floors = self.centres.T, self.floors[:, None, None]
+        centre = self.centres.T
+        floors = self.floors[:, None, None]
         if self.shares:
             return centre[:, None, :] - centre[:, :, None] > self.relevant
         return exceeds(centre[:, None, :], centre[:, :, None], floors, self.relevant)
@@ -317,12 +321,14 @@ class Comparison:
         """Return how a law compares with a rival in a block, at the level of a winner's comparison
         or of any pair's.
         """
-        a, b = self.laws.index(law), self.laws.index(rival)
+        a = self.laws.index(law)
+        b = self.laws.index(rival)
         if winner:
             error = self.limits.winner
         else:
             error = self.limits.pair
-        leads, lags = self.leads[block, a, b], self.leads[block, b, a]
+        leads = self.leads[block, a, b]
+        lags = self.leads[block, b, a]
         with np.errstate(over="ignore"):
             ends = np.exp([interval(lags, error)[1], -interval(leads, error)[1]])
             plain = _difference(self._plain[b, block], self._plain[a, block])
@@ -343,7 +349,8 @@ class Comparison:
 
         It makes up for what half the step and trends charge, too.
         """
-        a, b = self.laws.index(law), self.laws.index(rival)
+        a = self.laws.index(law)
+        b = self.laws.index(rival)
         lead = least_visible_lead(self.leads[block, a, b], self.limits.first, self.relevant)
         plain = self._by_unit(
             _difference(self._plain[b, block], self._plain[a, block]), block, a, b
@@ -361,7 +368,8 @@ class Comparison:
         They are returned where they are `apart`, as for any other number.
         """
         a = self.laws.index(law)
-        whole, half = self.cells[a, block], self.halves[a, block]
+        whole = self.cells[a, block]
+        half = self.halves[a, block]
         if self.shares or not (again := ~np.isnan(half)).any():
             return None
         before, after = (float(middle(values[again])) for values in (whole, half))
@@ -397,7 +405,8 @@ def bounds(
             repeated, np.fmax(cells, halves), cells
         )
     no_floor = np.zeros(len(floors))
-    whole, half = _logarithms(cells, no_floor), _logarithms(halves, no_floor)
+    whole = _logarithms(cells, no_floor)
+    half = _logarithms(halves, no_floor)
     change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
     widening = np.zeros(cells.shape[:2])
     known = repeated.any(axis=2)
@@ -419,7 +428,8 @@ def _rises(trends: np.ndarray, relevant: float) -> np.ndarray:
     """Return log rho of each law in each block, (laws, blocks); 0 where it is not relevant, or not
     known.
     """
-    rho, known = np.ones(trends.shape[:2]), ~np.isnan(trends).all(axis=2)
+    rho = np.ones(trends.shape[:2])
+    known = ~np.isnan(trends).all(axis=2)
     rho[known] = np.nanmedian(trends[known], axis=1)
     with np.errstate(divide="ignore"):
         rise = np.log(rho)
@@ -473,7 +483,8 @@ def _centres(by_run: np.ndarray, runs: np.ndarray, labels: tuple[int, ...] | Non
         return centres
     for unit in range(max(labels) + 1):
         ordered = np.sort(by_run[runs[np.array(labels) == unit]])
-        low, high = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
+        low = ordered[(ordered.size - 1) // 2]
+        high = ordered[ordered.size // 2]
         # also of two opposite infinite values
         if low == -high:
             centres[unit] = 0.0
@@ -534,7 +545,8 @@ def _linked(*sets: bytes) -> tuple[int, ...] | None:
     count = nodes = (
         len(sets[0]) // 8
     )  # a node for each run, then one for each set of gains; no matrix of pairs of runs
-    runs, their_sets = [], []
+    runs = []
+    their_sets = []
     for numbers in (np.frombuffer(one, np.int64) for one in sets):
         there = np.flatnonzero(numbers >= 0)
         distinct, which = np.unique(numbers[there], return_inverse=True)
@@ -567,10 +579,12 @@ def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
 
 def corrected_limits(comparisons: Sequence[Comparison]) -> Limits:
     """Return the limits of p-values for comparisons that form one family."""
-    pairs, winners = [], []
+    pairs = []
+    winners = []
     for one in comparisons:
         if len(one.laws) > 1:
-            p, diagonal = one.p[~one.untested], np.eye(len(one.laws), dtype=bool)
+            p = one.p[~one.untested]
+            diagonal = np.eye(len(one.laws), dtype=bool)
             pairs.append(
                 np.minimum(p, p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel()
             )
@@ -626,7 +640,8 @@ def exceeds(
     """Return whether a is larger than b by more than what is relevant, with both at least the floor
     q; a, b >= 0.
     """
-    larger, smaller = np.asarray(np.maximum(a, floor)), np.asarray(np.maximum(b, floor))
+    larger = np.asarray(np.maximum(a, floor))
+    smaller = np.asarray(np.maximum(b, floor))
     return np.asarray((larger > smaller) & ((1.0 - relevant) * larger > smaller))
 
 
@@ -698,7 +713,8 @@ def _tail(n: int, sums: np.ndarray) -> np.ndarray:
         return _distribution(n)[sums]
     from scipy.special import ndtr
 
-    mean, deviation = n * (n + 1) / 4, math.sqrt(n * (n + 1) * (2 * n + 1) / 6) / 2
+    mean = n * (n + 1) / 4
+    deviation = math.sqrt(n * (n + 1) * (2 * n + 1) / 6) / 2
     return ndtr((mean - sums + 0.5) / deviation)
 
 

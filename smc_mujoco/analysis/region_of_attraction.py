@@ -69,7 +69,9 @@ POSITION_REACH = {
 }  # X, chosen
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last third has one
-CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
+CONVERGES = 1
+UNDECIDED = 0
+DOES_NOT = -1
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -188,14 +190,14 @@ def basin_of(
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
-    undecided, done, broken = list(np.ndindex(*outcome.shape)), 0.0, {}
+    undecided = list(np.ndindex(*outcome.shape))
+    done = 0.0
+    broken = {}
     for i, horizon in enumerate(HORIZONS):
         shortened = dataclasses.replace(base, duration=horizon * base.duration)
         needed = done + len(undecided) * base.work * sum(HORIZONS[i:])
-        size, left = (
-            max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n))),
-            [],
-        )
+        size = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n)))
+        left = []
         for begin in range(0, len(undecided), size):
             batch = undecided[begin : begin + size]
             cases = [dataclasses.replace(shortened, x0=x[k], v0=v[j]) for j, k in batch]
@@ -229,7 +231,8 @@ def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int |
     """
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
-    x_reach, v_reach = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
+    x_reach = np.abs(x).max() or 1.0
+    v_reach = np.abs(v).max() or 1.0
     e = error(trace)
     distance = np.maximum(np.abs(e / x_reach), np.abs(trace.v / v_reach)).max(axis=1)
     if final:
@@ -238,9 +241,11 @@ def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int |
         late = slice(-(distance.size // EARLY_PARTS), None)
     inside = distance[late] <= SETTLING_BAND
     squares = ((e / x_reach) ** 2 + (trace.v / v_reach) ** 2).sum(axis=1)
-    start, square = squares[0], squares[late]
+    start = squares[0]
+    square = squares[late]
     middle = square.size // 2
-    first_half, second_half = square[:middle].max(), square[middle:].max()
+    first_half = square[:middle].max()
+    second_half = square[middle:].max()
     if final or start > NEAR_SQUARE:
         near = NEAR_SQUARE
     else:

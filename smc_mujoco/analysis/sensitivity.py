@@ -97,7 +97,8 @@ class Space:
     def scenario_at(self, shares: np.ndarray) -> Scenario:
         """Return the scenario at a share of each axis."""
         known = dict(zip(self.names, shares.tolist(), strict=True))
-        m, chance = len(self.members.constants), round(known.get(CHANCE, 0.0) * MAX_SEED)
+        m = len(self.members.constants)
+        chance = round(known.get(CHANCE, 0.0) * MAX_SEED)
         drawn = self.members.random(np.random.default_rng(chance))
         member = Member(
             shares[:m],
@@ -142,7 +143,8 @@ class Explained:
 
 def _random(scenario: Scenario) -> bool:
     """Return whether a run depends on the scenario's seed."""
-    noise, sensor = scenario.noise, scenario.sensor
+    noise = scenario.noise
+    sensor = scenario.sensor
     disturbed = any(signal.random for signal in scenario.disturbance)
     return bool(
         noise.position
@@ -161,7 +163,8 @@ def designs(points: int, k: int, seed: int) -> np.ndarray:
     from scipy.stats import qmc
 
     drawn = qmc.Sobol(2 * k, rng=np.random.default_rng(seed)).random(points)
-    a, b = drawn[:, :k], drawn[:, k:]
+    a = drawn[:, :k]
+    b = drawn[:, k:]
     mixed = np.repeat(a[None], k, axis=0)
     for i in range(k):
         mixed[i, :, i] = b[:, i]
@@ -212,7 +215,8 @@ def indices(
     """Return each axis with its indices."""
     from scipy.stats import sobol_indices, spearmanr
 
-    k, positive = len(space.names), scores.min() > 0.0
+    k = len(space.names)
+    positive = scores.min() > 0.0
     parts = (np.log(scores) if positive else scores).reshape(-1, points)
     first = total = [Interval(0.0, 0.0, 0.0, points)] * k
     if np.ptp(parts[:2]):
@@ -257,7 +261,8 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
     """Return regions where runs fail, chosen by the first half of the points and told by the
     second.
     """
-    half, found = len(failed) // 2, []
+    half = len(failed) // 2
+    found = []
     left = np.ones(len(failed), bool)  # not in a region yet
     axes = [i for i, name in enumerate(space.names) if name != CHANCE]
     single = []
@@ -312,7 +317,8 @@ def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
     """Return how well a region where more fail explains failures: the gain in log likelihood less
     BIC's price.
     """
-    n, inside = len(failed), int(within.sum())
+    n = len(failed)
+    inside = int(within.sum())
     if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
         return 0.0
     parts = [failed[within], failed[~within]]
@@ -320,7 +326,8 @@ def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
 
 
 def _log_likelihood(failed: np.ndarray) -> float:
-    n, k = len(failed), int(failed.sum())
+    n = len(failed)
+    k = int(failed.sum())
     return sum(count * math.log(count / n) for count in (k, n - k) if count)
 
 
@@ -343,7 +350,8 @@ def improvement(space: Space, shares: np.ndarray, values: np.ndarray) -> Improve
     best = min(
         halves, key=lambda cut: float(np.median(values[:half][_within([cut], shares[:half])]))
     )
-    told, within = values[half:], _within([best], shares[half:])
+    told = values[half:]
+    within = _within([best], shares[half:])
     if not 0 < within.sum() < len(told):
         return None
     if mannwhitneyu(told[within], told[~within], alternative="less").pvalue > 1 - LEVEL:

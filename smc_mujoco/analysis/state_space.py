@@ -55,13 +55,15 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         model.opt.disableflags |= NONLINEAR_FLAGS
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = models.initial_state(model, at)
-        driven, dofs = drive_ids(model), dof_ids(model)
+        driven = drive_ids(model)
+        dofs = dof_ids(model)
         _hold(model, data, driven, plant.name)
         block = rates(model, data)
     order = [*dofs, *(i for i in range(model.nv) if i not in dofs)]
     order += [model.nv + i for i in order]
     n = len(order)
-    a, b = block[:n, :n][np.ix_(order, order)], block[:n, n:][np.ix_(order, driven)]
+    a = block[:n, :n][np.ix_(order, order)]
+    b = block[:n, n:][np.ix_(order, driven)]
     names = joint_names(plant)
     if plant.pose:
         labels = names
@@ -75,7 +77,8 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         drives = [model.actuator(i).name for i in driven]
     else:
         drives = names[: plant.driven]
-    inputs, outputs = [f"u[{name}]" for name in drives], [f"x[{name}]" for name in names]
+    inputs = [f"u[{name}]" for name in drives]
+    outputs = [f"x[{name}]" for name in names]
     return StateSpace(
         a,
         b,
@@ -103,7 +106,9 @@ def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return d(rates) / d(positions, velocities, activations, commands) at `data`, square; rows of
     commands are 0.
     """
-    nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
+    nv = model.nv
+    n = 2 * model.nv + model.na
+    step = float(model.opt.timestep)
     point = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
     model.opt.timestep = INSTANT_STEP  # the force of a drive is that at the end of a step
 

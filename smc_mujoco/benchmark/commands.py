@@ -68,7 +68,8 @@ def enter(
         from smc_mujoco.benchmark.results import TITLES
         from smc_mujoco.benchmark.results import results as load
 
-    terminal, number = Terminal(), ""
+    terminal = Terminal()
+    number = ""
     if hidden:
         with reading(hidden, "file with the number", "write 64 hex digits in it") as file:
             number = file.read_text(encoding="utf-8").strip()

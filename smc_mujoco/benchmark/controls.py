@@ -59,8 +59,10 @@ def oracle_pair(y, gains, memory):
         y.gq / y.g,
     )  # the partner's acceleration is b times the joint's, and beside it that of its fall
     a = -b * gains.fall
-    k1, k2 = w**4 / a, 4.0 * w**3 / a
-    k3, k4 = -(6.0 * w * w + k1 + a) / b, -(4.0 * w + k2) / b
+    k1 = w**4 / a
+    k2 = 4.0 * w**3 / a
+    k3 = -(6.0 * w * w + k1 + a) / b
+    k4 = -(4.0 * w + k2) / b
     s = k1 * y.e + k2 * y.de + k3 * y.q + k4 * y.dq
     return (y.ddr - y.f + s) / y.g, s
 

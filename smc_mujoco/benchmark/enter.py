@@ -66,7 +66,8 @@ def enter(
       ScenarioError: a folder that is no entry, a law that crashes, never ends, or takes too much
         memory; or a result that is not what the entry gives.
     """
-    entry, problems = entries.read(folder), suite.suite(name)
+    entry = entries.read(folder)
+    problems = suite.suite(name)
     target = Path(out) / name / slug(entry.name)
     if (other := _entered(target)) not in ("", entry.name):
         raise ScenarioError(
@@ -167,7 +168,8 @@ def _all_runs(
 
     Return the report, and the marks that stand beside the entry wherever it is ranked.
     """
-    unchecked, whole = first["why_unchecked"], len(order["problems"]) * len(order["instances"])
+    unchecked = first["why_unchecked"]
+    whole = len(order["problems"]) * len(order["instances"])
     limit = LEAST_TIME + SLACK * whole * first["seconds"]
     with bar(name, whole * (2 if unchecked else 1), progress, counted=True) as shown:
         report = entrant.tried(order, limit, lambda done: shown.reached(done, shown.whole))
@@ -201,7 +203,8 @@ def _better_on_visible(visible: runs.Runs, hidden: runs.Runs) -> list[str]:
     """
     from scipy.stats import binomtest
 
-    shown, kept = visible.medians(), hidden.medians()
+    shown = visible.medians()
+    kept = hidden.medians()
     both = [name for name in shown if name in kept and shown[name]["itae"] != kept[name]["itae"]]
     worse = sum(kept[name]["itae"] > (1.0 + APART) * shown[name]["itae"] for name in both)
     if not both or binomtest(worse, len(both), 0.5, "greater").pvalue > CHANCE:

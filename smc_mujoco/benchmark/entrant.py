@@ -28,16 +28,20 @@ def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any
     its law.
     """
     say("reading its folder")
-    entry, instances, failures = entries.read(order["folder"]), order["instances"], list[str]()
+    entry = entries.read(order["folder"])
+    instances = order["instances"]
+    failures = list[str]()
     about: dict[str, Any] = {}
-    done, spent = 0, 0.0
+    done = 0
+    spent = 0.0
 
     def groups() -> Iterator[list[runs.Row]]:
         nonlocal done, spent
         for name in order["problems"]:
             one = problem(name)
             say(f"making its law for {one.plant}")
-            law, found = entry.law(one.plant), list[runs.Row]()
+            law = entry.law(one.plant)
+            found = list[runs.Row]()
             for i in range(0, len(instances), AT_ONCE):
                 part = instances[i : i + AT_ONCE]
                 scenarios = one.scenarios(law, part, order["number"])
@@ -117,9 +121,11 @@ def same(first: Path, second: Path, problems: Sequence[str]) -> str:
     """Return the first run that two tables answer differently, as "duffing/noise@1#03"; "" if all
     are equal.
     """
-    one, two = runs.Runs(first), runs.Runs(second)
+    one = runs.Runs(first)
+    two = runs.Runs(second)
     for name in problems:
-        a, b = one.columns(name), two.columns(name)
+        a = one.columns(name)
+        b = two.columns(name)
         differ = np.any(
             [~np.isclose(a[column], b[column], 0.0, 0.0, equal_nan=True) for column in a], axis=0
         )

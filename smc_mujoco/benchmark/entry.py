@@ -40,7 +40,8 @@ from smc_mujoco.control.law import Law, known_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.mechanisms.plant import plants
 
-ABOUT, FILES = "entry.toml", ("law.py", "law.c", "law.fmu")
+ABOUT = "entry.toml"
+FILES = ("law.py", "law.c", "law.fmu")
 TEXTS = "name", "source", "licence"
 DIVISIONS = {
     "one set": "one set of gains, [gains.all], for all plants",

@@ -38,7 +38,8 @@ AHEAD = (
 )
 ALONG = 1.5  # of w, chosen: bandwidth along the thrust, which waits for no attitude
 LEAST = 0.2  # of the weight, of the thrust: chosen
-PLACES, SPINS = np.array(quadrotor.PLACES), np.array(quadrotor.SPINS)
+PLACES = np.array(quadrotor.PLACES)
+SPINS = np.array(quadrotor.SPINS)
 ROTORS = 4
 OF_BODY = "a", "c", "fmax"
 TOLD = [
@@ -49,7 +50,8 @@ TOLD = [
 @njit(error_model="numpy")
 def _left(t, move):
     """Return what is left of the way at a time, as a share, and its four derivatives, (5,)."""
-    left, s = np.zeros(5), min(t / move, 1.0)
+    left = np.zeros(5)
+    s = min(t / move, 1.0)
     left[0] = 1.0
     for k in range(5 if s < 1.0 else 1):
         for i in range(5):
@@ -68,19 +70,15 @@ def _plan(y, gains, memory):
     The acceleration is that of the centre of mass. Also keep what the next sample needs: the error
     at the start, v (of the heading the error), r'' and the next derivative of this sample.
     """
-    start, v, ddr, dddr, acceleration = (
-        memory[:, 0],
-        memory[:, 1],
-        memory[:, 2],
-        memory[:, 3],
-        np.zeros(6),
-    )
-    first, left, plan, now = (
-        memory[0, 7] == 0.0,
-        _left(y.t, gains.move),
-        np.zeros((5, 6)),
-        np.zeros((3, 6)),
-    )
+    start = memory[:, 0]
+    v = memory[:, 1]
+    ddr = memory[:, 2]
+    dddr = memory[:, 3]
+    acceleration = np.zeros(6)
+    first = memory[0, 7] == 0.0
+    left = _left(y.t, gains.move)
+    plan = np.zeros((5, 6))
+    now = np.zeros((3, 6))
     if first:
         start[:], v[:], v[5], ddr[:] = y.e, y.v, y.e[5], y.ddr
     for i in range(6):
@@ -107,7 +105,9 @@ def _jerk(gains, now, modelled, memory, dt):
     """Return the jerk, (3,): that of the rotors' thrust, and through a filter that of all other
     forces.
     """
-    before, other, jerk = memory[:3, 4], memory[3:, 4], np.zeros(3)
+    before = memory[:3, 4]
+    other = memory[3:, 4]
+    jerk = np.zeros(3)
     share = dt * FILTER * gains.w / (1.0 + dt * FILTER * gains.w)
     for i in range(3):
         if memory[0, 7] == 0.0:
@@ -163,13 +163,13 @@ def _shares(y, gains, T, torque, speeds, told, supply):
 
     Write the speeds that they are told, which are less by what the supply lacks.
     """
-    u, total, levers = np.zeros(6), 0.0, (gains.a, gains.a, gains.c)
+    u = np.zeros(6)
+    total = 0.0
+    levers = (gains.a, gains.a, gains.c)
     for j in range(ROTORS):
-        signs, wanted, whole = (
-            (PLACES[j, 1], -PLACES[j, 0], -SPINS[j]),
-            T,
-            1.0 - gains.fade if j == 0 else 1.0,
-        )
+        signs = (PLACES[j, 1], -PLACES[j, 0], -SPINS[j])
+        wanted = T
+        whole = 1.0 - gains.fade if j == 0 else 1.0
         for i in range(3):
             wanted += signs[i] * torque[i] / levers[i]
         goal = speed_for(gains, 0.25 * wanted / whole)
@@ -195,26 +195,28 @@ def _shares(y, gains, T, torque, speeds, told, supply):
 )
 def oracle_flight(y, gains, memory):
     """Return the force and torque, and the error from the plan."""
-    w, along, m, first = gains.w, ALONG * gains.w, y.M[0, 0], memory[0, 7] == 0.0
-    speeds, told = memory[:, 5], memory[:, 6]
+    w = gains.w
+    along = ALONG * gains.w
+    m = y.M[0, 0]
+    first = memory[0, 7] == 0.0
+    speeds = memory[:, 5]
+    told = memory[:, 6]
     plan, now = _plan(y, gains, memory)
-    thrusts, off, attitude = (
-        _turn(gains, speeds, told, y.dt, first),
-        plan[:3] - now,
-        quaternion(y.x[3], y.x[4], y.x[5]),
-    )
-    T, dT, p, q, r, momentum, drag = (
-        thrusts[0].sum(),
-        thrusts[1].sum(),
-        y.v[3],
-        y.v[4],
-        y.v[5],
-        0.0,
-        0.0,
-    )
+    thrusts = _turn(gains, speeds, told, y.dt, first)
+    off = plan[:3] - now
+    attitude = quaternion(y.x[3], y.x[4], y.x[5])
+    T = thrusts[0].sum()
+    dT = thrusts[1].sum()
+    p = y.v[3]
+    q = y.v[4]
+    r = y.v[5]
+    momentum = 0.0
+    drag = 0.0
     now_jerk = _jerk(gains, now, turned(attitude, T * q / m, -T * p / m, dT / m), memory, y.dt)
     memory[0, 7] = 1.0
-    snap, jerk, torque = np.zeros(3), np.zeros(3), np.zeros(3)
+    snap = np.zeros(3)
+    jerk = np.zeros(3)
+    torque = np.zeros(3)
     for i in range(3):
         lag = 4.0 * (plan[3, i] - now_jerk[i])
         snap[i] = plan[4, i] + w * (
@@ -223,10 +225,8 @@ def oracle_flight(y, gains, memory):
         jerk[i] = plan[3, i] + along * (
             3.0 * off[2, i] + along * (3.0 * off[1, i] + along * off[0, i])
         )
-    across, least = (
-        turned_back(attitude, snap[0], snap[1], snap[2]),
-        LEAST * math.sqrt(inner(y.h, y.h)),
-    )
+    across = turned_back(attitude, snap[0], snap[1], snap[2])
+    least = LEAST * math.sqrt(inner(y.h, y.h))
     now[2, 3] = r * q - (m * across[1] + 2.0 * dT * p) / max(T, least)
     now[2, 4] = (m * across[0] - 2.0 * dT * q) / max(T, least) - r * p
     now[2, 5] = plan[2, 5] + w * (2.0 * off[1, 5] + w * off[0, 5])
@@ -247,7 +247,8 @@ def knowing(scenario: Scenario) -> Scenario:
     """Return a scenario whose law, the oracle of flight, is told all that is true of its plant, and
     the delay.
     """
-    plant, law = scenario.plant, scenario.law
+    plant = scenario.plant
+    law = scenario.law
     true = plant.values(scenario.factors(0))
     known = dict(zip(ROTOR.names or (), quadrotor.rotor(true, 0), strict=True))
     known |= {name: getattr(true, name) for name in OF_BODY} | {

@@ -47,7 +47,8 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
             why = "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
     kept, refused_hidden = sound(results, hidden=True)
-    hidden, made = {found.suite: found for found in kept}, _environment()
+    hidden = {found.suite: found for found in kept}
+    made = _environment()
     left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused + refused_hidden]
     for found in suites:
         values = {"hidden": hidden.get(found.suite), "up": "", "title": found.suite}
@@ -106,7 +107,8 @@ def curves(found: Results, question: str, names: Sequence[str]) -> dict[str, str
     made = {}
     for name in names:
         t, share = found.curve(name, question)
-        x, y = CURVE.width * t / t[-1], CURVE.height * (1.0 - share)
+        x = CURVE.width * t / t[-1]
+        y = CURVE.height * (1.0 - share)
         made[name] = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
     return made
 

@@ -196,11 +196,9 @@ class Problem:
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
         """Return the scenario of an instance."""
-        plant, resolved, force = (
-            base.plant,
-            base.resolved,
-            drawn.disturbance * self._values.get("scale", 1.0),
-        )
+        plant = base.plant
+        resolved = base.resolved
+        force = drawn.disturbance * self._values.get("scale", 1.0)
         mismatch = {}
         for name, value in base.mismatch.items():
             mismatch[name] = value * (force if name in plant.added else 1.0)

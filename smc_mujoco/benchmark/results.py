@@ -116,7 +116,8 @@ class Result:
     """What an entry did. Its runs are read when they are asked for."""
 
     def __init__(self, folder: Path, hidden: bool):
-        self.folder, self.hidden = folder, hidden
+        self.folder = folder
+        self.hidden = hidden
         self.table = folder / (HIDDEN[TABLE] if hidden else TABLE)
         with reading(folder / (HIDDEN[RESULT] if hidden else RESULT), "result", CURE) as file:
             self.about: dict[str, Any] = read_json(file)
@@ -175,7 +176,9 @@ class Results:
     """What entries did on a suite."""
 
     def __init__(self, name: str, entries: Mapping[str, Result], hidden: bool):
-        self.suite, self.entries, self.hidden = name, dict(entries), hidden
+        self.suite = name
+        self.entries = dict(entries)
+        self.hidden = hidden
         self.problems = suite.suite(name)
         informed = {cell: suite.boards(cell) for cell in self.problems}
         self._informing = {
@@ -241,10 +244,12 @@ class Results:
     def _places(self, question: str, names: Sequence[str]) -> list[Standing]:
         """Return the places of entries on a board, the best first."""
         ranks = self.ranks(question, names)
-        count, means = ranks.shape[1], ranks.mean(axis=1)
+        count = ranks.shape[1]
+        means = ranks.mean(axis=1)
         draws = np.random.default_rng(0).integers(count, size=(DRAWS, count))
         drawn = ranks[:, draws].mean(axis=2)  # (entries, DRAWS)
-        order, tails = np.argsort(means, kind="stable"), (50.0 - LEVEL / 2, 50.0 + LEVEL / 2)
+        order = np.argsort(means, kind="stable")
+        tails = (50.0 - LEVEL / 2, 50.0 + LEVEL / 2)
         standings = []
         for i in order.tolist():
             low, high = np.percentile(drawn[i], tails).tolist()
@@ -339,7 +344,8 @@ class Changes:
 
 def _change(new: Results, old: Results, name: str, question: str) -> Change:
     """Return how an entry changed on a board."""
-    measure, ratios = MEASURE[question], {}
+    measure = MEASURE[question]
+    ratios = {}
     for cell in new.on(question):
         now, before = (one.entries[name].medians[cell][measure] for one in (new, old))
         if now == before:
@@ -385,11 +391,9 @@ def sound(folder: Path, hidden: bool) -> tuple[list[Results], list[ScenarioError
 
     Names that share a folder's name are one: the result stands that is in the folder of its name.
     """
-    wanted, of_suite, refused = (
-        HIDDEN[RESULT] if hidden else RESULT,
-        dict[str, dict[str, Result]](),
-        [],
-    )
+    wanted = HIDDEN[RESULT] if hidden else RESULT
+    of_suite = dict[str, dict[str, Result]]()
+    refused = []
     for place in sorted(
         Path(place) for place, _, files in os.walk(folder) if wanted in files
     ):  # skips what vanishes

@@ -65,7 +65,8 @@ class Runs:
     def __init__(self, path: Path):
         import pyarrow.parquet as pq
 
-        self.path, self.file = path, pq.ParquetFile(path)
+        self.path = path
+        self.file = pq.ParquetFile(path)
         self.groups = {self._problem(i): i for i in range(self.file.num_row_groups)}
 
     def _problem(self, group: int) -> str:

@@ -120,7 +120,8 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     """Print everything about a law, surface or estimator of a package, "" for this one; `text` is
     its name or file.
     """
-    parts, is_law = entry(template), template.kind == "law"
+    parts = entry(template)
+    is_law = template.kind == "law"
     console.print(
         Text.assemble(
             (template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")

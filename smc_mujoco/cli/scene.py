@@ -50,7 +50,8 @@ def perform(
     with clock("repeating"):
         again = repeat(scene, threads) if repeated else {}
     for condition, runs in traces.items():
-        title, others = _title(scene, condition), again.get(condition)
+        title = _title(scene, condition)
+        others = again.get(condition)
         for table in [*tables.scores(title, runs, others), *tables.tips(title, runs, others)]:
             terminal.print(table)
         for label, trace in runs.items():
@@ -71,11 +72,10 @@ def perform(
     try:
         if filming:
             with clock("film"):
-                path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
-                runs, names = (
-                    [*traces[scene.film].values()],
-                    [*map(style.label, traces[scene.film])],
-                )
+                path = out / f"{slug(scene.film)}.mp4"
+                title = _title(scene, scene.film)
+                runs = [*traces[scene.film].values()]
+                names = [*map(style.label, traces[scene.film])]
                 written += filmed(runs, path, names, title, terminal, scene.camera)
     finally:  # also if the film fails or is stopped
         terminal.print("wrote", style="dim")

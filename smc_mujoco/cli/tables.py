@@ -85,7 +85,8 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     """
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
-    values, tables = _several(metric_scores, traces, again), []
+    values = _several(metric_scores, traces, again)
+    tables = []
     for group, heading in headings(scenario).items():
         units = {}
         for m in metrics():
@@ -113,10 +114,8 @@ def _noted(tables: list[Table], *words: str) -> list[Table]:
     cells = (cell for table in tables for column in table.columns for cell in column.cells)
     marked = any(MARK in cell.plain for cell in cells if isinstance(cell, Text))
     for table in tables[-1:]:
-        table.caption, table.caption_justify = (
-            "; ".join(filter(None, (*words, SCORE_NOTE * marked))) or None,
-            "left",
-        )
+        table.caption = "; ".join(filter(None, (*words, SCORE_NOTE * marked))) or None
+        table.caption_justify = "left"
     return tables
 
 
@@ -295,7 +294,8 @@ def trace_summary(trace: Trace) -> list[Table]:
     """Return a table for each group of channels: every metric of one trace, with its unit and its
     meaning.
     """
-    values, tables = metric_scores(trace), []
+    values = metric_scores(trace)
+    tables = []
     for group, heading in headings(trace.scenario).items():
         table = titled(
             heading,
@@ -308,10 +308,8 @@ def trace_summary(trace: Trace) -> list[Table]:
         )
         for m in metrics():
             if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
-                value, unit = (
-                    number(values[group.name][m.name]),
-                    m.unit_for(group.unit, group.effort),
-                )
+                value = number(values[group.name][m.name])
+                unit = m.unit_for(group.unit, group.effort)
                 table.add_row(m.name, value, unit, Text(m.summary))
         tables.append(table)
     return tables

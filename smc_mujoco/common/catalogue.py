@@ -314,7 +314,8 @@ class Files(Mapping[str, T_co]):
     """
 
     def __init__(self, package: str, kind: type[T_co]):
-        self.package, self.kind = package, kind
+        self.package = package
+        self.kind = kind
         self.names = sorted(
             info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__)
         )

@@ -219,7 +219,8 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
     """Check the arguments of each call whose parameters declare a constraint, before the function
     runs.
     """
-    constraints, signature = of_parameters(function), inspect.signature(function)
+    constraints = of_parameters(function)
+    signature = inspect.signature(function)
 
     @functools.wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> T:

@@ -227,7 +227,8 @@ def users_stacklevel() -> int:
     """Return the stacklevel of the nearest caller outside this package and `dataclasses`: that of
     the user's line.
     """
-    frame, level = sys._getframe(1), 1
+    frame = sys._getframe(1)
+    level = 1
     inner = "smc_mujoco", "dataclasses"
     while (
         frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in inner

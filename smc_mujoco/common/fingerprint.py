@@ -195,7 +195,8 @@ class _CodePickler(pickle._Pickler):
             names = obj.co_names, obj.co_varnames, obj.co_argcount
             contents = obj.co_code, obj.co_exceptiontable, *names, obj.co_consts
         elif isinstance(obj, type):
-            kind, contents = obj.__qualname__, _class_contents(obj)
+            kind = obj.__qualname__
+            contents = _class_contents(obj)
         elif isinstance(obj, types.Type):
             contents = obj.key  # not its number, which depends on what numba has compiled before
         elif isinstance(obj, set | frozenset):

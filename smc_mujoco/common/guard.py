@@ -101,7 +101,8 @@ def _ended(code: int | None, timeout: float) -> str:
     if code >= 0:
         return f"ended the process with exit code {code}: let it return"
     names = {known.value: known.name for known in signal.Signals}  # without most real-time signals
-    name, does = names.get(-code, f"signal {-code}"), CAUSES.get(-code, "reads, writes or divides")
+    name = names.get(-code, f"signal {-code}")
+    does = CAUSES.get(-code, "reads, writes or divides")
     return f"died of {name} ({signal.strsignal(-code)}): fix where it {does}"
 
 

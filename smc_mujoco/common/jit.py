@@ -347,7 +347,9 @@ class Cache(internals.FunctionCache):
 
     def __init__(self, body: Callable, name: str = "", content: str = ""):
         super().__init__(body)
-        locator, base, self.content = self._impl.locator, self._impl.filename_base, content
+        locator = self._impl.locator
+        base = self._impl.filename_base
+        self.content = content
         digest = hashlib.sha256(content.encode()).hexdigest()[:16]
         of_name = f"{name[:80]}-{{}}-{base}"  # a file's name has 255 bytes at most
         self.files_of_name = of_name.format("?" * len(digest))

@@ -51,7 +51,8 @@ warnings.filterwarnings("ignore", category=UserWarning, module=re.escape(__name_
 def _after_fork() -> None:
     """Free the locks and remove our callbacks: a child process has none of its parent's threads."""
     global _lock, _python_lock
-    _lock, _python_lock = threading.RLock(), threading.RLock()
+    _lock = threading.RLock()
+    _python_lock = threading.RLock()
     mujoco.set_mjcb_control(None)
     if (
         no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock()
@@ -70,10 +71,8 @@ def installed(control: Any) -> Iterator[None]:
     Other threads wait.
     """
     with _lock:
-        before, ours = (
-            _callbacks(),
-            dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()},
-        )
+        before = _callbacks()
+        ours = dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()}
         try:
             _install(ours)
             _given.append(ours)

@@ -41,14 +41,13 @@ class Bar:
         period: float = 0.0,
         delay: float = 0.0,
     ):
-        self.what, self.whole, self.counted, self.draw, self.period = (
-            what,
-            whole,
-            counted,
-            draw,
-            period,
-        )
-        self.done, self.start = 0.0, time.monotonic()
+        self.what = what
+        self.whole = whole
+        self.counted = counted
+        self.draw = draw
+        self.period = period
+        self.done = 0.0
+        self.start = time.monotonic()
         self.due = self.start + delay  # s, of the next drawing
 
     def advance(self, work: float) -> None:
@@ -57,7 +56,8 @@ class Bar:
 
     def reached(self, done: float, whole: float | None) -> None:
         """Set the work done and the whole work, which may change from call to call."""
-        self.done, self.whole = done, whole
+        self.done = done
+        self.whole = whole
         if self.draw is not None and (now := time.monotonic()) >= self.due:
             self.due = now + self.period
             self.draw(self)
@@ -197,12 +197,14 @@ def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None
 
     A bar shows how many runs are done and how many a second.
     """
-    start, done = time.monotonic(), 0
+    start = time.monotonic()
+    done = 0
 
     def stepped(count: int) -> None:
         nonlocal done
         done += count
-        spent, complete = time.monotonic() - start, runs * done / steps if steps else 0.0
+        spent = time.monotonic() - start
+        complete = runs * done / steps if steps else 0.0
         rate = complete / spent if spent else 0.0
         drawn.says(f"{math.floor(complete + 1e-9)} of {runs} runs, {rate:.3g} a second", count)
 

@@ -41,7 +41,8 @@ def rebuild(
     if function not in copies and not _calls_compiled(function):
         copies[function] = finish(function)
     elif function not in copies:
-        space, names = dict(function.__globals__), names_in(function.__code__)
+        space = dict(function.__globals__)
+        names = names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
         copy = FunctionType(
             function.__code__, space, function.__name__, function.__defaults__, cells

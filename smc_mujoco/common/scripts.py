@@ -32,7 +32,8 @@ def users_traceback(error: BaseException) -> str:
     """Return the traceback of an exception that a script raised, without what called it; "" for any
     other exception.
     """
-    step, inside = error.__traceback__, False
+    step = error.__traceback__
+    inside = False
     while step is not None:
         code = step.tb_frame.f_code
         if inside and "runpy" not in code.co_filename:

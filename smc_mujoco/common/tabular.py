@@ -105,10 +105,8 @@ class Tabular:
         """
         names = [self._names(i) for i in range(self.left)]
         numbers = range(self.left, len(self.headings))
-        columns, narrow = (
-            [self._column(i) for i in numbers],
-            [self._column(i, narrow=True) for i in numbers],
-        )
+        columns = [self._column(i) for i in numbers]
+        narrow = [self._column(i, narrow=True) for i in numbers]
         while sum(_widest(column) + 1 for column in [*names, *columns]) - 1 > width:
             savings = []
             for wide, other in zip(columns, narrow, strict=True):

@@ -39,7 +39,8 @@ def of_thrust(F, r):
     The heading is the first axis of the rotation vector r, (3,), or minus its third one if the
     force is along the first, as in a flip.
     """
-    size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
+    size = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
+    heading = quaternion(r[0], r[1], r[2])
     if size > MIN_FORCE:
         z = (F[0] / size, F[1] / size, F[2] / size)
     else:
@@ -56,22 +57,19 @@ def rate_of(wanted, F, dF, r, dr):
     """Return the rate of the attitude `wanted` by `of_thrust`, in its axes, as F and r change by dF
     and dr a second.
     """
-    size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
+    size = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
+    heading = quaternion(r[0], r[1], r[2])
     if size <= MIN_FORCE:
         return 0.0, 0.0, 0.0
-    x, y, z = (
-        turned(wanted, 1.0, 0.0, 0.0),
-        turned(wanted, 0.0, 1.0, 0.0),
-        turned(wanted, 0.0, 0.0, 1.0),
-    )
+    x = turned(wanted, 1.0, 0.0, 0.0)
+    y = turned(wanted, 0.0, 1.0, 0.0)
+    z = turned(wanted, 0.0, 0.0, 1.0)
     along = _dot(z, dF)
     dz = (dF[0] - along * z[0]) / size, (dF[1] - along * z[1]) / size, (dF[2] - along * z[2]) / size
     ahead = _ahead(z, heading)
     turning = _cross(rate(r[0], r[1], r[2], dr[0], dr[1], dr[2]), ahead)
-    b, db = (
-        turned(heading, ahead[0], ahead[1], ahead[2]),
-        turned(heading, turning[0], turning[1], turning[2]),
-    )
+    b = turned(heading, ahead[0], ahead[1], ahead[2])
+    db = turned(heading, turning[0], turning[1], turning[2])
     across = _cross(z, b)
     yaw = (_dot(x, _cross(dz, b)) + _dot(x, _cross(z, db))) / math.sqrt(_dot(across, across))
     return -_dot(y, dz), _dot(x, dz), -yaw
@@ -107,8 +105,12 @@ def _of_axes(x, y, z):
         1 - x[0] + y[1] - z[2],
         1 - x[0] - y[1] + z[2],
     )
-    a, b, c = y[2] - z[1], z[0] - x[2], x[1] - y[0]
-    d, e, f = x[1] + y[0], z[0] + x[2], y[2] + z[1]
+    a = y[2] - z[1]
+    b = z[0] - x[2]
+    c = x[1] - y[0]
+    d = x[1] + y[0]
+    e = z[0] + x[2]
+    f = y[2] + z[1]
     if squares[0] >= 1.0:
         root = 2.0 * math.sqrt(squares[0])
         return 0.25 * root, a / root, b / root, c / root
@@ -145,7 +147,9 @@ def steer(y, v, stiffness, damping, memory):
     attitude, and that attitude's own. In two slots the memory keeps the filtered e' and r'' of the
     sample before, and whether there was one.
     """
-    m, F, dF = y.M[0, 0], np.zeros(3), np.zeros(3)
+    m = y.M[0, 0]
+    F = np.zeros(3)
+    dF = np.zeros(3)
     if memory[0, 1] == 0.0:
         memory[:3, 0], memory[3:, 0], memory[0, 1] = y.de[:3], y.ddr[:3], 1.0
     for i in range(3):
@@ -170,9 +174,12 @@ def shorter(error, turning):
 
     q and -q are the same attitude, and the sign is that of the shorter way.
     """
-    sign, angle, change = 1.0 if error[0] >= 0.0 else -1.0, np.zeros(3), np.zeros(3)
+    sign = 1.0 if error[0] >= 0.0 else -1.0
+    angle = np.zeros(3)
+    change = np.zeros(3)
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
+        j = (i + 1) % 3
+        k = (i + 2) % 3
         angle[i] = 2.0 * sign * error[1 + i]
         change[i] = sign * (
             error[0] * turning[i] + error[1 + j] * turning[k] - error[1 + k] * turning[j]
@@ -188,8 +195,10 @@ def wrench(y, F, v, moving):
     The thrust is at least `LEAST` of the weight, also upside down. v, (3,), is the change of the
     angular velocity relative to the wanted one, `moving`, in the axes of the body.
     """
-    u, w = np.zeros(6), (y.v[3], y.v[4], y.v[5])
-    up, carried = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0), _cross(w, moving)
+    u = np.zeros(6)
+    w = (y.v[3], y.v[4], y.v[5])
+    up = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0)
+    carried = _cross(w, moving)
     thrust = max(_dot(F, up), LEAST * math.sqrt(_dot(y.h, y.h)))
     for i in range(3):
         u[i] = thrust * up[i]

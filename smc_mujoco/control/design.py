@@ -30,7 +30,9 @@ def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
             f"{plant.name}'s channel {plant.driven} has no actuator, and {law} does not see such a joint: "
             "take the law 'hierarchical', which does"
         )
-    p, rest, rows = SimpleNamespace(**plant.parameters), np.zeros(plant.n), []
+    p = SimpleNamespace(**plant.parameters)
+    rest = np.zeros(plant.n)
+    rows = []
     for i, moved in enumerate(DIFFERENCE_STEP * np.eye(plant.n)):
         f = [plant.nominal(x, rest, i, p)[0] for x in (moved, -moved)]
         f += [plant.nominal(rest, v, i, p)[0] for v in (moved, -moved)]
@@ -52,7 +54,8 @@ def at_plant(law: Law, plant: Plant) -> Law:
             missing[name] = known[name].plant
     if not missing:
         return law
-    values, order = linearised(plant, law.name), ("a1", "a2", "b")
+    values = linearised(plant, law.name)
+    order = ("a1", "a2", "b")
     gains = dict(law.gains) | {
         name: values[order.index(of_plant)] for name, of_plant in missing.items()
     }

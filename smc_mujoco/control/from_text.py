@@ -68,7 +68,8 @@ def laws(text: object) -> list[str | Law]:
         find("law", text, known_laws())
         return [str(text)]
     if os.path.exists(text):
-        head, gains = text, {}
+        head = text
+        gains = {}
     elif labelled := LABELLED.fullmatch(text):
         return [law(labelled["rest"]).named(labelled["label"].strip())]
     else:
@@ -173,7 +174,8 @@ READERS |= {**dict.fromkeys((".c", ".so"), _of_annex("c")), ".fmu": _of_annex("f
 
 def _reader(text: str) -> Callable[[str], list[Any]] | None:
     """Return the function that reads the laws of a file; None if the text names no file."""
-    suffix, exists = Path(text).suffix, os.path.exists(text)
+    suffix = Path(text).suffix
+    exists = os.path.exists(text)
     if suffix in READERS and not exists:
         raise ScenarioError(f"no file {text!r}: give a file with a law in it, or a name")
     if suffix not in READERS and exists:

@@ -93,7 +93,8 @@ def law(
         return base
     plant = as_plant(plant)
     if gains == "study":
-        of_plant, search = STUDY[paper_plant(plant.name)], None
+        of_plant = STUDY[paper_plant(plant.name)]
+        search = None
         values = find("law of the paper's study", STUDY_ALIASES.get(name, name), of_plant)
     else:
         shipped = tuned(plant, name, gains)

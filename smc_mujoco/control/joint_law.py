@@ -63,7 +63,9 @@ HEAD = floats(("t", "dt", "model", "dynamics", "n"))
 # The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of
 # their parameters, and the force per unit of u.
 HANDLE = floats(("coriolis", "jacobian", "parameters", "unit"))
-head_at, handle_at, HEAD_BYTES = record_at(HEAD), record_at(HANDLE), HEAD.itemsize
+head_at = record_at(HEAD)
+handle_at = record_at(HANDLE)
+HEAD_BYTES = HEAD.itemsize
 
 
 def stored_dtype(n: int) -> np.dtype:
@@ -123,7 +125,8 @@ def coriolis(y, w):
 def _coriolis(y, w):
     def compiled(y, w):
         n = len(y.x)
-        vector, forces = np.empty(n), np.zeros(n)
+        vector = np.empty(n)
+        forces = np.zeros(n)
         if len(w) != n:  # numba may have compiled this function elsewhere, without checks of bounds
             raise ValueError
         for i in range(n):
@@ -197,7 +200,8 @@ def solve(M, b):
     The bits are the same in Python and compiled.
     """
     n = len(b)
-    L, x = np.zeros((n, n)), b.copy()
+    L = np.zeros((n, n))
+    x = b.copy()
     for i in range(n):
         for j in range(i + 1):
             rest = M[i, j]

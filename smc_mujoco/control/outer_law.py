@@ -45,7 +45,8 @@ def on_computed_torque(law: Component) -> Component:
 
 def _template(outer: Template) -> Template:
     """Return the template of a law of many joints with this one as its outer law."""
-    inner, names = njit(outer.function), tuple(outer.gains)
+    inner = njit(outer.function)
+    names = tuple(outer.gains)
     # the plant is e'' = v
     own = {}
     for name, gain in outer.gains.items():
@@ -60,7 +61,8 @@ def _template(outer: Template) -> Template:
     of_joint = njit(space["of_joint"])
 
     def law(y, gains, memory):
-        v, s = 0.0 * y.e, 0.0 * y.e
+        v = 0.0 * y.e
+        s = 0.0 * y.e
         for i in range(len(v)):
             bound = max(y.limit[i] - abs(y.h[i]), 0.0) / y.M[i, i]
             seen = Measurement(

@@ -101,7 +101,9 @@ def _reads(function: object, position: int, seen: set[object]) -> set[str]:
         assert isinstance(tree, ast.FunctionDef)
     except (AssertionError, OSError, SyntaxError, ValueError):
         return set(Measurement._fields)
-    name, fields, understood = tree.args.args[position].arg, set(), 0
+    name = tree.args.args[position].arg
+    fields = set()
+    understood = 0
     for node in ast.walk(tree):
         if (
             isinstance(node, ast.Attribute)

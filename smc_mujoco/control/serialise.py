@@ -45,7 +45,8 @@ def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> C
     """Return the component that `describe` wrote, without its function if that is not among the
     known ones.
     """
-    module, template = data["module"], known.get(data["name"])
+    module = data["module"]
+    template = known.get(data["name"])
     # a law may have another name, see `named`
     if template is None:
         candidates = known.own.values()

@@ -16,14 +16,12 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 
-NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = (
-    "none",
-    "default",
-    "tuned here",
-    "shipped",
-    "study",
-    "yours",
-)
+NONE = "none"
+DEFAULT = "default"
+TUNED = "tuned here"
+SHIPPED = "shipped"
+STUDY = "study"
+YOURS = "yours"
 KINDS = {
     NONE: "the law has no gains",
     DEFAULT: "the defaults of the law's own file",
@@ -142,10 +140,8 @@ def _search_text(searches: Mapping[str, Sequence[Search]]) -> str:
     for of_law in searches.values():
         for search in of_law:
             every.append(search)
-    evaluations, counts = (
-        sorted({search.evaluations for search in every}),
-        [search.searches for search in every],
-    )
+    evaluations = sorted({search.evaluations for search in every})
+    counts = [search.searches for search in every]
     text = f"{' or '.join(dict.fromkeys(search.name for search in every))}, "
     text += (
         f"{' to '.join(map(str, dict.fromkeys([evaluations[0], evaluations[-1]])))} evaluations, "
@@ -164,9 +160,11 @@ def untuned_laws(words: Mapping[str, str]) -> list[str]:
     if not default or not tuned:
         return []
     if len(default) == 1:
-        have, them = ("has its default gains", "it")
+        have = "has its default gains"
+        them = "it"
     else:
-        have, them = ("have their default gains", "them")
+        have = "have their default gains"
+        them = "them"
     are = "is" if len(tuned) == 1 else "are"
     return [
         f"{joined(default)} {have}, {joined(tuned)} {are} tuned: tune {them} too (smc-mujoco tune)"

@@ -80,7 +80,8 @@ class Gain:
     def constraint(self) -> Each:
         """What it may be: one number, or one for each channel."""
         infinite = bool(np.isinf(self.default).any())
-        above, low = 0.0 if self.positive else -math.inf, 0.0 if self.nonnegative else -math.inf
+        above = 0.0 if self.positive else -math.inf
+        low = 0.0 if self.nonnegative else -math.inf
         return Each(one=Number(above=above, low=low, infinite=infinite))
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:

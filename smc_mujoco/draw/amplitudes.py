@@ -66,7 +66,9 @@ def amplitudes(
         page = pages.blank(style.FULL_WIDTH, PAGE_HEIGHT)
         ax = page.subplots()
         colours = style.law_colours([its[0].scenario.law for its in runs.values()])
-        handles, predicted, hollow = [], {}, False
+        handles = []
+        predicted = {}
+        hollow = False
         gains, shared = pages.gain_sources(
             [[trace.scenario.law.source for trace in its] for its in runs.values()]
         )
@@ -80,9 +82,11 @@ def amplitudes(
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
             for at, trace, change in zip(lags, its, step_halving(its, 0), strict=True):
                 if change.marked:
-                    face, edge = (style.PAPER, colour)
+                    face = style.PAPER
+                    edge = colour
                 else:
-                    face, edge = (colour, style.PAPER)
+                    face = colour
+                    edge = style.PAPER
                 ax.plot(
                     at, channel_cycle(trace)[0], "o", color=face, ms=style.points(7.0), mec=edge
                 )

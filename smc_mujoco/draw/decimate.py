@@ -86,7 +86,9 @@ def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
         return t, y.min(axis=1), y.max(axis=1)
     edges = t[:: 2 * -(-count // (2 * COLUMNS))]
     e = windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
-    low, high, size = e.low.min(axis=1), e.high.max(axis=1), 1 + int(MAX_GAP / (e.t[1] - e.t[0]))
+    low = e.low.min(axis=1)
+    high = e.high.max(axis=1)
+    size = 1 + int(MAX_GAP / (e.t[1] - e.t[0]))
     return e.t, grey_opening(low, size, mode="nearest"), grey_closing(high, size, mode="nearest")
 
 
@@ -115,7 +117,8 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     step = np.diff(y)
     moving = np.flatnonzero(np.abs(step) > MIN_MOVE * np.abs(y).max())
     turns = np.flatnonzero(np.diff(np.sign(step[moving])))
-    first, last = moving[turns], moving[turns + 1]
+    first = moving[turns]
+    last = moving[turns + 1]
 
     def sequences(near: int) -> list[np.ndarray]:
         """Return the indices of the reversals in each row of `near`-close ones."""
@@ -128,7 +131,8 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     )
     result = []
     for part in sequences(width):
-        a, b = first[part[0]] + 1, last[part[-1]] + 1
+        a = first[part[0]] + 1
+        b = last[part[-1]] + 1
         if ((seeds >= a) & (seeds <= b)).any():
             result.append(slice(a if a > width // 4 else 0, b if b < len(y) - width else len(y)))
     return result

@@ -132,7 +132,8 @@ def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, s
     """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with
     its interval.
     """
-    of_metric, intervals = {metric: by_row(table, metric) for metric in metrics}, {}
+    of_metric = {metric: by_row(table, metric) for metric in metrics}
+    intervals = {}
     for group in groups(table, GROUPS):
         for metric in metrics:
             scores = group.scores(of_metric[metric])
@@ -153,7 +154,8 @@ def _key(
     """Return the entries of the legend, law by law, and where all gains come from if that is the
     same.
     """
-    known, key = sources(table), []
+    known = sources(table)
+    key = []
     gains, shared = pages.gain_sources([known.get(law, ()) for law in colours])
     for law, source in zip(colours, gains, strict=True):
         look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
@@ -235,7 +237,9 @@ def _labels(metrics: Sequence[str], x: str, room: float) -> list[str]:
     """
     labels = []
     for metric in metrics:
-        words, bracket, unit = "share of runs that settle", "", ""
+        words = "share of runs that settle"
+        bracket = ""
+        unit = ""
         if metric != SETTLES:
             words, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
         labels.append(words + bracket + unit.replace("^2", "²").replace(" ", "·"))

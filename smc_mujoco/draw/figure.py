@@ -117,10 +117,8 @@ def figure(
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     traces = style.same_plant(traces)
-    names, colours = (
-        style.labels(traces, labels),
-        style.law_colours([trace.scenario.law for trace in traces]),
-    )
+    names = style.labels(traces, labels)
+    colours = style.law_colours([trace.scenario.law for trace in traces])
     traces = [finite(trace) for trace in traces]
     if panels is None:
         chosen = _default(traces, width)
@@ -311,7 +309,9 @@ def _rows(
         ax = page.add_subplot(cell, sharex=share)
         return ax, [(ax, panel, runs.colours)]
     frame = page.add_subplot(cell, frameon=False, xticks=[])
-    pitch, size, rows = 1.0 / len(panel.traces), style.points(8.5), []
+    pitch = 1.0 / len(panel.traces)
+    size = style.points(8.5)
+    rows = []
     filled = BELOW_NAME if above else ROW_FILLED
     for i, (trace, name, colour) in enumerate(
         zip(panel.traces, runs.names, runs.colours, strict=True)
@@ -390,7 +390,9 @@ def _draw_sparks(
     """Draw a row of sparklines for each of the worst of so many channels, with the largest
     magnitude beside each.
     """
-    rows, size, frames = cell.subgridspec(len(sparks), 2), style.points(SPARK_SIZE), []
+    rows = cell.subgridspec(len(sparks), 2)
+    size = style.points(SPARK_SIZE)
+    frames = []
     room = SPARK_NAME * 72 * cell.get_position(page).width * page.bbox.width / page.dpi
     for i, row in enumerate(sparks):
         for k, panel in enumerate(row):

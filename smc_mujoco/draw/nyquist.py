@@ -88,7 +88,9 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     ax.set(xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE), ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE))
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.8))
-    loop, omega, unit = Loop(scenario, channel), math.tau * cycle.frequency, -cycle.response
+    loop = Loop(scenario, channel)
+    omega = math.tau * cycle.frequency
+    unit = -cycle.response
     fastest = math.pi / scenario.control_period
     omegas = np.geomspace(omega / SPAN_FACTOR, min(omega * SPAN_FACTOR, fastest), 400)
     response = np.array([loop.response(w) for w in omegas]) / unit
@@ -134,14 +136,16 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
     factor, unit = style.prefixed(
         float(np.abs(trace.s[part, channel]).max()), f"{trace.scenario.plant.units[channel]}/s"
     )
-    t, s = trace.t[part] - trace.t[part][0], factor * trace.s[part, channel]
+    t = trace.t[part] - trace.t[part][0]
+    s = factor * trace.s[part, channel]
     ax.plot(1e3 * t if cycle else t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
     ax.set(
         xlabel=f"last {SHOWN_PERIODS} periods predicted (ms)" if cycle else "time (s)",
         ylabel=f"s ({unit})",
     )
     if cycle:
-        mean, amplitude = float(s.mean()), factor * cycle.amplitude
+        mean = float(s.mean())
+        amplitude = factor * cycle.amplitude
         ax.axhspan(mean - amplitude, mean + amplitude, color=colour, alpha=0.15, lw=0)
         low, high = ax.get_ylim()
         ax.set_ylim(low, high + 0.18 * (high - low))

@@ -70,7 +70,8 @@ class Page(Figure):
 
 def embedded(page: Figure | SubFigure) -> tuple[bytes, float]:
     """Return the whole figure as a PNG, and its width in px of a web page, 96 an inch."""
-    whole, content = page.get_figure(root=True), io.BytesIO()
+    whole = page.get_figure(root=True)
+    content = io.BytesIO()
     whole.savefig(content, format="png", dpi=DPI)
     return content.getvalue(), 96 * whole.get_figwidth()
 
@@ -138,7 +139,9 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
 
     In a single column labels may be as wide as the page.
     """
-    page, size, labels = 72 * width, style.points(TEXT_SIZE), []
+    page = 72 * width
+    size = style.points(TEXT_SIZE)
+    labels = []
     beside = (ENTRY_SAMPLE + ENTRY_SPACE) * size  # of a label
     for share in (MAX_SHARE, MAX_SINGLE_SHARE):
         labels = []
@@ -161,7 +164,9 @@ def set_head(
 
     A long title has smaller letters, no smaller than the legend's.
     """
-    size, big, room = style.points(TEXT_SIZE), style.points(TITLE_SIZE), 72 * width - 16
+    size = style.points(TEXT_SIZE)
+    big = style.points(TITLE_SIZE)
+    room = 72 * width - 16
     words, columns = _legend(handles, width)
     if note:
         note = style.cropped(note, MAX_SHARE * room, size)
@@ -281,13 +286,13 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
     """
     if not paths:
         return
-    whole, about = page.get_figure(root=True), str(page.get_label()) or None
-    dates, layout = (
-        {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}},
-        whole.get_layout_engine(),
-    )
+    whole = page.get_figure(root=True)
+    about = str(page.get_label()) or None
+    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}
+    layout = whole.get_layout_engine()
     if layout is not None:
-        canvas, dpi = whole.canvas, whole.dpi
+        canvas = whole.canvas
+        dpi = whole.dpi
         get_registered_canvas_class(paths[0].suffix[1:])(
             whole
         )  # texts are as large as this canvas draws them
@@ -326,7 +331,9 @@ class Spaced(AutoLocator):
         """Return the ticks of the visible range."""
         assert isinstance(self.axis, Axis)
         low, high = sorted(self.axis.get_view_interval())
-        box, formatter, ticks = self.axis.axes.bbox, self.axis.get_major_formatter(), []
+        box = self.axis.axes.bbox
+        formatter = self.axis.get_major_formatter()
+        ticks = []
         for count in range(MAX_TICKS, 0, -1):
             self.set_params(nbins=count)
             ticks = []

@@ -151,12 +151,10 @@ class Panel(NamedTuple):
     @property
     def label(self) -> str:
         """The label of the vertical axis, with its unit. A joint of a robot has its name in it."""
-        name, group, plant, unit = (
-            self.quantity,
-            self.group,
-            self.traces[0].scenario.plant,
-            self.scale[1],
-        )
+        name = self.quantity
+        group = self.group
+        plant = self.traces[0].scenario.plant
+        unit = self.scale[1]
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
         if group.driven:
@@ -181,7 +179,8 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     """Return the panels of a quantity over time, one for each group of channels that has it; a tip
     has one panel.
     """
-    groups, scenarios = style.split(traces), [trace.scenario for trace in traces]
+    groups = style.split(traces)
+    scenarios = [trace.scenario for trace in traces]
     if quantity in ("tip", "contact"):
         has = []
         for one in scenarios:
@@ -222,7 +221,8 @@ def by_channel(panel: Panel) -> list[Panel]:
     """Return a panel for each channel of a panel's group whose error counts."""
     if panel.quantity in SINGLE:
         return [panel]
-    panels, judged = [], panel.traces[0].scenario.plant.judged
+    panels = []
+    judged = panel.traces[0].scenario.plant.judged
     for k, i in enumerate(i for i in panel.group.channels if i in judged):
         place, channel = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
         panels.append(
@@ -256,7 +256,8 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     network: how far its channels are apart, the error and u. Of two joints of your own model: x and
     u of each; of more: the error and the largest u of a joint.
     """
-    groups, plant = list(style.split(traces).items()), traces[0].scenario.plant
+    groups = list(style.split(traces).items())
+    plant = traces[0].scenario.plant
     driven = [each for each in groups if each[0].driven]
     errors = [Panel("settling", *each) for each in driven]
     if of_tip := [panel for name in ("tip", "contact") for panel in over_groups(traces, name)]:
@@ -289,7 +290,9 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     )
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
-    over, single, words = max(filter(None, windows), default=None), min(n, MAX_DRAWN_CHANNELS), {}
+    over = max(filter(None, windows), default=None)
+    single = min(n, MAX_DRAWN_CHANNELS)
+    words = {}
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
     if over:
@@ -311,7 +314,8 @@ def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
     """Return the labels of panels of these heights in points; the unit is on a second line if two
     would be close.
     """
-    words, size = [panel.label for panel in panels], style.points(style.RC["font.size"])
+    words = [panel.label for panel in panels]
+    size = style.points(style.RC["font.size"])
     free = [height - style.width(text, size) for height, text in zip(heights, words, strict=True)]
     close = {i for i, (a, b) in enumerate(itertools.pairwise(free)) if (a + b) / 2 < size}
     return [
@@ -368,7 +372,8 @@ def horizon(traces: Sequence[Trace]) -> float:
 
     Nothing changes or disturbs the plant after that part, and no reference moves.
     """
-    whole, last = end(traces), 0.0
+    whole = end(traces)
+    last = 0.0
     for group, parts in style.split(traces).items():
         low, high = span(parts, "x")
         for trace in parts:
@@ -409,10 +414,8 @@ def over_time(
     `names`: of the traces, for the words; `told`: whether to write them.
     """
     artists: list[Artist] = []
-    name, means = (
-        panel.quantity,
-        [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces],
-    )
+    name = panel.quantity
+    means = [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
     if name in PEAKS:
         ax.set_yscale("log")
         ax.yaxis.set_minor_formatter(NullFormatter())
@@ -435,10 +438,8 @@ def over_time(
     for trace, colour, mean, path, start in reversed(
         list(zip(panel.traces, colours, means, lines, starts, strict=True))
     ):
-        y, steps = (
-            QUANTITIES[name](trace),
-            "default" if smoothed(trace) or name != "u" else "steps-post",
-        )
+        y = QUANTITIES[name](trace)
+        steps = "default" if smoothed(trace) or name != "u" else "steps-post"
         if bands and name not in UNBANDED:
             artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
         look: dict[str, Any] = {"color": colour, "drawstyle": steps}
@@ -449,9 +450,11 @@ def over_time(
                 slowest = set()
             for i in sorted({*drawn_channels(y).tolist(), *slowest}):
                 if i in slowest:
-                    width, alpha = (SLOWEST_LINE, 1.0)
+                    width = SLOWEST_LINE
+                    alpha = 1.0
                 else:
-                    width, alpha = (LIGHT_LINE, 0.55)
+                    width = LIGHT_LINE
+                    alpha = 0.55
                 artists += ax.plot(
                     *curve(trace, y[:, i], name), alpha=alpha, lw=style.points(width), **look
                 )
@@ -587,7 +590,8 @@ def tell_agreements(
         if not (style.width(words, size) < room):
             words = words.replace(" agree", "")
         words = style.cropped(words, room, size)
-        wide, gap = style.width(words, size), 0.4 * size
+        wide = style.width(words, size)
+        gap = 0.4 * size
         start, parting, whole = ax.xaxis.get_transform().transform(np.array([first, stop, last]))
         ends = room * float((parting - start) / (whole - start)) - gap
         left = ends > wide  # of where they part
@@ -679,7 +683,8 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
     """Mark when plants change or arms are hit, time in s -> words; with the words above the axes if
     `named`.
     """
-    last, size = ax.get_xlim()[1], style.points(9)
+    last = ax.get_xlim()[1]
+    size = style.points(9)
     room = ax.get_window_extent().width * 72 / ax.figure.dpi  # points
     ends: list[float] = []  # of the words in each row above the axes, in points
     for time, change in sorted(changes.items()):
@@ -687,7 +692,8 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
         if not named:
             continue
         words = style.cropped(change, room, size)
-        width, at = style.width(words, size), room * time / last
+        width = style.width(words, size)
+        at = room * time / last
         begin = min(at, room - width)
         row = next((row for row, end in enumerate(ends) if end < begin), len(ends))
         ends[row:] = [begin + width + size]
@@ -701,7 +707,8 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
 
     A ring marks the start of a trace.
     """
-    traces, speed = panel.traces, panel._replace(quantity="v")
+    traces = panel.traces
+    speed = panel._replace(quantity="v")
     for axis, words in ((ax.xaxis, panel), (ax.yaxis, speed)):
         set_numbers(axis, words)
         axis.set_label_text(words.label)
@@ -712,14 +719,13 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
         (trace.t, trace.x[:, 0] / (right - left) + 1j * trace.v[:, 0] / (high - low))
         for trace in traces
     ]
-    shared, width = (
-        agreements(places, 1.0) if one else [],
-        style.points(LINE if one else LIGHT_LINE),
-    )
+    shared = agreements(places, 1.0) if one else []
+    width = style.points(LINE if one else LIGHT_LINE)
     for trace, colour, start in reversed(
         list(zip(traces, colours, partings(shared, len(traces)), strict=True))
     ):
-        shown, later = drawn_channels(trace.x), trace.t >= start
+        shown = drawn_channels(trace.x)
+        later = trace.t >= start
         for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
             ax.plot(x[later], v[later], color=colour, lw=width)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
@@ -769,7 +775,8 @@ def last_samples(
     """Draw the last samples of u of the first channel, each held until the next, of the longest run
     of `among`.
     """
-    traces, stop = panel.traces, end(among)
+    traces = panel.traces
+    stop = end(among)
     set_numbers(ax.yaxis, panel._replace(traces=among))
     begin = max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in among))
     lines = []
@@ -778,7 +785,8 @@ def last_samples(
         lines.append((1e3 * (trace.t[part] - stop), trace.u[part, 0]))
     shown = np.concatenate([u for _, u in lines])
     if shown.size:
-        low, high = shown.min(), shown.max()
+        low = shown.min()
+        high = shown.max()
         half = max(0.62 * (high - low), MIN_CLOSE_UP / 2 * max(map(abs, span(traces, "u")))) or 1.0
         ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     shared = agreements(lines, float(np.ptp(ax.get_ylim())))

@@ -45,7 +45,8 @@ def pareto(
     Raises:
       ScenarioError: no tunings, tunings that cannot be compared, or as `figure`.
     """
-    paths, best = pages.files(path, format), compare(tunings)
+    paths = pages.files(path, format)
+    best = compare(tunings)
     width, height = pages.measure(size, fig)
     with style.page(width):
         page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)

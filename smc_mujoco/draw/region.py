@@ -35,7 +35,8 @@ def draw(
     if not maps:
         raise ScenarioError("no map to draw: give at least one")
     if size is None and fig is None:
-        width, height = (MAP_SIZE[0] * len(maps), None)
+        width = MAP_SIZE[0] * len(maps)
+        height = None
     else:
         width, height = pages.measure(size, fig)
     with style.page(style.FULL_WIDTH if size is None and fig is None else width):
@@ -44,13 +45,15 @@ def draw(
             across = max(1, min(len(maps), int(width / style.points(3.2))))
         else:
             across = len(maps)
-        down, space = -(-len(maps) // across), pages.head_height(width, [rest])
+        down = -(-len(maps) // across)
+        space = pages.head_height(width, [rest])
         if size is None:
             tall = MAP_SIZE[1]
         else:
             tall = down * width / across * 1.08
         page = pages.blank(width, height or tall + space, fig)
-        axes, after = page.subplots(down, across, squeeze=False).ravel(), convergence_times(maps)
+        axes = page.subplots(down, across, squeeze=False).ravel()
+        after = convergence_times(maps)
         plants = dict.fromkeys(region.plant for region in maps)
         words, gains = pages.gain_sources([[Source(kind=region.source)] for region in maps])
         for ax, region, source in zip(axes, maps, words, strict=False):

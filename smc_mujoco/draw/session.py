@@ -68,7 +68,9 @@ class Session:
 
     def __init__(self, scenarios: Sequence[Scenario]):
         self.first = tuple(scenarios)
-        self.due, self.message, self.paused = 0.0, "", False
+        self.due = 0.0
+        self.message = ""
+        self.paused = False
         self.begin(self.first)
 
     def begin(self, scenarios: Sequence[Scenario], sample: int = 0) -> None:
@@ -241,14 +243,19 @@ def at_keyframe(scenario: Scenario, model: mujoco.MjModel, key: int) -> Scenario
     """Return a scenario that starts in a keyframe; refuse one that the channels' x0 and v0 cannot
     give.
     """
-    qpos, qvel, joints = model.key_qpos[key], model.key_qvel[key], models.moving_joints(model)[0]
+    qpos = model.key_qpos[key]
+    qvel = model.key_qvel[key]
+    joints = models.moving_joints(model)[0]
     if scenario.plant.pose:
-        first, dof = model.jnt_qposadr[joints[0]], model.jnt_dofadr[joints[0]]
+        first = model.jnt_qposadr[joints[0]]
+        dof = model.jnt_dofadr[joints[0]]
         turn = np.zeros(3)
         mujoco.mju_quat2Vel(turn, qpos[first + 3 : first + 7], 1.0)
-        x0, v0 = [*qpos[first : first + 3], *turn], qvel[dof : dof + 6]
+        x0 = [*qpos[first : first + 3], *turn]
+        v0 = qvel[dof : dof + 6]
     else:
-        x0, v0 = qpos[model.jnt_qposadr[joints]], qvel[model.jnt_dofadr[joints]]
+        x0 = qpos[model.jnt_qposadr[joints]]
+        v0 = qvel[model.jnt_dofadr[joints]]
     started = dataclasses.replace(scenario, x0=tuple(map(float, x0)), v0=tuple(map(float, v0)))
     if not all(map(np.allclose, models.initial_state(model, started), (qpos, qvel))):
         raise ScenarioError(f"no start from keyframe {key}: it moves joints without a channel")

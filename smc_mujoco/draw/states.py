@@ -61,7 +61,8 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> l
     """Return the state at each time, s; None for a machine without states, and after its run
     failed.
     """
-    dry, gap = has_dry_friction(trace.scenario), backlash_gap(trace.scenario)
+    dry = has_dry_friction(trace.scenario)
+    gap = backlash_gap(trace.scenario)
     contact = np.any(np.stack([extended(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
     sliding = np.array([extended(~on, trace.t, hold) for on in at_rest(trace).T])
     if gap:
@@ -105,7 +106,8 @@ def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) ->
     ]
     result = list(states)
     for run, after in itertools.pairwise(runs):
-        state, before = states[run[0]], result[run[0] - 1] if run[0] else states[after[0]]
+        state = states[run[0]]
+        before = result[run[0] - 1] if run[0] else states[after[0]]
         brief = times[after[0]] - times[run[0]] < hold - 1e-9
         if (
             brief

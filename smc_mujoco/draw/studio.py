@@ -143,7 +143,8 @@ def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], b
     model = session.screen()
     data = mujoco.MjData(model)
     page.set_model(model, data=data)
-    before, pull = time.perf_counter(), np.zeros((model.nbody, 3))
+    before = time.perf_counter()
+    pull = np.zeros((model.nbody, 3))
     while page.is_running() and watched(session):
         now = time.perf_counter()
         while not panel.asked.empty():

@@ -34,8 +34,14 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Jump, Push
 from smc_mujoco.simulation.trace import Trace
 
-INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
-DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
+INK = "#1F2429"
+MUTED = "#646C75"
+GRID = "#E3E6E9"
+PAPER = "#FFFFFF"
+FAILED = "#A9AFB6"
+DISTURBANCE = "#3A3F46"
+BAND = "#DDE1E5"
+RULE = "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours,
 # the disturbance's and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6),
 # 2009).
@@ -78,7 +84,9 @@ XYZ = np.array(
 
 # Inches. A full page is 845 px of SVG, so that its least letters have 11 px in 800 px, as in a
 # README. Letters of narrower pages than a journal's have 8 points, those of slides 16.
-FULL_WIDTH, JOURNAL_WIDTH, SLIDE_WIDTH = 8.8, 8.5, 13.3
+FULL_WIDTH = 8.8
+JOURNAL_WIDTH = 8.5
+SLIDE_WIDTH = 13.3
 RC = {
     "font.family": "DejaVu Sans",
     "font.size": 10.5,
@@ -172,7 +180,8 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     changed = []
     for i in library + others:
         again = [k for k, name in enumerate(names) if name == names[i]]
-        wanted, shades = law_colour(laws[i]), len(again) > 1
+        wanted = law_colour(laws[i])
+        shades = len(again) > 1
         if shades:
             wanted = ramp(wanted, len(again))[again.index(i)]
         if not shades and any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
@@ -448,7 +457,8 @@ def _value(value: object, digits: int) -> str:
     if isinstance(value, int | float):
         return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"
     if isinstance(value, tuple):
-        same, few = len(set(value)) == 1, len(value) <= MAX_VALUES
+        same = len(set(value)) == 1
+        few = len(value) <= MAX_VALUES
         parts = [_value(part, digits) for part in value[: 1 if same else len(value)]]
         if same or few:
             return ", ".join(parts)
@@ -490,7 +500,8 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
     """
     who_at: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
-        plant, jump = trace.scenario.plant, trace.scenario.jump
+        plant = trace.scenario.plant
+        jump = trace.scenario.jump
         if jump is None:
             events = []
         else:
@@ -548,7 +559,8 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
 
     A number and a short word after it, such as its unit, stay together.
     """
-    broken, words = [], re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
+    broken = []
+    words = re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
     while words and len(broken) < lines - 1:
         count = next(
             (n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1
@@ -641,7 +653,8 @@ def heading(
     plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False
 ) -> str:
     """Return plants, and the condition if there is only one, which is not the nominal one."""
-    names, condition = dict.fromkeys(plant_name(plant, short) for plant in plants), {*conditions}
+    names = dict.fromkeys(plant_name(plant, short) for plant in plants)
+    condition = {*conditions}
     if len(condition) == 1:
         alone = next(iter(condition))
     else:

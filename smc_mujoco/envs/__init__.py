@@ -3,4 +3,6 @@
 from smc_mujoco.common import lazy
 
 _SHELF = lazy.shelf(__name__)
-__getattr__, __dir__, __all__ = _SHELF.getattr, _SHELF.dir, [*_SHELF.origins, *_SHELF.modules]
+__getattr__ = _SHELF.getattr
+__dir__ = _SHELF.dir
+__all__ = list(_SHELF.origins | _SHELF.modules)

@@ -94,9 +94,11 @@ class PlantTask(Episode, control.Task):
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return positions and velocities, and the reference if the task has one."""
         if self.diverged:
-            x, v = (bounded(self.x), bounded(self.v))
+            x = bounded(self.x)
+            v = bounded(self.v)
         else:
-            x, v = (self.x, self.v)
+            x = self.x
+            v = self.v
         observation = OrderedDict(position=x, velocity=v)
         if self.setting.task.moving:
             observation["reference"] = self.setting.reference(self.sample)

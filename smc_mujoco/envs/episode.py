@@ -67,7 +67,8 @@ class Setting:
         that `flies` is a free body; its runs are those of `flown`.
         """
         plant = as_plant(plant)
-        self.task, known = find("task", task, TASKS), FLIGHT_TASKS if flies else tasks(plant)
+        self.task = find("task", task, TASKS)
+        known = FLIGHT_TASKS if flies else tasks(plant)
         if plant.pose and not flies:
             cure = "make its environment by gymnasium.make, and copies by make_vec(..., vectorization_mode='sync')"
             raise ScenarioError(f"{plant.name} is a free body: {cure}")
@@ -107,7 +108,8 @@ class Setting:
         if changes.get("x0") is None:
             self.low, self.high = starts(self.task, plant)
         else:
-            self.low, self.high = (fixed, fixed)
+            self.low = fixed
+            self.high = fixed
         spec = models.spec(self.scenario)
         edit(spec)
         self.model = models.with_values(models.compiled(spec, self.scenario), self.scenario)
@@ -134,10 +136,8 @@ class Setting:
             self.scenario, self.scenario.samples + 1 if self.task.moving else 1
         )
         width = self.references.shape[1]
-        self.observation_size, self.action_shape = (
-            2 * plant.n + width * self.task.moving,
-            (plant.driven,),
-        )
+        self.observation_size = 2 * plant.n + width * self.task.moving
+        self.action_shape = (plant.driven,)
         self.rest_r = np.zeros(
             width
         )  # from where the references count: the rest of each that has one, then zeros
@@ -178,7 +178,8 @@ class Setting:
         (..., nv). The mean force of a drive acts throughout a step. In a run with RK4, a Lag's
         first moment acts, too.
         """
-        effect, steps = self.scenario.drive_step, self.scenario.steps
+        effect = self.scenario.drive_step
+        steps = self.scenario.steps
         if effect is None:
             ctrl[..., self.ctrl] = self.scale * command
             yield steps
@@ -195,7 +196,8 @@ class Setting:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options
         x0 and v0.
         """
-        x, v = random.uniform(self.low, self.high), np.array(self.scenario.v0)
+        x = random.uniform(self.low, self.high)
+        v = np.array(self.scenario.v0)
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
@@ -230,7 +232,9 @@ class Episode:
     """
 
     def __init__(self, setting: Setting):
-        self.setting, self.episodes, self.diverged = setting, 0, False
+        self.setting = setting
+        self.episodes = 0
+        self.diverged = False
         self.sample = 0  # control samples since the episode began
         self.drive_states = np.zeros((2, *setting.action_shape))  # of `DriveStep`
         self.x = self.v = np.zeros(setting.scenario.plant.n)
@@ -256,7 +260,8 @@ class Episode:
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
-        self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
+        self.x = data.qpos[self.setting.qpos]
+        self.v = data.qvel[self.setting.qvel]
         self.diverged = bool(self.setting.diverged(self.x, self.v))
 
     def reward_and_info(self) -> tuple[float, dict[str, Any]]:

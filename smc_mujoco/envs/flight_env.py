@@ -49,7 +49,8 @@ class FlightEnv(PlantEnv):
         `changes`: Scenario field -> value, of `episode.FIELDS`.
         """
         super().__init__(plant, task, changes, render_mode)
-        model, scenario = self.setting.model, self.setting.scenario
+        model = self.setting.model
+        scenario = self.setting.scenario
         drives = drive_ids(model)
         if not model.actuator_ctrllimited[drives].all():
             raise ScenarioError(
@@ -97,12 +98,11 @@ class FlightEnv(PlantEnv):
         drawn.
         """
         data.qpos[:], qvel = (self.batch.batch.bind(name)[0] for name in ("qpos", "qvel"))
-        first, dof = self.setting.qpos[3], self.setting.qvel[0]
+        first = self.setting.qpos[3]
+        dof = self.setting.qvel[0]
         turn = rotation.rotation_vector(*data.qpos[first : first + 4])
-        self.x, self.v = (
-            np.array([*data.qpos[first - 3 : first], *turn]),
-            qvel[dof : dof + 6].copy(),
-        )
+        self.x = np.array([*data.qpos[first - 3 : first], *turn])
+        self.v = qvel[dof : dof + 6].copy()
         self.diverged = bool(self.setting.diverged(self.x, self.v))
 
     def errors(self) -> Pair:
@@ -110,7 +110,8 @@ class FlightEnv(PlantEnv):
         r = np.concatenate([self.setting.rest_x, np.zeros(6)])
         if self.setting.task.moving:
             r = self.setting.reference(self.sample)[:12]
-        e, w = self.x - r[:6], self.v - r[6:]
+        e = self.x - r[:6]
+        w = self.v - r[6:]
         rotation.put_attitude_error(self.x, self.v, r[:6], r[6:], e, w)
         return e, w
 

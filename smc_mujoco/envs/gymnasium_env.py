@@ -93,7 +93,8 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
         scenario = self.setting.scenario
-        self.render_mode, self.max_samples = render_mode, scenario.samples
+        self.render_mode = render_mode
+        self.max_samples = scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / scenario.control_period))}
         self.action_space, self.observation_space = (
             action_space(self.setting),

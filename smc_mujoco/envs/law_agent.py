@@ -59,9 +59,11 @@ def agent(
         gymnasium.
         """
         nonlocal controller, last_episode
-        k, plant = episode.sample, scenario.plant
+        k = episode.sample
+        plant = scenario.plant
         if k == 0 or last_episode != episode.episodes:
-            last_episode, controller = episode.episodes, Controller(scenario)
+            last_episode = episode.episodes
+            controller = Controller(scenario)
         t = k * scenario.control_period
         try:
             with np.errstate(all="ignore"):

@@ -53,7 +53,8 @@ class OffsetSine(Signal):
 
     @staticmethod
     def value(t, p):
-        r, angle = p.amplitude * math.sin(p.omega * t), p.omega * t
+        r = p.amplitude * math.sin(p.omega * t)
+        angle = p.omega * t
         return p.middle + r, p.amplitude * p.omega * math.cos(angle), -p.omega * p.omega * r
 
 
@@ -118,7 +119,9 @@ class Track(Task):
         """Return the distance of the driven channels from their references, and the state of the
         others.
         """
-        m, e, w = r.shape[-1] // 3, np.array(x), np.array(v)
+        m = r.shape[-1] // 3
+        e = np.array(x)
+        w = np.array(v)
         e[..., selected] -= r[..., :m]
         w[..., selected] -= r[..., m : 2 * m]
         return e, w
@@ -140,7 +143,8 @@ class SwingUp(Task):
         """
         if plant.free:
             return {}
-        down, p = toppling(plant), Values(**plant.parameters)
+        down = toppling(plant)
+        p = Values(**plant.parameters)
         level = math.pi / 2 * down
         pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
         return {"u_max": SWING_UP_TORQUE * max(abs(f / g) for f, g in pulls)}

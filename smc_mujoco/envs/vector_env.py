@@ -182,10 +182,8 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         """Return the infos of `Episode.reward_and_info` as gymnasium joins them; e is (num_envs,
         n).
         """
-        times, known = (
-            self.samples * self.setting.scenario.control_period,
-            np.ones(self.num_envs, bool),
-        )
+        times = self.samples * self.setting.scenario.control_period
+        known = np.ones(self.num_envs, bool)
         return {"time": times, "_time": known, "error": e, "_error": known.copy()}
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:

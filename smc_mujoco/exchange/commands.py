@@ -113,7 +113,8 @@ def export(
         raise ScenarioError(
             f"{len(outs) or 'no'} files to write: give one that ends in {', '.join(ENDINGS)}"
         )
-    out, others = Path(outs[0]), [text for text in what if text != outs[0]]
+    out = Path(outs[0])
+    others = [text for text in what if text != outs[0]]
     of_fmu = "surface", "velocity", "period", "u_max", "model", "joint", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
     options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")

@@ -92,7 +92,8 @@ class LinearLaw:
     @functools.cached_property
     def py_func(self) -> Any:
         """The compiled text, as a plain function of Python."""
-        file, space = f"<controller {self.name} {hash(self):x}>", {"__name__": "law_from_control"}
+        file = f"<controller {self.name} {hash(self):x}>"
+        space = {"__name__": "law_from_control"}
         lines = self.text.splitlines(keepends=True)
         linecache.cache[file] = len(self.text), None, lines, file  # for the translation to C
         exec(compile(self.text, file, "exec"), space)
@@ -112,7 +113,9 @@ class LinearLaw:
         """Return the lines of x = (I - A h/2)^-1 (z + h/2 B w), u = C x + D w, z+ = 2 x - z, with z
         in memory.
         """
-        n, last, lines = len(self.a), len(self.a) - 1, ["h = 0.5 * y.dt"] if self.a else []
+        n = len(self.a)
+        last = len(self.a) - 1
+        lines = ["h = 0.5 * y.dt"] if self.a else []
         while last >= 0:  # blocks, from below
             if last > 0 and self.a[last][last - 1]:
                 first = last - 1
@@ -138,7 +141,8 @@ def _block_lines(a: Matrix, first: int, last: int) -> list[str]:
     """
     if first == last:
         return [f"x{first} = f{first} / (1.0 - h * {a[first][first]!r})"]
-    i, j = first, last
+    i = first
+    j = last
     p, t = (f"(1.0 - h * {a[k][k]!r})" for k in (i, j))
     q, r = (f"(-h * {a[k][m]!r})" for k, m in ((i, j), (j, i)))
     return [
@@ -184,7 +188,8 @@ def law_from_control(
     """
     errors.name("name of the controller", name)
     system = _checked(_system(K))
-    states, count = len(system.a), system.b.shape[1]
+    states = len(system.a)
+    count = system.b.shape[1]
     if inputs is None:
         names = DEFAULT_INPUTS[:count]
     elif isinstance(inputs, str):
@@ -197,7 +202,10 @@ def law_from_control(
         raise ScenarioError(
             f"K has {count} inputs, and {len(names)} are named: give inputs=, such as ['r', 'x']"
         )
-    a, b, c, discrete = system.a, system.b, system.c, system.dt is not None
+    a = system.a
+    b = system.b
+    c = system.c
+    discrete = system.dt is not None
     if states and not discrete:
         from scipy.linalg import schur
 
@@ -251,7 +259,9 @@ def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
         b = b[:, None] if b.ndim == 1 else b
         a, b, c, d = (np.atleast_2d(array) for array in (a, b, c, d))
         if not a.size:
-            a, b, c = np.zeros((0, 0)), np.zeros((0, d.shape[1])), np.zeros((len(d), 0))
+            a = np.zeros((0, 0))
+            b = np.zeros((0, d.shape[1]))
+            c = np.zeros((len(d), 0))
     except (TypeError, ValueError):
         raise ScenarioError(f"K has matrices that are not of real numbers: {CURE}") from None
     return System(a, b, c, d, dt)
@@ -289,7 +299,9 @@ def _checked(K: System) -> System:
     """Return a system whose sizes fit, of finite numbers, and with None for a dt of continuous
     time.
     """
-    n, inputs, outputs = len(K.a), K.d.shape[1], len(K.d)
+    n = len(K.a)
+    inputs = K.d.shape[1]
+    outputs = len(K.d)
     shapes = {
         "A": (K.a, (n, n)),
         "B": (K.b, (n, inputs)),

@@ -116,7 +116,8 @@ class Controller(Policy):
         if isinstance(answer, tuple):
             u, told = answer
         else:
-            u, told = (answer, {})
+            u = answer
+            told = {}
         return float(np.asarray(u, float).item()), float(told.get("s", 0.0))
 
 
@@ -165,7 +166,8 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
     options.intra_op_num_threads = 1  # more would only spin: the batch is one observation
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     inputs = session.get_inputs()
-    dtype, shape = ONNX_DTYPES.get(inputs[0].type), list(inputs[0].shape)
+    dtype = ONNX_DTYPES.get(inputs[0].type)
+    shape = list(inputs[0].shape)
     if (
         len(inputs) != 1
         or dtype is None
@@ -213,7 +215,8 @@ class Network:
         """Return what pickle and run keys contain: the module's bytes, its classes, and torch's
         version.
         """
-        torch, file = sys.modules["torch"], io.BytesIO()
+        torch = sys.modules["torch"]
+        file = io.BytesIO()
         _reset_distribution(self.module)
         torch.save(self.module, file)
         classes = {type(part) for part in self.module.modules()}
@@ -291,7 +294,9 @@ def _callable(act: Any) -> tuple[Act, str]:
         except Failed as failed:
             raise ScenarioError(failed.fault or f"policy {path.name!r}: {failed}") from None
         return file, path.stem
-    torch, control, name = sys.modules.get("torch"), sys.modules.get("control"), type(act).__name__
+    torch = sys.modules.get("torch")
+    control = sys.modules.get("control")
+    name = type(act).__name__
     if control is not None and isinstance(act, control.InputOutputSystem):
         raise ScenarioError(
             f"policy is a {name} of python-control: give smc.exchange.law_from_control(...) as the law"

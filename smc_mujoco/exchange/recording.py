@@ -38,9 +38,11 @@ def write(trace: Trace, file: Path) -> None:
         from mcap_protobuf.writer import Writer
 
     message = message_of(joint_names(trace.scenario.plant))
-    fields, model = message.DESCRIPTOR.fields_by_name, shapes(trace.scenario)[0].model
+    fields = message.DESCRIPTOR.fields_by_name
+    model = shapes(trace.scenario)[0].model
     samples, places, turns = posed(trace)
-    scene, at = SceneUpdate(), {sample: i for i, sample in enumerate(samples.tolist())}
+    scene = SceneUpdate()
+    at = {sample: i for i, sample in enumerate(samples.tolist())}
     add_shapes(scene, model)
     with file.open("wb") as stream, Writer(stream) as writer:
         about = to_json(serialise.describe(trace.scenario))
@@ -79,7 +81,8 @@ def message_of(joints: Sequence[str]) -> Any:
     file = descriptor_pb2.FileDescriptorProto(
         name="smc_mujoco/joints.proto", package="smc_mujoco", syntax="proto3"
     )
-    kind, taken = file.message_type.add(name="Joints"), {*dir(message.Message)}
+    kind = file.message_type.add(name="Joints")
+    taken = {*dir(message.Message)}
     plain = [re.sub(r"^(?=\d)|\W", "_", joint, flags=re.ASCII) for joint in joints]
     for number, known in enumerate(plain, 1):
         name = known + f"_{number}" * (plain.count(known) > 1)
@@ -112,10 +115,8 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         whole = np.tile(models.initial_state(first, trace.scenario)[0], (len(samples), 1))
     if not trace.scenario.plant.pose:  # of which `poses` has all
         whole[:, channels] = trace.x[samples]
-    places, turns = (
-        np.empty((len(samples), first.nbody, 3)),
-        np.empty((len(samples), first.nbody, 4)),
-    )
+    places = np.empty((len(samples), first.nbody, 3))
+    turns = np.empty((len(samples), first.nbody, 4))
     for i, k in enumerate(samples.tolist()):
         now = sum(trace.t[k] >= machine.time for machine in machines) - 1
         data[now].qpos[:] = whole[i]
@@ -152,7 +153,9 @@ def add_shapes(message: Any, model: mujoco.MjModel) -> None:
 
 def primitives(entity: Any, model: mujoco.MjModel, geom: int) -> Iterator[tuple[Any, np.ndarray]]:
     """Yield the primitives of a geom, added to an entity, with their places in the body."""
-    kind, size, place = GEOM(model.geom_type[geom]), model.geom_size[geom], model.geom_pos[geom]
+    kind = GEOM(model.geom_type[geom])
+    size = model.geom_size[geom]
+    place = model.geom_pos[geom]
     if kind == GEOM.mjGEOM_BOX:
         yield sized(entity.cubes.add(), 2.0 * size), place
     elif kind in (GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_ELLIPSOID):

@@ -39,16 +39,21 @@ def solve(
         f"{kind} of {plant.name}", name, {known: i for i, known in enumerate(names) if known}
     )
     if kind == "site":
-        places, jacobian = (data.site_xpos, mujoco.mj_jacSite)
+        places = data.site_xpos
+        jacobian = mujoco.mj_jacSite
     else:
-        places, jacobian = (data.xpos, mujoco.mj_jacBody)
-    ids, moves = joint_ids(model), np.zeros((3, model.nv))
+        places = data.xpos
+        jacobian = mujoco.mj_jacBody
+    ids = joint_ids(model)
+    moves = np.zeros((3, model.nv))
     limited = model.jnt_limited[ids].astype(bool)
     low, high = (
         np.where(limited, model.jnt_range[ids, side], end)
         for side, end in enumerate((-np.inf, np.inf))
     )
-    x, path, away = np.array(start, float), [], np.zeros(3)
+    x = np.array(start, float)
+    path = []
+    away = np.zeros(3)
     for i, point in enumerate(points):
         for _ in range(MAX_STEPS):
             data.qpos[model.jnt_qposadr[ids]] = x

@@ -70,10 +70,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         return plant(text, **values)
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 
-    path, joints = (
-        model["path"],
-        list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or ""))),
-    )
+    path = model["path"]
+    joints = list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
     if not joints:
         raise ScenarioError(
             f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow"

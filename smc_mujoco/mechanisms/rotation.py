@@ -49,7 +49,9 @@ def relative(p, q):
 def turned(q, x, y, z):
     """Return the vector R(q) (x, y, z)."""
     w, a, b, c = q
-    s, t, u = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    s = 2.0 * (b * z - c * y)
+    t = 2.0 * (c * x - a * z)
+    u = 2.0 * (a * y - b * x)
     return x + w * s + b * u - c * t, y + w * t + c * s - a * u, z + w * u + a * t - b * s
 
 
@@ -74,8 +76,12 @@ def rate(x, y, z, dx, dy, dz):
         second = (1.0 - angle * angle / 20.0) / 6.0
     else:
         second = (angle - math.sin(angle)) / angle**3
-    ax, ay, az = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
-    bx, by, bz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
+    ax = y * dz - z * dy
+    ay = z * dx - x * dz
+    az = x * dy - y * dx
+    bx = y * az - z * ay
+    by = z * ax - x * az
+    bz = x * ay - y * ax
     return (
         dx - first * ax + second * bx,
         dy - first * ay + second * by,

@@ -88,11 +88,13 @@ def trends(trace: Trace) -> dict[str, float]:
     first = dataclasses.replace(
         trace, **{name: array[:count] for name, array in trace.arrays().items()}
     )
-    earlier, whole = conventions.by_group(first), conventions.by_group(trace)
+    earlier = conventions.by_group(first)
+    whole = conventions.by_group(trace)
     found = {}
     for m in metrics():
         if m.late and not m.refusal(trace.scenario.plant):
-            now, before = m.worst(whole), m.worst(earlier)
+            now = m.worst(whole)
+            before = m.worst(earlier)
             if now > 0.0 and before > 0.0:
                 found[m.name] = now / before
     return found
@@ -119,7 +121,8 @@ def rise_time(trace: Trace) -> float:
     transient response), inf if there is none. A channel without such an approach is left out; 0 if
     all are.
     """
-    e, t = error(trace), trace.t
+    e = error(trace)
+    t = trace.t
     times = [0.0]
     for i, parts in enumerate(approaches(trace)):
         part = next((p for p in parts if e[p.start, i] != 0), None)
@@ -138,7 +141,8 @@ def overshoot(trace: Trace) -> float:
     the approach's start: only the far side of the reference counts. If e_b = 0, both sides count:
     100 |e| / scale.
     """
-    e, worst = error(trace), 0.0
+    e = error(trace)
+    worst = 0.0
     for i, parts in enumerate(approaches(trace)):
         for part in parts:
             side = np.sign(e[part.start, i])
@@ -243,7 +247,8 @@ def tv_rate(trace: Trace) -> float:
     its last sample; 0 for a single sample.
     """
     part = last_part(trace)
-    u, t = trace.u[part], trace.t[part]
+    u = trace.u[part]
+    t = trace.t[part]
     if t.size < 2:
         return 0.0
     return np.abs(np.diff(u, axis=0)).sum(axis=0).max() / (t[-1] - t[0])
@@ -268,7 +273,8 @@ def hf_share(trace: Trace) -> float:
     variance). Powers are pooled over the channels, so that a channel at rest does not count. 0 if u
     is constant, and if half the sampling rate is 50 Hz or less.
     """
-    u, t = trace.u[:-1], trace.t
+    u = trace.u[:-1]
+    t = trace.t
     if u.size == 0 or np.ptp(u, axis=0).max() <= ROUNDING_SHARE * np.abs(u).max():
         return 0.0
     k = len(u)
@@ -330,7 +336,8 @@ def reversal_rate(trace: Trace) -> float:
     Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle
     longer than the last part is not seen.
     """
-    part, threshold = last_part(trace), 1e-6 * scale(trace)
+    part = last_part(trace)
+    threshold = 1e-6 * scale(trace)
     return max(conventions.turns(e, threshold) for e in error(trace)[part].T) / (
         np.ptp(trace.t[part]) or np.inf
     )

@@ -110,7 +110,8 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     """
     if len(group.channels) == trace.x.shape[1]:
         return trace
-    plant, whole = trace.scenario.plant, trace.arrays()
+    plant = trace.scenario.plant
+    whole = trace.arrays()
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
     columns = [i for i in group.channels if i in plant.judged]
@@ -227,7 +228,8 @@ def metric(
     """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
-        name, summary = formula.__name__, (inspect.getdoc(formula) or "").partition("\n")[0]
+        name = formula.__name__
+        summary = (inspect.getdoc(formula) or "").partition("\n")[0]
         fields = {
             "summary": summary,
             "formula": formula,
@@ -286,7 +288,8 @@ def by_group(trace: Trace) -> dict[Group, Trace]:
 
 def scale(trace: Trace) -> float:
     """Return the scale of a group's trace in x's unit, never zero; see the module's conventions."""
-    start, travel = np.abs(trace.x[0] - trace.r[0]).max(), max(np.ptp(r) for r in trace.r.T)
+    start = np.abs(trace.x[0] - trace.r[0]).max()
+    travel = max(np.ptp(r) for r in trace.r.T)
     return float(max(start, travel)) or 1.0
 
 
@@ -334,8 +337,12 @@ def row_max(a: np.ndarray) -> np.ndarray:
 
 def turns(y: np.ndarray, threshold: float) -> int:
     """Return how often y (K,) turns back by half its range or more; 0 for a range <= `threshold`."""
-    count, direction, low, high = 0, 0, y[0], y[0]
-    swing, slopes = float(np.ptp(y)) / 2, np.diff(y)
+    count = 0
+    direction = 0
+    low = y[0]
+    high = y[0]
+    swing = float(np.ptp(y)) / 2
+    slopes = np.diff(y)
     peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # y is monotonic between them
     for value in y[[0, *peaks, -1]].tolist() if 2 * swing > threshold else ():
         low, high = min(low, value), max(high, value)

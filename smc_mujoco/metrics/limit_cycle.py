@@ -118,7 +118,8 @@ def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, perio
         / np.sin(0.5 * math.pi * np.arange(1, len(spectrum)) / (len(spectrum) - 1)) ** 2
     )
     sizes = np.convolve(np.r_[0.0, of_s], np.ones(5), "same")  # of lines, which the window spreads
-    order, largest = 1, sizes[peak]
+    order = 1
+    largest = sizes[peak]
     for k in range(2, round(periods / MIN_PERIODS) + 1 if periods >= 3 * MIN_PERIODS else 4):
         at = round(periods / k)
         if sizes[at] <= largest:
@@ -127,7 +128,8 @@ def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, perio
         if at < MIN_PERIODS or (
             strong and abs(_refined(rates, at) - periods / k) < MAX_LINE_OFFSET
         ):
-            order, largest = k, sizes[at]
+            order = k
+            largest = sizes[at]
     return order
 
 

@@ -64,9 +64,11 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
             f"{plant.name} has no tip: make it with smc.plant_from(..., tip='SITE')"
         )
     model = plant.load(factors)
-    data, site = mujoco.MjData(model), model.site(plant.tip).id
+    data = mujoco.MjData(model)
+    site = model.site(plant.tip).id
     data.qpos[:] = initial_pose(model)
-    addresses, tip = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
+    addresses = model.jnt_qposadr[joint_ids(model)]
+    tip = np.empty((len(x), 3))
     for k, joints in enumerate(x):
         data.qpos[addresses] = joints
         mujoco.mj_kinematics(model, data)
@@ -79,7 +81,8 @@ def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     """Return the actual path of the tip (true plant) and the wanted one (nominal plant), m, (K + 1,
     3), read-only.
     """
-    scenario, jump = trace.scenario, _jump_sample(trace)
+    scenario = trace.scenario
+    jump = _jump_sample(trace)
     parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
     actual = np.concatenate(
         [tip_path(scenario.plant, x, scenario.factors(step)) for x, step in parts if len(x)]
@@ -124,9 +127,12 @@ def contacts(trace: Trace) -> Contacts:
         )
     compiled = models.compile_model(scenario)
     model = models.with_values(compiled, scenario)
-    data, joints = mujoco.MjData(model), joint_ids(model)
-    positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-    drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
+    data = mujoco.MjData(model)
+    joints = joint_ids(model)
+    positions = model.jnt_qposadr[joints]
+    rates = model.jnt_dofadr[joints]
+    drives = model.actuator_ctrladr[drive_ids(model)]
+    n = scenario.plant.driven
     scale = math.prod(part.scale for part in scenario.actuator)
     pushes = []
     for d in scenario.disturbance:
@@ -242,11 +248,13 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     `smc.score`.
     """
     conventions.refuse(trace)
-    values, names = {}, joint_names(trace.scenario.plant)
+    values = {}
+    names = joint_names(trace.scenario.plant)
     for group in groups(trace.scenario):
         for i in group.channels:
             joint = dataclasses.replace(group, channels=(i,))
-            part, power = group_trace(trace, joint), np.abs(trace.force[:, i] * trace.v[:, i])
+            part = group_trace(trace, joint)
+            power = np.abs(trace.force[:, i] * trace.v[:, i])
             values[names[i]] = {
                 m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)
             }

@@ -103,9 +103,11 @@ def checked_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     kinds = {struct: _ctype(structs.STRUCTS[struct]) for struct in ("mjModel", "mjData")}
     for name in Offsets._fields:
         if name in OF_MODEL:
-            struct, live = ("mjModel", model)
+            struct = "mjModel"
+            live = model
         else:
-            struct, live = ("mjData", data)
+            struct = "mjData"
+            live = data
         if not (field := getattr(kinds[struct], name, None)):
             raise LayoutError(f"lacks the field {struct}.{name}")
         value = getattr(live, name)
@@ -148,7 +150,8 @@ def callback():
     """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it
     is there.
     """
-    at, ours = offsets(), magic()
+    at = offsets()
+    ours = magic()
 
     def control(model, data):
         if integers(model + at.nuserdata)[0] < USERDATA:
@@ -202,7 +205,8 @@ def installed(control=None) -> Iterator[None]:
     Other threads wait.
     """
     with mjcb.installed(None):
-        function, silent = callback().ctypes if control is None else control, silence().ctypes
+        function = callback().ctypes if control is None else control
+        silent = silence().ctypes
         before = mujoco.get_mju_user_warning()
         with mjcb.installed(function):
             try:

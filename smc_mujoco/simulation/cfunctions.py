@@ -56,11 +56,9 @@ instant_at, friction_input_at, seen_at, series_at = map(
 @functools.cache
 def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two numbers; an estimator may return only the velocity."""
-    body, inputs, values = (
-        jit(function),
-        loader(Reading if kind == "estimator" else Measurement),
-        loader(named(gains)),
-    )
+    body = jit(function)
+    inputs = loader(Reading if kind == "estimator" else Measurement)
+    values = loader(named(gains))
     attempt = attempting(2, kind == "estimator")
 
     def native(y, g, m, out):
@@ -78,7 +76,9 @@ def _compile_joint_law(
     Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u
     and s, (n,) each.
     """
-    body, values, attempt = jit(function), _joint_gains(gains, shared), attempting(0)
+    body = jit(function)
+    values = _joint_gains(gains, shared)
+    attempt = attempting(0)
 
     @checked
     def law(y, g, m, out):
@@ -92,7 +92,8 @@ def _compile_joint_law(
     def native(y, g, m, out):
         seen = measurement_at(y)
         n = len(seen.x)
-        memories, output = carray(pointer(m), (n, memory)), carray(pointer(out), (2 * n,))
+        memories = carray(pointer(m), (n, memory))
+        output = carray(pointer(out), (2 * n,))
         return attempt(law, (seen, values(g, n), memories, output), out)
 
     return _stored(native, function, gains, shared, memory)
@@ -118,14 +119,15 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 
     The parameters of a series are followed by the address and the number of its points.
     """
-    body, values, attempt = jit(kind.value), loader(named(names)), attempting(3)
-    random, series, memory, parameter_bytes = (
-        kind.random,
-        kind.series,
-        max(kind.memory, 1),
-        8 * len(names),
-    )
-    rows, sees = kind.rows, kind.sees
+    body = jit(kind.value)
+    values = loader(named(names))
+    attempt = attempting(3)
+    random = kind.random
+    series = kind.series
+    memory = max(kind.memory, 1)
+    parameter_bytes = 8 * len(names)
+    rows = kind.rows
+    sees = kind.sees
 
     def native(y, p, m, out):
         now = instant_at(y, 0)
@@ -149,11 +151,14 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 @functools.cache
 def compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
     """Compile a record SEEN -> f and g of channel i."""
-    body, values, attempt = jit(function), loader(named(names)), attempting(2)
+    body = jit(function)
+    values = loader(named(names))
+    attempt = attempting(2)
 
     def native(y, p, m, out):
         seen = seen_at(y, 0)
-        x, v = carray(pointer(seen.x), (seen.n,)), carray(pointer(seen.v), (seen.n,))
+        x = carray(pointer(seen.x), (seen.n,))
+        v = carray(pointer(seen.v), (seen.n,))
         return attempt(body, (x, v, seen.i, values(p)), out)
 
     return _stored(native, function, names)
@@ -164,7 +169,9 @@ def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
     """Compile a friction by a formula: v, motor, load -> sliding friction, and both bounds of the
     static friction.
     """
-    body, values, attempt = jit(function), loader(named(names)), attempting(3)
+    body = jit(function)
+    values = loader(named(names))
+    attempt = attempting(3)
 
     def native(y, p, m, out):
         friction = friction_input_at(y, 0)

@@ -166,7 +166,8 @@ def physics_step(name: str, value: float | None, s: Any) -> float | None:
     """Return the physics step, s, as an exact fraction of the control period."""
     if value is None:
         return None
-    h, period = number(name, value, above=0.0, low=MIN_TIME), s.control_period
+    h = number(name, value, above=0.0, low=MIN_TIME)
+    period = s.control_period
     count = period / h
     if not 1.0 - 1e-9 <= count < math.inf or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(

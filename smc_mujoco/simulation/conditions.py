@@ -290,7 +290,8 @@ def _call(node: ast.Call) -> Any:
     """Return the part, signal or estimator that a call makes."""
     name = ast.unparse(node.func).removeprefix("smc.")
     kind = find("part, signal or estimator", name, estimators() | _kinds())
-    values, keywords = map(_parsed, node.args), _keywords(node)
+    values = map(_parsed, node.args)
+    keywords = _keywords(node)
     try:
         return kind(*values, **keywords)
     except TypeError:

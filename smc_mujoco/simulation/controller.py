@@ -73,9 +73,12 @@ def control(address, sim, data):
     sim.calls = calls + 1
     if sim.failure != record.FINE:
         return
-    stages, steps = sim.stages, sim.steps
-    step, stage = calls // stages, calls % stages
-    k, within = step // steps, step % steps
+    stages = sim.stages
+    steps = sim.steps
+    step = calls // stages
+    stage = calls % stages
+    k = step // steps
+    within = step % steps
     failure = record.FINE
     _remove_exact_friction(sim, data)
     if stage == 0:
@@ -103,7 +106,8 @@ def control(address, sim, data):
     if sim.frictions != 0 and failure == record.FINE:  # an integrator of one stage
         failure = _apply_friction(address, sim, data)
     if failure != record.FINE:
-        sim.failure, sim.failed_step = failure, step
+        sim.failure = failure
+        sim.failed_step = step
         _zero_inputs(sim, data)
         return
     if stage == 0 and within == 0:
@@ -156,12 +160,11 @@ def _sample(address, sim, data, k, within):
 @njit(error_model="numpy")
 def _repeat_command(sim, k):
     """Give sample k the command of the sample before, with its u, s and r in the log."""
-    buffer, last_u = (
-        pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)),
-        pointer(sim.seen.u),
-    )
+    buffer = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots))
+    last_u = pointer(sim.seen.u)
     for i in range(sim.n):
-        sample, before = log_at(sim.log, k * sim.n + i), log_at(sim.log, (k - 1) * sim.n + i)
+        sample = log_at(sim.log, k * sim.n + i)
+        before = log_at(sim.log, (k - 1) * sim.n + i)
         sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last_u[i]
 
 
@@ -208,7 +211,8 @@ def _read_sensor(sim, state, i, x, v, j, hinge):
     if sim.dropout != 0.0:
         if j > 0 and philox.uniform(sim.seed, i, philox.DROPOUT, j) < sim.dropout:
             return state.last_x, state.last_v
-        state.last_x, state.last_v = x, v
+        state.last_x = x
+        state.last_v = v
     return x, v
 
 
@@ -246,15 +250,20 @@ def _measure(address, sim, data, k, t):
     """Measure position, and estimate velocity and acceleration, of every channel at sample k, at
     time t, s.
     """
-    j, x, v, a = k, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a)
+    j = k
+    x = pointer(sim.seen.x)
+    v = pointer(sim.seen.v)
+    a = pointer(sim.a)
     if sim.read_period != 0.0:
         j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
-    reading, estimate = sim.reading, sim.estimate
+    reading = sim.reading
+    estimate = sim.estimate
     reading.dt = sim.period
     x_error = _measurement_error(address, sim, sim.position_error, t)
     v_error = _measurement_error(address, sim, sim.velocity_error, t)
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
         position = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
         velocity = data.sensordata[channel.v_sensor] + v_error
         reading.x, reading.v = _read_sensor(
@@ -286,14 +295,13 @@ def update_law(address, sim, k, t):
 
     A channel's nominal model may depend on the new commands of the channels before it.
     """
-    n, width, last_u, limits, feedforward = (
-        sim.n,
-        sim.width,
-        pointer(sim.seen.u),
-        pointer(sim.limits),
-        0.0,
-    )
-    joint, commands = sim.joint.head != 0, pointer(sim.commands)
+    n = sim.n
+    width = sim.width
+    last_u = pointer(sim.seen.u)
+    limits = pointer(sim.limits)
+    feedforward = 0.0
+    joint = sim.joint.head != 0
+    commands = pointer(sim.commands)
     y = sim.joint.head if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
@@ -317,12 +325,11 @@ def update_law(address, sim, k, t):
         if _call(law, first, y, sim.commands) != 0:
             return record.LAW_RAISED
         for j in range(width):
-            i, limit = first + j, limits[first + j]
-            command, s, sample = (
-                commands[j] + feedforward,
-                commands[width + j],
-                log_at(sim.log, k * n + i),
-            )
+            i = first + j
+            limit = limits[first + j]
+            command = commands[j] + feedforward
+            s = commands[width + j]
+            sample = log_at(sim.log, k * n + i)
             u = min(max(command, -limit), limit)
             if not (
                 math.isfinite(command)
@@ -387,49 +394,71 @@ def _measure_channel(address, sim, k, t, i):
     """
     if _evaluate_reference(address, sim, k, i) != 0:
         return record.RAISED
-    y, x, v, a, motion, model = (
-        sim.y,
-        pointer(sim.seen.x),
-        pointer(sim.seen.v),
-        pointer(sim.a),
-        sim.motion,
-        sim.model,
-    )
-    y.t, y.dt, y.r, y.dr, y.ddr = t, sim.period, motion.value, motion.rate, motion.acceleration
-    y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
+    y = sim.y
+    x = pointer(sim.seen.x)
+    v = pointer(sim.seen.v)
+    a = pointer(sim.a)
+    motion = sim.motion
+    model = sim.model
+    y.t = t
+    y.dt = sim.period
+    y.r = motion.value
+    y.dr = motion.rate
+    y.ddr = motion.acceleration
+    y.q = 0.0
+    y.dq = 0.0
+    y.fq = 0.0
+    y.gq = 0.0
     partner = i + sim.driven  # a joint without actuator, which moves with channel i
     if partner < sim.n:
         if _evaluate_model(address, sim, partner) != 0:
             return record.RAISED
-        y.q, y.dq = x[partner], v[partner]
-        y.fq, y.gq = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
+        y.q = x[partner]
+        y.dq = v[partner]
+        y.fq = model.f - sim.drive_drag * v[i] * model.g
+        y.gq = sim.drive_gain * model.g
     if _evaluate_model(address, sim, i) != 0:
         return record.RAISED
-    y.f, y.g = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
+    y.f = model.f - sim.drive_drag * v[i] * model.g
+    y.g = sim.drive_gain * model.g
     if sim.told != 0:
         y.f += pointer(sim.told)[i] * model.g
     if sim.motors != 0:  # u is the acceleration x''
         y.gq /= y.g
         y.fq -= y.gq * y.f
-        y.f, y.g = 0.0, 1.0
-    y.x, y.v = x[i], v[i]
-    y.e, y.de = y.x - y.r, y.v - y.dr
+        y.f = 0.0
+        y.g = 1.0
+    y.x = x[i]
+    y.v = v[i]
+    y.e = y.x - y.r
+    y.de = y.v - y.dr
     y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
-    y.limit, y.model = pointer(sim.limits)[i], sim.uses_model
-    y.has_surface, y.s, y.v_eq = 0.0, 0.0, 0.0
+    y.limit = pointer(sim.limits)[i]
+    y.model = sim.uses_model
+    y.has_surface = 0.0
+    y.s = 0.0
+    y.v_eq = 0.0
     if sim.surface.address != 0:
         if _call(sim.surface, i, address + record.AT.y, address + record.AT.sliding) != 0:
             return record.RAISED
-        y.has_surface, y.s, y.v_eq = 1.0, sim.sliding.s, sim.sliding.v_eq
+        y.has_surface = 1.0
+        y.s = sim.sliding.s
+        y.v_eq = sim.sliding.v_eq
     return record.FINE
 
 
 @njit(error_model="numpy")
 def _measure_joints(address, sim, k, t):
     """Write what a law of many joints reads at sample k, at time t, s."""
-    y, n, motion, seen = sim.joint, sim.n, sim.motion, sim.seen
+    y = sim.joint
+    n = sim.n
+    motion = sim.motion
+    seen = sim.seen
     head = head_at(y.head, 0)
-    head.t, head.dt, head.model, head.n = t, sim.period, sim.uses_model, n
+    head.t = t
+    head.dt = sim.period
+    head.model = sim.uses_model
+    head.n = n
     if sim.handle.coriolis != 0.0:
         head.dynamics = address + record.AT.handle
     else:
@@ -437,7 +466,9 @@ def _measure_joints(address, sim, k, t):
     for i in range(n):
         if _evaluate_reference(address, sim, k, i) != 0:
             return record.RAISED
-        x, v, a = pointer(seen.x)[i], pointer(seen.v)[i], pointer(sim.a)[i]
+        x = pointer(seen.x)[i]
+        v = pointer(seen.v)[i]
+        a = pointer(sim.a)[i]
         pointer(y.x)[i], pointer(y.v)[i] = x, v
         pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
         pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = (
@@ -459,13 +490,11 @@ def _measure_joints(address, sim, k, t):
 @njit(error_model="numpy")
 def _measure_dynamics(address, sim):
     """Write nominal M, h and g of all channels, per unit of u, into a joint measurement."""
-    n, v, M, h, g = (
-        sim.n,
-        pointer(sim.seen.v),
-        pointer(sim.joint.M),
-        pointer(sim.joint.h),
-        pointer(sim.joint.g),
-    )
+    n = sim.n
+    v = pointer(sim.seen.v)
+    M = pointer(sim.joint.M)
+    h = pointer(sim.joint.h)
+    g = pointer(sim.joint.g)
     failure = record.FINE
     if sim.uses_model == 0.0:
         for i in range(n * n):
@@ -490,7 +519,9 @@ def _separate_equations(address, sim, M, h, g):
 
     M is diagonal.
     """
-    n, v, measured = sim.n, pointer(sim.seen.v), pointer(sim.joint.v)
+    n = sim.n
+    v = pointer(sim.seen.v)
+    measured = pointer(sim.joint.v)
     for i in range(n * n):
         M[i] = 0.0
     for moving in (True, False):  # h at v, then g at rest
@@ -523,7 +554,8 @@ def _actuate(sim, data, step):
                 _command_stepper(_motor_at(sim, i), sim.stepper, buffer[i], step * sim.step)
     if sim.motors != 0:
         for i in range(sim.driven):
-            motor, queue = _motor_at(sim, i), pointer(_queue_of(sim, i))
+            motor = _motor_at(sim, i)
+            queue = pointer(_queue_of(sim, i))
             _advance_stepper(motor, sim.stepper, queue, step * sim.step, (step + 1) * sim.step)
             _turn_field(motor, sim.stepper, queue, step * sim.step, (step + 1) * sim.step)
         return
@@ -565,12 +597,11 @@ def _apply_steppers(sim, data, stage):
     over the step.
     """
     for i in range(sim.driven):
-        channel, state, motor = (
-            channel_at(sim.channels, i),
-            state_at(sim.states, i),
-            _motor_at(sim, i),
-        )
-        moved, weight = motor.middle, 1.0
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
+        motor = _motor_at(sim, i)
+        moved = motor.middle
+        weight = 1.0
         if sim.stages > 1:  # RK4
             if stage == 3:
                 moved += motor.rise
@@ -588,7 +619,8 @@ def _give_moment(sim, data, stage):
     `drives._rise`.
     """
     for i in range(sim.driven):
-        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
         if stage == 3:
             data.ctrl[channel.ctrl] = state.middle + state.rise
         else:
@@ -603,17 +635,18 @@ def _step_drives(factors, state, v):
 
     Return the mean force. v: speed of the drive.
     """
-    u, second = state.delayed, state.second
-    a, b = state.first - u, second - u
+    u = state.delayed
+    second = state.second
+    a = state.first - u
+    b = second - u
     force = u + factors.force_first * a
     state.first = u + factors.first_left * a
     state.rise = factors.rise_first * a
     if factors.voltage != 0.0:
-        bound, torque = factors.voltage, second - factors.drag * v
-        mean, end = (
-            min(max(force, -bound), bound),
-            min(max(u + factors.second_first * a, -bound), bound),
-        )
+        bound = factors.voltage
+        torque = second - factors.drag * v
+        mean = min(max(force, -bound), bound)
+        end = min(max(u + factors.second_first * a, -bound), bound)
         state.second = end + factors.second_left * (torque - end) - factors.second_drag * v
         return mean + factors.force_second * (torque - mean) - factors.force_drag * v
     if factors.reach == 0.0:
@@ -638,23 +671,28 @@ def _fly(sim, data, step, stage):
     if stage == 0:
         lifted = 0.0
         for j in range(sim.actuators):
-            rotor, state = rotor_at(data.actuator_user, j), state_at(sim.states, j)
+            rotor = rotor_at(data.actuator_user, j)
+            state = state_at(sim.states, j)
             if step > 0:
                 state.first = spun(rotor, state.first, state.second, sim.step)[0]
             lifted += thrust_at(rotor, state.first)
         for j in range(sim.actuators):
-            rotor, state = rotor_at(data.actuator_user, j), state_at(sim.states, j)
+            rotor = rotor_at(data.actuator_user, j)
+            state = state_at(sim.states, j)
             state.second = speed_for(rotor, state.delayed) * max(0.0, 1.0 - rotor.sag * lifted)
     passed = sim.step * (0.5 if sim.stages == 1 else 0.5 * ((stage + 1) // 2))
-    momentum, change = 0.0, 0.0
+    momentum = 0.0
+    change = 0.0
     for j in range(sim.actuators):
-        rotor, state = rotor_at(data.actuator_user, j), state_at(sim.states, j)
+        rotor = rotor_at(data.actuator_user, j)
+        state = state_at(sim.states, j)
         W, rate = spun(rotor, state.first, state.second, passed)
         data.ctrl[channel_at(sim.channels, j).ctrl] = thrust_at(rotor, W)
         momentum += rotor.inertia * rotor.spin * W
         change += rotor.inertia * rotor.spin * rate
     dof = channel_at(sim.channels, 0).qvel
-    v, drag = data.qvel, _drag(sim, data, data.qvel[dof], data.qvel[dof + 1], data.qvel[dof + 2])
+    v = data.qvel
+    drag = _drag(sim, data, data.qvel[dof], data.qvel[dof + 1], data.qvel[dof + 2])
     for i in range(3):
         data.qfrc_applied[dof + i] = -drag[i]
     data.qfrc_applied[dof + 3] = -v[dof + 4] * momentum
@@ -665,12 +703,11 @@ def _fly(sim, data, step, stage):
 @njit(error_model="numpy")
 def _drag(sim, data, x, y, z):
     """Return R diag(drag) R' times a velocity (x, y, z) in the axes of the world, N."""
-    place, first = channel_at(sim.channels, 0), channel_at(sim.channels, 3).qpos
+    place = channel_at(sim.channels, 0)
+    first = channel_at(sim.channels, 3).qpos
     q = data.qpos[first], data.qpos[first + 1], data.qpos[first + 2], data.qpos[first + 3]
-    along, drag = (
-        rotation.turned_back(q, x, y, z),
-        pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6)),
-    )
+    along = rotation.turned_back(q, x, y, z)
+    drag = pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6))
     return rotation.turned(q, drag[0] * along[0], drag[1] * along[1], drag[2] * along[2])
 
 
@@ -719,7 +756,9 @@ def _apply_pushes(address, sim, data):
 @njit(error_model="numpy")
 def _apply_wind(address, sim, data):
     """Apply the force of the air that moves past a free body with drag."""
-    x, y, z = 0.0, 0.0, 0.0
+    x = 0.0
+    y = 0.0
+    z = 0.0
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         sim.instant.stream = signal.stream
@@ -760,13 +799,16 @@ def _evaluate_feedback(address, sim, data, signal, i, k):
     if i > 0 or k < 0:
         sim.motion.value = pointer(signal.function.memory)[0]
         return 0
-    channel, sample, instant = channel_at(sim.channels, 0), log_at(sim.log, k * sim.n), sim.instant
+    channel = channel_at(sim.channels, 0)
+    sample = log_at(sim.log, k * sim.n)
+    instant = sim.instant
     if k == 0:
         before = sample.r
     else:
         before = log_at(sim.log, (k - 1) * sim.n).r
     instant.e = data.qpos[channel.qpos] - sample.r
-    instant.de, instant.s = data.qvel[channel.qvel] - (sample.r - before) / sim.period, sample.s
+    instant.de = data.qvel[channel.qvel] - (sample.r - before) / sim.period
+    instant.s = sample.s
     return _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion)
 
 
@@ -775,8 +817,10 @@ def _apply_disturbances(address, sim, data, t, k):
     """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at
     all others.
     """
-    instant, motion = sim.instant, sim.motion
-    instant.t, instant.seed = t, sim.seed
+    instant = sim.instant
+    motion = sim.motion
+    instant.t = t
+    instant.seed = sim.seed
     if _apply_pushes(address, sim, data) != record.FINE:
         return record.RAISED
     if sim.rotors != 0 and _apply_wind(address, sim, data) != record.FINE:
@@ -804,10 +848,8 @@ def _apply_disturbances(address, sim, data, t, k):
             _add_force(data, channel, motion.value, signal.cartesian != 0)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
-        on_joint, horizontal = (
-            data.xfrc_applied[channel.xfrc],
-            data.xfrc_applied[channel.horizontal],
-        )
+        on_joint = data.xfrc_applied[channel.xfrc]
+        horizontal = data.xfrc_applied[channel.horizontal]
         if not (math.isfinite(on_joint) and math.isfinite(horizontal)):
             return record.DISTURBANCE_NOT_FINITE
         if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
@@ -821,7 +863,8 @@ def lever(channel, xipos, xanchor, xaxis):
 
     All are flat arrays.
     """
-    j, k = channel.axis + 1, (channel.axis + 2) % 3
+    j = channel.axis + 1
+    k = (channel.axis + 2) % 3
     arm_j = xipos[channel.hinge_body + j] - xanchor[channel.anchor + j]
     arm_k = xipos[channel.hinge_body + k] - xanchor[channel.anchor + k]
     return xaxis[channel.anchor + j] * arm_k - xaxis[channel.anchor + k] * arm_j
@@ -844,18 +887,17 @@ def _generalised_disturbance(data, channel):
 @njit(error_model="numpy")
 def _apply_friction(address, sim, data):
     """Give every joint its friction by a formula for a physics step, see hardware/sliding.py."""
-    inputs, outputs = sim.friction_input, sim.friction_output
+    inputs = sim.friction_input
+    outputs = sim.friction_output
     for i in range(sim.n):
-        channel, state, function = (
-            channel_at(sim.channels, i),
-            state_at(sim.states, i),
-            function_at(sim.frictions, i),
-        )
-        x, v, joint = data.qpos[channel.qpos], data.qvel[channel.qvel], channel.qvel
-        inputs.v, inputs.motor = (
-            v,
-            data.actuator_force[channel.force] if channel.force >= 0 else 0.0,
-        )
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
+        function = function_at(sim.frictions, i)
+        x = data.qpos[channel.qpos]
+        v = data.qvel[channel.qvel]
+        joint = channel.qvel
+        inputs.v = v
+        inputs.motor = data.actuator_force[channel.force] if channel.force >= 0 else 0.0
         inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
         inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
         sim.seen.i = i
@@ -866,11 +908,14 @@ def _apply_friction(address, sim, data):
             != 0
         ):
             return record.RAISED
-        f, low, high = outputs.f, outputs.low, outputs.high
+        f = outputs.f
+        low = outputs.low
+        high = outputs.high
         if state.stuck == 0.0:
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(state.speed)
             if slows or v * state.speed < 0.0:
-                state.stuck, state.stuck_at = 1.0, x
+                state.stuck = 1.0
+                state.stuck_at = x
         if state.stuck != 0.0:
             bristle = pointer(function.memory)
             spring = bristle[0] * (x - state.stuck_at)
@@ -900,8 +945,10 @@ def _apply_exact_friction(sim, data, stage):
     While it holds the joint, it takes up what the other forces change within the step, too.
     """
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
-        joint, drive = channel.qvel, data.ctrl[channel.ctrl] if channel.ctrl >= 0 else 0.0
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
+        joint = channel.qvel
+        drive = data.ctrl[channel.ctrl] if channel.ctrl >= 0 else 0.0
         level = data.dof_frictionloss[joint]
         others = (
             data.qfrc_passive[joint]
@@ -910,7 +957,8 @@ def _apply_exact_friction(sim, data, stage):
         )
         if stage == 0:
             state.smooth = others + (state.middle if sim.drive_step.rise_first != 0.0 else drive)
-            v, mobility = data.qvel[joint], data.qLDiagInv[joint]
+            v = data.qvel[joint]
+            mobility = data.qLDiagInv[joint]
             state.friction, state.friction_rise, held = _coulomb_step(
                 v, state.smooth, level, mobility, sim.step
             )
@@ -940,7 +988,8 @@ def _sum_forces(sim, data):
     contacts.
     """
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
         if channel.force >= 0 and sim.drive_step.rise_first == 0.0 and sim.motors == 0:
             state.force += data.actuator_force[channel.force]
         if channel.gathered >= 0:
@@ -954,12 +1003,11 @@ def _sum_forces(sim, data):
 def _log(sim, data, k):
     """Write sample k of every channel into the log, except u, s and r, which are there already."""
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
         sample = log_at(sim.log, k * sim.n + i)
-        sample.x, sample.v = (
-            _position(data.qpos, channel.qpos, channel.turn),
-            data.qvel[channel.qvel],
-        )
+        sample.x = _position(data.qpos, channel.qpos, channel.turn)
+        sample.v = data.qvel[channel.qvel]
         if channel.ctrl < 0:
             sample.applied = 0.0
         elif sim.mixer != 0:
@@ -968,13 +1016,17 @@ def _log(sim, data, k):
             else:
                 sample.applied = data.ctrl[channel.ctrl]
         else:
-            applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
+            applied = data.ctrl[channel.ctrl] / sim.scale
+            limit = pointer(sim.limits)[i]
             # the quotient may round to just beyond the limit
             if sim.has_drives == 0:
                 sample.applied = min(max(applied, -limit), limit)
             else:
                 sample.applied = state.delayed
         sample.d = _generalised_disturbance(data, channel)
-        sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
+        sample.force = state.force / sim.steps
+        sample.reaction = state.reaction / sim.steps
         sample.held = state.held
-        state.force, state.reaction, state.held = 0.0, 0.0, 0.0
+        state.force = 0.0
+        state.reaction = 0.0
+        state.held = 0.0

@@ -72,7 +72,8 @@ class Starts:
         Of a free body it is the largest distance from rest along an axis, m, from which a run may
         start.
         """
-        middle, plant = scenario.resolved.x0 if self.x0 is None else self.x0, scenario.plant
+        middle = scenario.resolved.x0 if self.x0 is None else self.x0
+        plant = scenario.plant
         if plant.pose:
             return (
                 max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False))
@@ -334,7 +335,8 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
     if not isinstance(law, str) or law not in known_laws():
         return checked_name(coerce.law(law))
     gains = "default" if law == "none" else gains
-    with_gains, standard = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
+    with_gains = sets.law(plant, law, gains, seed)
+    standard = catalogue().get(plant.name)
     if gains != "default" and standard is not None and plant.parameters != standard.parameters:
         changed = []
         for name, v in plant.parameters.items():

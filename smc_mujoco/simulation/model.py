@@ -143,7 +143,8 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
             raise ScenarioError(
                 f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one"
             )
-    joints, drives = joint_ids(model).tolist(), drive_ids(model).tolist()
+    joints = joint_ids(model).tolist()
+    drives = drive_ids(model).tolist()
     drives += [-1] * (len(joints) - len(drives))
     rows = []
     for drive, joint in zip(drives, joints, strict=True):
@@ -174,7 +175,8 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name
     )
     computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
-    xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
+    xfrc = 6 * body + component + 3 * hinge
+    sign = int(np.sign(axis[component]))
     indices = {
         "turn": -1,
         "gathered": -1,
@@ -220,9 +222,11 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
     A disturbance is a force on its centre of mass, the same along each axis of the world; a
     horizontal one is along x.
     """
-    joint, drives = free_joint(model), drive_ids(model)
+    joint = free_joint(model)
+    drives = drive_ids(model)
     table = np.full(len(PLACES), -1, [(name, "i8") for name in CHANNEL.names or ()])
-    at, turns = np.arange(len(PLACES)), np.arange(len(PLACES)) - 3
+    at = np.arange(len(PLACES))
+    turns = np.arange(len(PLACES)) - 3
     for name, kinds in POSE_SENSORS.items():
         first, second = (int(model.sensor_adr[model.sensor(POSE + kind).id]) for kind in kinds)
         table[name] = np.where(turns < 0, first + at, second + (turns if name == "v_sensor" else 0))
@@ -324,7 +328,8 @@ def compiled(spec: mujoco.MjSpec, scenario: Scenario, nuserdata: int = 0) -> muj
     """Return the model of a mechanism, with the step and the integrator of a scenario, and without
     its values.
     """
-    model, resolved = compiled_for_runs(spec, nuserdata), scenario.resolved
+    model = compiled_for_runs(spec, nuserdata)
+    resolved = scenario.resolved
     model.opt.timestep = resolved.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
     if resolved.exact_friction:  # the callback reads the levels from the model
@@ -357,7 +362,8 @@ def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[st
     """Return model field -> its values from a physics step on, for every field that the scenario
     sets.
     """
-    plant, written = scenario.plant, {}
+    plant = scenario.plant
+    written = {}
     if scenario.mechanism == "equation":
         fields = plant.fields
     else:
@@ -385,7 +391,8 @@ def moving_joints(model: mujoco.MjModel) -> np.ndarray:
     """
     if free_joint(model) >= 0:
         return np.array([joint_ids(model)] * 2)
-    joints, driven = joint_ids(model), model.actuator_trnid[drive_ids(model), 0]
+    joints = joint_ids(model)
+    driven = model.actuator_trnid[drive_ids(model), 0]
     return np.array([joints, [*driven, *joints[len(driven) :]]])
 
 
@@ -395,9 +402,11 @@ def state_with(
     """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in
     `initial_pose`.
     """
-    qpos, qvel = initial_pose(model), np.zeros(model.nv)
+    qpos = initial_pose(model)
+    qvel = np.zeros(model.nv)
     if (free := free_joint(model)) >= 0:
-        first, dof = model.jnt_qposadr[free], model.jnt_dofadr[free]
+        first = model.jnt_qposadr[free]
+        dof = model.jnt_dofadr[free]
         qpos[first : first + 7], qvel[dof : dof + 6] = [*x[:3], *rotation.quaternion(*x[3:])], v
         return qpos, qvel
     qpos[model.jnt_qposadr[joints]], qvel[model.jnt_dofadr[joints]] = x, v
@@ -435,8 +444,10 @@ def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
     """Check that the path from the plant's default start, or from 0 if that is not free, crosses no
     obstacle.
     """
-    data, qpos = mujoco.MjData(model), initial_state(model, scenario)[0]
-    inside, beyond = _overlap(model, data, qpos), None
+    data = mujoco.MjData(model)
+    qpos = initial_state(model, scenario)[0]
+    inside = _overlap(model, data, qpos)
+    beyond = None
     moves_around = (
         scenario.plant.tip
     )  # an arm: the straight line in its joints may cross what the arm goes around

@@ -26,9 +26,12 @@ JITTER, MISSED = (
 PAUSE = 1 << 36  # stream that decides when the controller has its first pause
 REFILL = 1 << 35  # stream that decides when the generators of stepper motors look at their queues
 
-_M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
-_W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)
-_SHIFT, _ONE = np.uint64(11), np.uint64(1)
+_M0 = np.uint64(0xD2E7470EE14C6C93)
+_M1 = np.uint64(0xCA5A826395121157)
+_W0 = np.uint64(0x9E3779B97F4A7C15)
+_W1 = np.uint64(0xBB67AE8584CAA73B)
+_SHIFT = np.uint64(11)
+_ONE = np.uint64(1)
 
 
 @intrinsic
@@ -47,8 +50,12 @@ def _mulhi(typingctx, a, b):
 @njit(error_model="numpy")
 def block(seed, channel, stream, k):
     """Return the four uint64 words of block k of a stream. All arguments are whole numbers >= 0."""
-    c0, c1, c2, c3 = np.uint64(k), np.uint64(stream), np.uint64(0), np.uint64(0)
-    key0, key1 = np.uint64(seed), np.uint64(channel)
+    c0 = np.uint64(k)
+    c1 = np.uint64(stream)
+    c2 = np.uint64(0)
+    c3 = np.uint64(0)
+    key0 = np.uint64(seed)
+    key1 = np.uint64(channel)
     for _ in range(10):
         c0, c1, c2, c3 = (
             _mulhi(_M1, c2) ^ c1 ^ key0,

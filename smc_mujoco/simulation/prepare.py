@@ -128,10 +128,8 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
     about = reason.partition(" does not compile: ")[0]
     of = next((part for part in components if about == f"{part.kind} {part.name!r}"), None)
     if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
-        count, wanted = (
-            mistake[1],
-            {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity"),
-        )
+        count = mistake[1]
+        wanted = {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
         raise BrokenLawError(
             f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}"
         )
@@ -198,11 +196,9 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
 
     The log, (K + 1, n) LOG, is written at samples. It and `prepared` must outlive the run.
     """
-    s, mechanism, buffer = (
-        prepared.scenario.resolved,
-        prepared.mechanism,
-        Functions(prepared.scenario.resolved, python),
-    )
+    s = prepared.scenario.resolved
+    mechanism = prepared.mechanism
+    buffer = Functions(prepared.scenario.resolved, python)
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
     values = (
@@ -253,7 +249,9 @@ class Functions(state.Buffer):
 
         super().__init__()
         self.wrap = python_functions
-        self.s, self.all_python, self.python = s, python, list[Any]()
+        self.s = s
+        self.all_python = python
+        self.python = list[Any]()
 
     def _found(self, compiler: Any, thing: Any, otherwise: Any, *arguments: Any) -> Any:
         with contextlib.suppress(NotCompilable):
@@ -288,7 +286,8 @@ def _function(
 
     Its parameters, and its memory in each channel, go into the buffer.
     """
-    parameters, first = buffer.put(values), buffer.reserve(memory * channels)
+    parameters = buffer.put(values)
+    first = buffer.reserve(memory * channels)
     return {
         "address": compiled.address,
         "parameters": parameters,
@@ -302,10 +301,8 @@ def _tables(prepared: Prepared, buffer: "Functions") -> dict[str, list[dict[str,
     records.
     """
     s = prepared.scenario.resolved
-    n, memory = (
-        s.plant.n,
-        {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory},
-    )
+    n = s.plant.n
+    memory = {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
     each = range(n if s.law.joint else 1)  # numbers of a gain
     laws = []
     for law in buffer.laws():
@@ -353,7 +350,8 @@ def _signal(signal: Signal, buffer: "Functions", channels: int = 1) -> dict[str,
 
 def _settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, sensor and drives."""
-    sensor, drives = s.sensor or IDEAL_SENSOR, s.drive_step
+    sensor = s.sensor or IDEAL_SENSOR
+    drives = s.drive_step
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
         "steps": s.steps,
@@ -387,7 +385,8 @@ def _settings(s: Resolved) -> dict[str, Any]:
 
 def _arrays(s: Resolved, model: mujoco.MjModel, buffer: "Functions") -> dict[str, Any]:
     """Return the arrays of a record in which the callback keeps measurements, commands and states."""
-    n, width = s.plant.n, s.plant.n if s.law.joint else 1
+    n = s.plant.n
+    width = s.plant.n if s.law.joint else 1
     late = not s.clock.regular  # a late command may take effect after the next sample began
     slots = s.delay_steps // s.steps + 1 + late
     states = np.zeros(n, state.CHANNEL_STATE)  # at the start of a run
@@ -480,7 +479,8 @@ def _frictions(prepared: Prepared, buffer: "Functions") -> list[dict[str, int]]:
     """
     if (friction := prepared.scenario.formula_friction) is None:
         return []
-    compiled, shared = cfunctions.compile_friction(friction), prepared.mechanism
+    compiled = cfunctions.compile_friction(friction)
+    shared = prepared.mechanism
     inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
     numbers = []
     for i, a in enumerate(inertia):

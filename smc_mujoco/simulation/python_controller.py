@@ -45,7 +45,8 @@ class Controller:
     """
 
     def __init__(self, scenario: Scenario):
-        self.scenario, n = scenario.resolved, scenario.plant.n
+        self.scenario = scenario.resolved
+        n = scenario.plant.n
         if scenario.plant.pose:
             raise ScenarioError(
                 f"{scenario.plant.name} is a free body, which only smc.run moves: give it to smc.run"
@@ -54,10 +55,8 @@ class Controller:
             PythonComponent(c, n) for c in (self.scenario.law, self.scenario.velocity)
         )
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
-        self.limits, self.scale = (
-            np.array(scenario.limits),
-            math.prod(part.scale for part in scenario.actuator),
-        )
+        self.limits = np.array(scenario.limits)
+        self.scale = math.prod(part.scale for part in scenario.actuator)
         self.values = Values(
             **dict(zip(scenario.plant.parameters, known_values(self.scenario), strict=True))
         )
@@ -101,7 +100,8 @@ class Controller:
         time t, s.
         """
         x, v = np.array(x, float), np.array(v, float)
-        j, sensor = k, self.scenario.sensor
+        j = k
+        sensor = self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((t - sensor.delay) / sensor.period + 1e-6))
         errors = []
@@ -118,7 +118,9 @@ class Controller:
         """Return reading j of channel i: true position x and velocity v with noise, bias, rounding
         and loss.
         """
-        sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.seed
+        sigma = self.scenario.noise
+        sensor = self.scenario.sensor
+        seed = self.scenario.seed
         if sigma.position or sigma.velocity:
             z = normals(seed, i, philox.MEASUREMENT, j)
             x, v = x + sigma.position * z[0], v + sigma.velocity * z[1]
@@ -136,7 +138,9 @@ class Controller:
         """Return saturated commands and sliding variables, (n,) each, for measured x and v at time
         t, s.
         """
-        scenario, n, driven = self.scenario, len(x), len(self.limits)
+        scenario = self.scenario
+        n = len(x)
+        driven = len(self.limits)
         if scenario.feedforward is None:
             feedforward = 0.0
         else:
@@ -146,7 +150,9 @@ class Controller:
         for signal in references(scenario):
             values.append(evaluate(signal, t))
         motion = np.array([values[i % len(values)] for i in range(n)]).T.copy()
-        self.r, u, s = np.where(np.arange(n) < driven, motion[0], 0.0), np.zeros(n), np.zeros(n)
+        self.r = np.where(np.arange(n) < driven, motion[0], 0.0)
+        u = np.zeros(n)
+        s = np.zeros(n)
         if scenario.law.joint:
             u, s = self.law.call_joint(self.joint_measurement(x, v, t, motion))
             return np.array(
@@ -254,7 +260,8 @@ class PythonComponent:
     """
 
     def __init__(self, c: Component, n: int, memory: np.ndarray | None = None):
-        self.name, self.returns = f"{c.kind} {c.name!r}", RETURN_VALUES[c.kind]
+        self.name = f"{c.kind} {c.name!r}"
+        self.returns = RETURN_VALUES[c.kind]
         if memory is None:
             self.memory = np.zeros((n, c.memory))
         else:
@@ -314,11 +321,14 @@ class NominalDynamics:
     """
 
     def __init__(self, scenario: Scenario, x: np.ndarray, v: np.ndarray):
-        self.scenario, self.x, self.v = scenario, x, v
+        self.scenario = scenario
+        self.x = x
+        self.v = v
 
     def coriolis(self, w: np.ndarray) -> np.ndarray:
         """Return C(x, v) w per unit of u, (n,)."""
-        plant, nominal = self.scenario.plant, self.nominal
+        plant = self.scenario.plant
+        nominal = self.nominal
         if nominal is None:
             return np.zeros(len(self.x))
         return (
@@ -328,7 +338,8 @@ class NominalDynamics:
 
     def jacobian(self) -> np.ndarray:
         """Return the tip's Jacobian, (3, n)."""
-        plant, nominal = self.scenario.plant, self.nominal
+        plant = self.scenario.plant
+        nominal = self.nominal
         if nominal is None or not plant.tip:
             raise ValueError(
                 "there is no tip, or the law has no model: give the plant a tip, and the law the model"

@@ -75,7 +75,8 @@ def of_component(c: Component, n: int, s: Any) -> PythonFunction:
             )
 
         return PythonFunction(joint)
-    record, function = Reading if c.kind == "estimator" else Measurement, PythonComponent(c, 1)
+    record = Reading if c.kind == "estimator" else Measurement
+    function = PythonComponent(c, 1)
 
     def one(y, m):
         function.memory = memories.at(m, (1, c.memory))

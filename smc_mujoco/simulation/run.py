@@ -111,7 +111,8 @@ def run(
             f"cannot run {scenarios!r}: give smc.Scenario(plant={scenarios!r}, law='pid')"
         )
     prepared = list(map(prepare, [scenarios] if isinstance(scenarios, Scenario) else scenarios))
-    work, count = sum(item.scenario.work for item in prepared), len(prepared)
+    work = sum(item.scenario.work for item in prepared)
+    count = len(prepared)
     with bar(f"{count} run{'s' * (count != 1)}", work, shown=progress) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
     if isinstance(scenarios, Scenario):
@@ -151,7 +152,8 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
     except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo raises any of the three
         if not (isinstance(error, MemoryError) or "allocate memory" in str(error)):
             raise
-        count, needed = len(prepared), sum(item.bytes for item in prepared) / 2**20
+        count = len(prepared)
+        needed = sum(item.bytes for item in prepared) / 2**20
         raise ScenarioError(
             f"no memory for {count} run{'s' * (count > 1)} at once, about {needed:.0f} MiB beside the traces kept so "
             "far: give a shorter duration, a longer control period or fewer channels, or take traces from smc.stream"
@@ -177,7 +179,8 @@ def _batches(
         needed = prepared.bytes
         if len(batch) >= threads and size + needed > BATCH_BYTES:
             yield batch
-            batch, size = [], 0
+            batch = []
+            size = 0
         batch.append((index, prepared))
         size += needed
     if batch:
@@ -237,10 +240,13 @@ class ScenarioBatch:
         constraints: bool = True,
         python: bool = False,
     ):
-        self.prepared, self.python = prepared, python
+        self.prepared = prepared
+        self.python = python
         self.scenarios = scenarios = [item.scenario.resolved for item in prepared]
-        first, count = scenarios[0], len(scenarios)
-        self.base, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
+        first = scenarios[0]
+        count = len(scenarios)
+        self.base = prepared[0].mechanism.model
+        self.model = copy.copy(prepared[0].mechanism.model)
         if not (constraints and self.may_have_constraints()):
             self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
         set_fields = models.put_values(self.model, self.base, first, 0)
@@ -355,8 +361,10 @@ class ScenarioBatch:
 
     def put_initial_states(self) -> None:
         """Put all simulations at t = 0, with the past readings of delayed sensors."""
-        delayed, arrays = bool(self.model.nhistory), self.started
-        model, data = copy.copy(self.model) if delayed else self.model, self.scratch
+        delayed = bool(self.model.nhistory)
+        arrays = self.started
+        model = copy.copy(self.model) if delayed else self.model
+        data = self.scratch
         for i, scenario in enumerate(self.scenarios):
             if delayed:  # the periods of the readings differ between scenarios
                 models.put_values(model, self.base, scenario, 0)
@@ -414,13 +422,15 @@ class ScenarioBatch:
 
     def trace(self, i: int) -> Trace:
         """Return the Trace of simulation i."""
-        code, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
+        code = int(self.records["failure"][i])
+        step = int(self.records["failed_step"][i])
         if code == state.FINE:
             failure = None
         else:
             failure = self.failure(i, code)
         if failure is None and self.lost_contacts(i):
-            failure, step = LOST_CONTACTS, 0
+            failure = LOST_CONTACTS
+            step = 0
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
 
     def lost_contacts(self, i: int) -> bool:
@@ -461,7 +471,9 @@ def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     Compiled code keeps no text of an exception, so the law is called again in Python. Return None
     if that raises none.
     """
-    n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
+    n = s.plant.n
+    i = int(record["seen"]["i"])
+    width = int(record["width"])
     memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
     function = PythonComponent(s.law, n, memory)
     try:

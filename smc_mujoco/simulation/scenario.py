@@ -782,7 +782,8 @@ def check_channels(s: Resolved) -> None:
             )
     if not s.law.joint:
         return
-    plant, joints = s.plant, getattr(s.law.function, "joints", s.plant.n)
+    plant = s.plant
+    joints = getattr(s.law.function, "joints", s.plant.n)
     sized = f"write it for {plant.n}, with SMC_JOINTS, or --joints of export-c"
     for refused, why in (
         (
@@ -935,7 +936,8 @@ def _made_up_bound(s: Scenario) -> str:
     """
     if s.u_max is not None or not s.plant.own or not s.force_command or s.law.name == "none":
         return ""
-    driven, u_max = range(s.plant.driven), s.resolved.u_max
+    driven = range(s.plant.driven)
+    u_max = s.resolved.u_max
     if isinstance(u_max, tuple):
         taken = u_max
     else:
@@ -951,7 +953,8 @@ def _made_up_bound(s: Scenario) -> str:
     else:
         joints = f"joint {last}"
     bounds = list(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
-    verb, number = "are" if len(bounds) > 1 else "is", f"{taken[free[0]]:g}"
+    verb = "are" if len(bounds) > 1 else "is"
+    number = f"{taken[free[0]]:g}"
     fact = f"nothing bounds the force on {joints} of {s.plant.name}, so that |u| <= {' and '.join(bounds)} {verb} taken"
     if len(driven) == 1:
         example = f"u_max={number}"

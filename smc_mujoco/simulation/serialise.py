@@ -136,7 +136,8 @@ def _restored(data: Any) -> Any:
 
 def _restore_plant(data: dict) -> Plant:
     plant = dict(data)
-    name, module = plant.pop("name"), plant.pop("module")
+    name = plant.pop("name")
+    module = plant.pop("module")
     if mjcf := plant.pop("mjcf", None):
         from smc_mujoco.mechanisms.custom.plant_from import restored
 

@@ -157,7 +157,8 @@ class MinimumJerk(Signal):
     @staticmethod
     def value(t, p):
         a = min(max((t - p.time) / p.duration, 0.0), 1.0)
-        b, T = 1.0 - a, p.duration
+        b = 1.0 - a
+        T = p.duration
         r = p.amplitude * a * a * a * (10.0 - a * (15.0 - 6.0 * a))
         return (
             r,
@@ -335,7 +336,8 @@ class Dryden(Signal):
     def value(t, p, memory, seed, channel, stream):
         feet = p.height / FOOT
         b = 0.177 + 0.000823 * feet
-        size, length = 0.1 * p.w20, p.height
+        size = 0.1 * p.w20
+        length = p.height
         if channel < 2.0:
             size, length = size / b**0.4, length / b**1.2
         return _dryden(t, size, length / p.speed, p.dt, memory, seed, channel, stream), 0.0, 0.0
@@ -347,7 +349,8 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
     second.
     """
     root = math.sqrt(3.0)
-    knot, x = t / dt, dt / T
+    knot = t / dt
+    x = dt / T
     left = math.exp(-x)
     if memory[0] == 0.0:  # the stationary state
         z = philox.normals(seed, channel, stream, 0)
@@ -370,7 +373,8 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
         second = 0.25 - left * left * (0.5 * x * x + 0.5 * x + 0.25)
         a = math.sqrt(first)
         c = both / a
-        p, q = left * memory[1], left * (x * memory[1] + memory[2])
+        p = left * memory[1]
+        q = left * (x * memory[1] + memory[2])
         memory[1] = p + sigma * a * z[0]
         memory[2] = q + sigma * (c * z[0] + math.sqrt(max(0.0, second - c * c)) * z[1])
         memory[4] = root * memory[1] + (1.0 - root) * memory[2]
@@ -582,7 +586,8 @@ def after_pauses(k, steps, length, samples, phase):
     A period has `steps` physics steps, a pause `length`; one follows every `samples` samples, the
     first `phase` fewer.
     """
-    cycle, end = samples * steps + length, (k + 1 + phase) * steps - 1
+    cycle = samples * steps + length
+    end = (k + 1 + phase) * steps - 1
     within = end % cycle
     sample = within // steps
     if sample >= samples:

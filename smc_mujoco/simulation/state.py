@@ -26,10 +26,13 @@ from smc_mujoco.mechanisms.plant import SEEN
 #   surface: MEASUREMENT -> SLIDING; estimator: READING -> ESTIMATE; nominal model: SEEN -> MODEL
 # reference and disturbance: INSTANT -> MOTION; friction by a formula: FRICTION_INPUT ->
 # FRICTION_OUTPUT
-MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
+MEASUREMENT = floats(Measurement._fields)
+READING = floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream", "e", "de", "s"))
-SLIDING, ESTIMATE = floats(("s", "v_eq")), floats(("v", "a"))
-MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
+SLIDING = floats(("s", "v_eq"))
+ESTIMATE = floats(("v", "a"))
+MOTION = floats(("value", "rate", "acceleration"))
+MODEL = floats(("f", "g"))
 FRICTION_INPUT, FRICTION_OUTPUT = (
     floats(("v", "motor", "load")),
     floats(("f", "low", "high")),
@@ -91,7 +94,9 @@ CHANNEL = np.dtype(
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
 RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
-DRIVE_STEP, PULSING, MOTOR = floats(DriveStep._fields), floats(Pulsing._fields), floats(GENERATOR)
+DRIVE_STEP = floats(DriveStep._fields)
+PULSING = floats(Pulsing._fields)
+MOTOR = floats(GENERATOR)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
 # and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])

@@ -31,7 +31,8 @@ MAX_KNOTS = 1_000_000  # of a path in space: minutes of computing
 @njit(error_model="numpy")
 def last_before(data, t, end, early):
     """Return the last i below `end` for which data[0, i] * early <= t; 0 if there is none."""
-    low, high = 0, end
+    low = 0
+    high = end
     while high - low > 1:
         middle = (low + high) // 2
         if t < data[0, middle] * early:
@@ -210,10 +211,14 @@ class Waypoints(TimeSeries):
         # = (t - t0) / T
         T = data[0, high] - data[0, low]
         a = (t - data[0, low]) / T
-        v0, v1 = data[2, low] * T, data[2, high] * T
-        a0, a1 = data[3, low] * T * T, data[3, high] * T * T
+        v0 = data[2, low] * T
+        v1 = data[2, high] * T
+        a0 = data[3, low] * T * T
+        a1 = data[3, high] * T * T
         # what is missing at the end, in position, velocity and acceleration, without c3, c4 and c5
-        dr_end, dv_end, da_end = data[1, high] - data[1, low] - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
+        dr_end = data[1, high] - data[1, low] - v0 - 0.5 * a0
+        dv_end = v1 - v0 - a0
+        da_end = a1 - a0
         c3 = 10.0 * dr_end - 4.0 * dv_end + 0.5 * da_end
         c4 = -15.0 * dr_end + 7.0 * dv_end - da_end
         c5 = 6.0 * dr_end - 3.0 * dv_end + 0.5 * da_end
@@ -314,7 +319,8 @@ def cartesian_path(
             f"points are {shown(points)}: give a position (x, y, z) in m for each of {len(times)} times"
         )
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
-    first, last = path[0].times[0], path[0].times[-1]
+    first = path[0].times[0]
+    last = path[0].times[-1]
     steps = (last - first) / KNOT_SPACING
     if steps > MAX_KNOTS:
         raise ScenarioError(
@@ -329,8 +335,10 @@ def cartesian_path(
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
     if site is not None:
-        kind, name = ("site", site)
+        kind = "site"
+        name = site
     else:
-        kind, name = ("body", body)
+        kind = "body"
+        name = body
     joints = solve(plant, kind, str(name), positions, start)
     return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]

@@ -382,7 +382,9 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     if not finite.all():
         k = int(np.argmin(finite.all(axis=0)))
         name = names[int(np.argmin(finite[:, k]))]
-        end, failed_step, failure = k, k * scenario.steps, f"{name} became NaN or inf"
+        end = k
+        failed_step = k * scenario.steps
+        failure = f"{name} became NaN or inf"
     if failure is not None:
         for values in arrays.values():
             values[end:] = np.nan

@@ -151,7 +151,8 @@ class Advice(Tables):
     @property
     def tied(self) -> list[str]:
         """The laws that are level with the advised law in every block, see `Comparison.level`."""
-        laws, first = self.comparison.laws, self.compared[0]
+        laws = self.comparison.laws
+        first = self.compared[0]
         return [
             name
             for name in self.compared[1:]
@@ -180,10 +181,8 @@ class Advice(Tables):
         rows = []
         for choice in self.choices[:MAX_ROWS]:
             law = Cell(choice.law.name, colour=law_colour(choice.law.name))
-            place, settles = (
-                f"{choice.rank.place:g}" if choice.fit else "–",
-                f"{100 * choice.settles:.0f} %",
-            )
+            place = f"{choice.rank.place:g}" if choice.fit else "–"
+            settles = f"{100 * choice.settles:.0f} %"
             rows.append([law, place, settles, *(self._cell(choice, need) for need in self.needs)])
         notes = [
             line for note in (self.key, *failures(self.table), *self.answer) for line in (note, "")
@@ -224,10 +223,8 @@ class Advice(Tables):
     @property
     def key(self) -> str:
         """The meaning of the table's signs."""
-        shown, more = (
-            self.choices[:MAX_ROWS],
-            [choice.law.name for choice in self.choices[MAX_ROWS:]],
-        )
+        shown = self.choices[:MAX_ROWS]
+        more = [choice.law.name for choice in self.choices[MAX_ROWS:]]
         over = f" over {len(self.conditions)} conditions" * (len(self.conditions) > 1)
         medians = f" Medians{over}, with {100 * LEVEL:g} % intervals over {self.samples}." * (
             not self._untested
@@ -257,7 +254,8 @@ class Advice(Tables):
         """The largest sample of two laws in words: "24 runs", or "3 sets of gains" where runs share
         them.
         """
-        samples, sets = self.comparison.samples, self.comparison.sets.max(axis=1)
+        samples = self.comparison.samples
+        sets = self.comparison.sets.max(axis=1)
         block, a, b = np.unravel_index(int(samples.argmax()), samples.shape)
         if len(sets) > 1:
             count = int(samples[block, a, b])
@@ -272,7 +270,8 @@ class Advice(Tables):
         """The laws whose runs share several sets of gains, with their number, such as "classical
         3".
         """
-        seeds, counts = self.comparison.seeds.max(), self.comparison.sets.max(axis=1).tolist()
+        seeds = self.comparison.seeds.max()
+        counts = self.comparison.sets.max(axis=1).tolist()
         named = zip(self.comparison.laws, counts, strict=True)
         return [f"{law} {count}" for law, count in named if 1 < count < seeds]
 
@@ -331,7 +330,8 @@ class Advice(Tables):
         return f"Use {first.law} ({first.gains})."
 
     def _because(self) -> str:
-        first, count = self.choices[0], len(self.compared)
+        first = self.choices[0]
+        count = len(self.compared)
         if not first.reliable or not first.fit:
             return ""
         if self.all_level:
@@ -367,7 +367,8 @@ class Advice(Tables):
 
     def _standing(self, choice: Choice, need: str) -> str:
         """Return the median of a law on a need, and who is better."""
-        name, value = choice.law.name, f"{NEEDS[need].label} {self._number(choice, need)}"
+        name = choice.law.name
+        value = f"{NEEDS[need].label} {self._number(choice, need)}"
         rivals = {}
         for rival in self.compared:
             rivals[rival] = [block for block in self.wins(rival, name) if block[0] == need]
@@ -403,10 +404,8 @@ class Advice(Tables):
         named = f"Second choice: {second.law} ({second.gains})"
         if not second.fit:
             return f"{named}; it settles too seldom to be advised."
-        ahead, behind = (
-            self.wins(second.law.name, first.law.name),
-            self.wins(first.law.name, second.law.name),
-        )
+        ahead = self.wins(second.law.name, first.law.name)
+        behind = self.wins(first.law.name, second.law.name)
         parts = [f"better {self._on(ahead)}"] * bool(ahead) + [f"worse {self._on(behind)}"] * bool(
             behind
         )
@@ -441,7 +440,8 @@ class Advice(Tables):
         """Return how the first law compares with a rival on each need, in the condition that is
         worst for the first.
         """
-        first, parts = self.compared[0], []
+        first = self.compared[0]
+        parts = []
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         for need in self.needs:
             blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
@@ -481,7 +481,8 @@ class Advice(Tables):
 
     def _number(self, choice: Choice, need: str) -> str:
         """Return a median with its unit."""
-        metric, median = NEEDS[need], choice.medians[need].median
+        metric = NEEDS[need]
+        median = choice.medians[need].median
         if math.isfinite(median):
             unit = f" {metric.unit_for(self.plant.unit, self.effort)}"
         else:

@@ -62,7 +62,8 @@ class Extent(NamedTuple):
     parts: int  # divisor of an adversary's budget
 
 
-FULL, QUICK = Extent(5.0, search.SEARCHES, search.BUDGET, 1), Extent(3.0, 3, 16, 3)
+FULL = Extent(5.0, search.SEARCHES, search.BUDGET, 1)
+QUICK = Extent(3.0, 3, 16, 3)
 
 
 @constrained
@@ -106,7 +107,8 @@ def which(
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
-    extent, machine = QUICK if quick else FULL, as_plant(plant)
+    extent = QUICK if quick else FULL
+    machine = as_plant(plant)
     compared, properties = _needs(needs, machine)
     if duration is None:
         length = extent.duration
@@ -114,7 +116,8 @@ def which(
         length = duration
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
-    effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
+    effort = _effort(trial)
+    wanted = [name for name in properties if name != NO_VELOCITY]
     candidates = _candidates(trial, _suited(machine, wanted, laws), extent, defaults)
     table = trial.run({machine.name: [*candidates.values()]}, seeds)
     if ROBUST in compared:
@@ -189,7 +192,8 @@ def _effort(trial: Trial) -> str:
     """Return the unit of u, or "" where conditions differ; refuse conditions in which nothing
     moves.
     """
-    plant, efforts = trial.plants[0], set()
+    plant = trial.plants[0]
+    efforts = set()
     for condition in trial.conditions:
         scenario = case(plant, "none", condition, trial.duration, starts=trial.starts)
         check_moving([scenario])
@@ -369,7 +373,8 @@ def _restraint(
     table: Table, group: Group, ran: Sequence, plant: Plant, relevant: float
 ) -> dict[str, tuple[float, ...]]:
     """Return law -> its mean rank on each of the metrics of `ties`."""
-    mean_ranks, laws = [], group.laws
+    mean_ranks = []
+    laws = group.laws
     for metric in ties(plant):
         scores = group.scores(paired_runs.by_row(table, metric.name))
         if scores.blocks:
@@ -386,7 +391,8 @@ def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -
     ahead = np.any(comparison.better, axis=0)
     dominates = np.logical_and(ahead, ~ahead.T)
     place = {law: k for k, law in enumerate(comparison.laws)}
-    left, ordered = ranks(comparison), []
+    left = ranks(comparison)
+    ordered = []
     while left:
         at = [place[rank.law] for rank in left]
         undominated = [rank for rank in left if not dominates[at, place[rank.law]].any()]

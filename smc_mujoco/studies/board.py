@@ -284,9 +284,11 @@ class Board(Tables):
             )
         if failing:
             if len(failing) == 1:
-                have, are = ("has", "it is")
+                have = "has"
+                are = "it is"
             else:
-                have, are = ("have", "they are")
+                have = "have"
+                are = "they are"
             doubts.append(
                 f"{joined(failing)} {have} runs that {self._fail}, too few to tell whether {are} beaten"
             )
@@ -516,7 +518,8 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
-        plants, made = [its[0].group.get("plant", "") for its in groups.values()], list[Tabular]()
+        plants = [its[0].group.get("plant", "") for its in groups.values()]
+        made = list[Tabular]()
         for i, (name, its) in enumerate(groups.items()):
             if plants[i] not in plants[:i]:
                 times = self.times.get(plants[i], {})
@@ -629,7 +632,8 @@ def _cell(board: Board, entry: Entry) -> Cell:
     for a winner.
     """
     median = size(entry.interval.median, board.metric)
-    visible, change = board.visible(entry.law), board.step_change(entry.law)
+    visible = board.visible(entry.law)
+    change = board.step_change(entry.law)
     blind = board.too_few or visible >= MAX_VISIBLE
     best = entry.rank.best and median != "" and not blind and not board.barred
     if visible < MAX_VISIBLE:

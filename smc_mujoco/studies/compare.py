@@ -165,7 +165,8 @@ class Compared(Tables):
         """Yield the rows of `to_pandas`."""
         for board in self.leaderboard:
             plant = board.group.get("plant", "")
-            worst, times = self.worst.get(plant, {}), self.times.get(plant, {})
+            worst = self.worst.get(plant, {})
+            times = self.times.get(plant, {})
             for entry in board.entries:
                 yield {
                     **{"plant": "", "condition": ""} | dict(board.group),

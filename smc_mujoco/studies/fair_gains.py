@@ -66,7 +66,8 @@ class Candidate(NamedTuple):
         """
         from smc_mujoco.analysis.tuning.evaluator import objectives
 
-        instances, again = range(count), range(0, count, REPEATED_SEEDS)
+        instances = range(count)
+        again = range(0, count, REPEATED_SEEDS)
         options = {"threads": threads}
         values = objectives(plant, [self(i) for i in instances], goal, instances, **options)
         halves = np.full(count, math.nan)
@@ -250,7 +251,8 @@ class Trial(NamedTuple):
         """Say which laws are tuned on which plants, by how many searches, and for about how long,
         on stderr.
         """
-        seconds, named = 0.0, dict[str, list[str]]()
+        seconds = 0.0
+        named = dict[str, list[str]]()
         for plant in self.plants if tune else ():
             known, starts = self._known(plant, laws[plant.name], gains)
             new = [
@@ -318,7 +320,8 @@ class Trial(NamedTuple):
         """
         from smc_mujoco.analysis.tuning import result, search
 
-        goal, default = self._goal(plant, starts), coerce.law(law)
+        goal = self._goal(plant, starts)
+        default = coerce.law(law)
         try:
             (first, *_) = goal.scenarios(plant, default)
             if isinstance(law, Template):
@@ -371,12 +374,14 @@ class Trial(NamedTuple):
         """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is
         left out.
         """
-        found, several = {}, [(plant, c) for plant in self.plants for c in candidates[plant.name]]
+        found = {}
+        several = [(plant, c) for plant in self.plants for c in candidates[plant.name]]
         with bar(
             "J on runs that no search has seen", len(several), self.progress, counted=True
         ) as shown:
             for plant in self.plants:
-                goal, its = self._goal(plant, self.starts), {}
+                goal = self._goal(plant, self.starts)
+                its = {}
                 for candidate in candidates[plant.name]:
                     with contextlib.suppress(ScenarioError):
                         its[candidate.law.name] = candidate.unseen(plant, goal, count, self.threads)

@@ -89,7 +89,8 @@ def leaderboard(
         find("metric", name, {known: unit for known, unit in UNITS.items() if known != OBJECTIVE})
     _check_worst(table, worst or {})
     boards = Boards()
-    boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
+    boards.worst = worst or {}
+    boards.failures = paired_runs.failures(table)
     by_row = {name: paired_runs.by_row(table, name) for name in dict.fromkeys(metrics)}
     groups = list(paired_runs.groups(table, by))
     if set(by) == set(paired_runs.GROUPS):
@@ -140,7 +141,8 @@ def objective_boards(
         )
 
     alone = [compared(plant, Limits(0.0, 0.0)) for plant in unseen]
-    limits, boards = corrected_limits(alone), []
+    limits = corrected_limits(alone)
+    boards = []
     for plant in unseen:
         comparison = compared(plant, limits)
         its = sources.get(plant, {})
@@ -301,7 +303,8 @@ def _lead(comparison: Comparison, at: int) -> Lead | None:
     """
     if len(comparison.laws) < 2 or comparison.shares:
         return None
-    lacking, winner = comparison.without_value[:, at], comparison.winners[at]
+    lacking = comparison.without_value[:, at]
+    winner = comparison.winners[at]
     order = sorted(
         range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at])
     )
@@ -359,7 +362,8 @@ def _entries(
     entries = []
     for rank in ranks(comparison):
         at = comparison.laws.index(rank.law)
-        values, samples = comparison.cells[at], linked(*sets[rank.law])
+        values = comparison.cells[at]
+        samples = linked(*sets[rank.law])
         if comparison.shares:
             if samples is None:
                 n = values.shape[1]
@@ -368,7 +372,8 @@ def _entries(
             interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n)
         else:
             interval = median_of(values, samples)
-        failed, runs = int(comparison.without_value[at].sum()), int((~np.isnan(values)).sum())
+        failed = int(comparison.without_value[at].sum())
+        runs = int((~np.isnan(values)).sum())
         its = sources.get(rank.law, ())
         known = {"law": rank.law, "sources": its}
         entries.append(Entry(interval=interval, rank=rank, failed=failed, runs=runs, **known))

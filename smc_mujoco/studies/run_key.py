@@ -108,10 +108,8 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     """
     if scenario.condition:
         return scenario.condition
-    text, nominal = (
-        _condition_text(data or description(scenario)),
-        _nominal(scenario.plant, scenario.duration),
-    )
+    text = _condition_text(data or description(scenario))
+    nominal = _nominal(scenario.plant, scenario.duration)
     if text == nominal:
         return "nominal"
     changed = [

@@ -175,7 +175,8 @@ class Outcome:
         It is the last one before `holds` is first false: "a and b 20 ms, c 10 ms, d none". The
         sentence also names later conditions in which it is true again.
         """
-        where, words = self._where(holds), {}
+        where = self._where(holds)
+        words = {}
         for label, names in where.items():
             tried = [name for name, runs in self if label in runs]
             good = next((i for i, name in enumerate(tried) if name not in names), len(tried))
@@ -194,7 +195,8 @@ class Outcome:
         A change below the least relevant difference is called that: "b no relevant change (0.535
         s)".
         """
-        value, parts = _function(measure), []
+        value = _function(measure)
+        parts = []
         before, after = (
             lookup("condition of the scene", name, self.traces) for name in (one, other)
         )

@@ -121,7 +121,8 @@ class Sensitivity(Tables, Explained):
 
     @property
     def _failures(self) -> list[str]:
-        count, n = int(self.failed.sum()), len(self.failed)
+        count = int(self.failed.sum())
+        n = len(self.failed)
         if not count:
             return [f"None of {n} runs fails (at most {100 * share_interval(0.0, n).high:.2g} %)."]
         if count == n:
@@ -138,7 +139,8 @@ class Sensitivity(Tables, Explained):
     def _improvement(self) -> list[str]:
         if not (its := self.improvement):
             return []
-        now, before = self.text(its.median), self.text(its.before)
+        now = self.text(its.median)
+        before = self.text(its.before)
         words = _words(self.space, [its.half]).replace("<", "to below").replace(">", "to above")
         return [f"Narrow {words} first: the median {self.label} is then {now}, not {before}."]
 
@@ -259,7 +261,8 @@ def sensitivity(
             f"points is {points}: give a power of 2, such as {1 << points.bit_length() - 1}"
         )
     design = designs(points, k, seed)
-    scores, held = np.empty(len(design)), np.empty(len(design), bool)
+    scores = np.empty(len(design))
+    held = np.empty(len(design), bool)
     broken = ""
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, len(design) * scenario.work, shown=progress) as drawn:
@@ -276,7 +279,9 @@ def sensitivity(
         raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
     scores[~finite] = scores[finite].max()
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
-    shares, values, failed = design[halves], scores[halves], ~held[halves]
+    shares = design[halves]
+    values = scores[halves]
+    failed = ~held[halves]
     axes = indices(space, scores, points, shares, values, seed)
     found = tuple(regions(space, shares, failed))
     return Sensitivity(
@@ -304,7 +309,9 @@ def default_over(scenario: Scenario) -> Uncertainty:
     20 control periods, noise up to 1 mrad or mm at each sample, encoders of 2^11 to 2^15 counts,
     u_max x .5 to 1, control period x 1 to 4. A free body has no friction and no encoder.
     """
-    plant, u, flies = scenario.plant, strength(scenario), bool(scenario.plant.pose)
+    plant = scenario.plant
+    u = strength(scenario)
+    flies = bool(scenario.plant.pose)
     return Uncertainty(
         mass=MASS if plant.mass and not plant.uncertain else (1.0, 1.0),
         parameters=plant.uncertain,

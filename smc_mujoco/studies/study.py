@@ -61,7 +61,8 @@ class Store:
     """The folder of a study. Parts are written by one thread at a time."""
 
     def __init__(self, out: Path):
-        self.parts, self.results = out / "parts", out / "results.parquet"
+        self.parts = out / "parts"
+        self.results = out / "results.parquet"
         self.schema = tables.schema({"scores": fingerprint.of(tuple(m.formula for m in metrics()))})
         self.where: dict[
             str, tuple[Path, int]
@@ -221,7 +222,8 @@ def study(
     """
     where = executors.as_executor(executor)
     threads = cores(threads)
-    store, folder = Store(Path(out)), Path(out) / "traces"
+    store = Store(Path(out))
+    folder = Path(out) / "traces"
     plants: run_key.Hashes = {}
     by_key = _by_key(_checked(scenarios), store, resume, plants)
     if half_steps:
@@ -317,10 +319,8 @@ def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:
     """Check and yield scenarios one by one: a generator with a wrong item may be endless."""
-    empty, several = (
-        True,
-        isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping),
-    )
+    empty = True
+    several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
     for scenario in scenarios if several else ():
         if not isinstance(scenario, Scenario):
             raise ScenarioError(
@@ -346,7 +346,8 @@ def worst_rows(table: Table) -> list[int]:
     """Return row indices of the worst runs by plant and condition: failed, unsettled, then by bound
     or overshoot.
     """
-    failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
+    failed = table.column("failure") != np.array(None)
+    bounds = table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
     unsettled = table.column("settling_time") == np.inf
     badness = list(zip(failed, unsettled & ~failed, np.where(failed, 0.0, ends), strict=True))

@@ -132,7 +132,8 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
         else:
             rows = file.read()
         metadata = dict(file.metadata.metadata or {})
-    written, digest = metadata.pop(DIGEST, None), hashlib.sha256()
+    written = metadata.pop(DIGEST, None)
+    digest = hashlib.sha256()
     for group in groups:
         digest.update(content(group))
     if written != digest.hexdigest().encode() and (sealed or written is not None):

@@ -70,9 +70,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     from smc_mujoco.common.errors import ScenarioError
 
     try:
-        names_of, wrong = _cases(marker.args, marker.kwargs, metafunc.fixturenames), ""
+        names_of = _cases(marker.args, marker.kwargs, metafunc.fixturenames)
+        wrong = ""
     except ScenarioError as error:
-        names_of, wrong = {}, str(error)
+        names_of = {}
+        wrong = str(error)
     if wrong:  # raised outside of the handler, so that pytest does not show the frames of the error
         pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
     for argument, names in names_of.items():
@@ -100,7 +102,8 @@ def _cases(
         find("argument of marker smc", name, defaults)
     used: dict[str, list[str]] = {}
     for plural, default in defaults.items():
-        argument, value = plural.removesuffix("s"), named.get(plural, default)
+        argument = plural.removesuffix("s")
+        value = named.get(plural, default)
         if isinstance(value, list | tuple):
             several = value
         else:
@@ -157,8 +160,10 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     from smc_mujoco.testing import golden as files
     from smc_mujoco.testing.limits import without_frames
 
-    file, update = request.path.with_suffix(".golden.json"), request.config.getoption("smc_update")
-    test, number = request.node.nodeid.partition("::")[2], itertools.count(1)
+    file = request.path.with_suffix(".golden.json")
+    update = request.config.getoption("smc_update")
+    test = request.node.nodeid.partition("::")[2]
+    number = itertools.count(1)
 
     @without_frames
     def compare(response: StepResponse, **tolerances: float) -> None:
@@ -192,7 +197,8 @@ def pytest_runtest_makereport(
     if ledger and report.failed and call.when != "teardown" and (responses := _used(item, ledger)):
         from smc_mujoco.testing.response import report_of
 
-        config, out = item.config, item.config.getoption("smc_out")
+        config = item.config
+        out = item.config.getoption("smc_out")
         if out:
             folder = config.invocation_params.dir / out
         else:

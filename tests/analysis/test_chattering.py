@@ -49,7 +49,8 @@ def measured(trace, part=0.4):
     the last part.
     """
     first = int(len(trace.t) * (1 - part))
-    s, t = trace.s[first:, 0], trace.t[first:]
+    s = trace.s[first:, 0]
+    t = trace.t[first:]
     z = s - s.mean()
     up = np.flatnonzero((z[:-1] < 0) & (z[1:] >= 0))
     at = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
@@ -59,7 +60,9 @@ def measured(trace, part=0.4):
 
 # describing functions
 
-A, OMEGA, C = 0.03, 7.0, 2.5
+A = 0.03
+OMEGA = 7.0
+C = 2.5
 S, TURN = (
     A * abs(C + 1j * OMEGA),
     np.exp(1j * np.angle(C + 1j * OMEGA)),
@@ -123,7 +126,8 @@ def fitted(scenario, omega):
     """
     trace = smc.run(scenario)
     part = trace.t > 0.5 * scenario.duration
-    t, x = trace.t[part], trace.x[part, 0]
+    t = trace.t[part]
+    x = trace.x[part, 0]
     (real, imaginary, *_), *_ = np.linalg.lstsq(
         np.column_stack([np.cos(omega * t), np.sin(omega * t), np.ones_like(t), t]), x
     )
@@ -167,9 +171,9 @@ def weighted(y, gains, memory):
 
 @pytest.mark.parametrize("name", weighted.gains)
 def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_models(name):
-    omega, loop = (
-        20.0,
-        Loop(smc.Scenario(plant=smc.plant("furuta", b=1e-3, bq=1e-3), law=weighted(**{name: 1.0}))),
+    omega = 20.0
+    loop = Loop(
+        smc.Scenario(plant=smc.plant("furuta", b=1e-3, bq=1e-3), law=weighted(**{name: 1.0}))
     )
     answer = loop._answer(omega) / loop._answer(omega)[loop.rows[0]]
     (x, q), (v, dq) = answer[loop.rows], answer[loop.nv + loop.rows]
@@ -191,7 +195,8 @@ def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omeg
         physics_step=1e-4,
         actuator=smc.Backlash(gap, rotor_inertia=0.01),
     )
-    loop, found = Loop(scenario), fitted(scenario, omega)
+    loop = Loop(scenario)
+    found = fitted(scenario, omega)
     assert loop.gap == pytest.approx(gap * 0.01 / 1.01, rel=1e-6)
     assert found / loop.response(omega) == pytest.approx(play(abs(found), loop.gap), abs=0.01)
 
@@ -223,7 +228,8 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
         sensor=smc.Encoder(counts),
         duration=5.0,
     )
-    cycle, trace = chattering(scenario), smc.run(scenario)
+    cycle = chattering(scenario)
+    trace = smc.run(scenario)
     part = trace.t > 4.0
     (said,) = (one for one in cycle.assumptions if "hides smaller cycles" in one)
     count = float(said.split()[said.split().index("by", 4) + 1])
@@ -238,18 +244,19 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
 @pytest.mark.parametrize("name", LAWS)
 def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(name):
     """Perez-Ventura & Fridman 2017: s' = u behind 1/(mu s + 1)^2."""
-    lags, found = (1e-3, 2e-2), []
+    lags = (1e-3, 2e-2)
+    found = []
     for mu in lags:
         scenario = lagging(LAWS[name], mu, duration=1.0 + 40 * mu)
         cycle = chattering(scenario)
         if name == "classical":
-            amplitude, omega = 2 * mu * 2.0 / math.pi, 1 / mu
+            amplitude = 2 * mu * 2.0 / math.pi
+            omega = 1 / mu
         else:
-            a, b = 2 * HALF * 1.5, 16 * 1.1 / math.pi
-            amplitude, omega = (
-                mu**2 * (a * a + b) ** 2 / (4 * a * a),
-                a / (mu * math.sqrt(a * a + b)),
-            )
+            a = 2 * HALF * 1.5
+            b = 16 * 1.1 / math.pi
+            amplitude = mu**2 * (a * a + b) ** 2 / (4 * a * a)
+            omega = a / (mu * math.sqrt(a * a + b))
         fine = chattering(
             lagging(LAWS[name], mu, control_period=mu / 100)
         )  # the formula knows no sampling
@@ -271,7 +278,8 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
     assert frequencies == pytest.approx(-1.0, rel=0.02)
 
 
-BEHIND_LAG, LATE = {"actuator": smc.Lag(0.01)}, {"input_delay": 0.01}
+BEHIND_LAG = {"actuator": smc.Lag(0.01)}
+LATE = {"input_delay": 0.01}
 SLOWLY = {"velocity": smc.estimator("filtered_difference", tau=0.01)}  # 1.5 times the amplitude
 
 
@@ -335,7 +343,8 @@ def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
 
 def test_a_relay_behind_a_motor_may_have_any_period_in_its_range():
     scenario = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.DCMotor(), duration=4.0)
-    cycle, score = chattering(scenario), smc.score(smc.run(scenario))
+    cycle = chattering(scenario)
+    score = smc.score(smc.run(scenario))
     assert cycle.frequency_range == pytest.approx((219.4, 500.0), rel=0.01)
     assert 230.0 < score["chattering_frequency"] < 400.0
     assert cycle.amplitude_range[0] < score["chattering_amplitude"] < cycle.amplitude_range[1]
@@ -414,7 +423,9 @@ class Formula:
     scenario = SimpleNamespace(control_period=1e-3)
 
     def __init__(self, law, size, turn):
-        self.law, self.size, self.turn = law, size, turn
+        self.law = law
+        self.size = size
+        self.turn = turn
 
     def gain(self, amplitude, omega, max_samples=1000):
         return complex(-self.law(amplitude))
@@ -456,7 +467,8 @@ def relay_with_a_dead_zone(a):
 )
 def test_the_cycles_of_a_closed_form_are_stable_where_its_gain_falls(law, wanted):
     """The largest N of the relay with a dead zone is 63.7, at 0.0141; N = 62 at 0.0126 and 0.0162."""
-    turn, places = 40.0, np.geomspace(1e-3, 3.0, 200_001)
+    turn = 40.0
+    places = np.geomspace(1e-3, 3.0, 200_001)
     loop = Formula(law, 2.0 * turn / wanted, turn)
     signs = np.diff(np.sign([law(a) - wanted for a in places]))
     for found, sign in zip(cycles(loop), (-1, 1), strict=True):
@@ -512,7 +524,8 @@ def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too
     """A number with an error of h c and so with c (h - h / 2) = c h / 2 between the runs: the error
     itself is told.
     """
-    exact, error = 2.0, 0.3
+    exact = 2.0
+    error = 0.3
     halves = [exact + error / 2**k for k in range(2)]
     assert relative_range(halves) == pytest.approx(0.5 * error / (exact + error / 2))
     assert relative_range(halves, first_order=True) == pytest.approx(error / exact)

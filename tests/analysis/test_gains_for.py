@@ -21,7 +21,8 @@ def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem(
     assert 0.99e-3 < design.chattering.amplitude_range[1] <= 1e-3
     run = smc.run(smc.Scenario(plant="duffing", law=design.law, x0=0.02, duration=6.0, **LAG))
     assert channel_cycle(run)[0] == pytest.approx(1e-3, rel=0.1)
-    own, gains = smc.law("super_twisting").gains, design.law.gains
+    own = smc.law("super_twisting").gains
+    gains = design.law.gains
     assert gains["k1"] / own["k1"] == pytest.approx(math.sqrt(design.size), rel=1e-9)
     assert gains["k2"] / own["k2"] == pytest.approx(design.size, rel=1e-9)
     assert (gains["c"], design.speed) == (own["c"], 1.0)
@@ -40,7 +41,9 @@ def test_forces_among_the_gains_stay_at_the_actuators_limit():
 
 def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     """With the model a gain is an acceleration, of which each joint has its own limit."""
-    law, limits, rest = smc.law("classical", k=2.0), (6.0, 0.5), np.zeros(2)
+    law = smc.law("classical", k=2.0)
+    limits = (6.0, 0.5)
+    rest = np.zeros(2)
     base = smc.Scenario(plant="double_pendulum", law=law, model="nominal", u_max=limits)
     least = min(
         u * base.plant.nominal(rest, rest, i, base.plant.values({}))[1]
@@ -54,7 +57,8 @@ FAST = smc.law("classical", k=1.0, c=20.0)
 
 @COARSELY
 def test_a_frequency_decides_the_speed():
-    wanted, fields = 60.0, {"u_max": 10.0, **LAG}
+    wanted = 60.0
+    fields = {"u_max": 10.0, **LAG}
     with pytest.warns(
         smc.errors.ScenarioWarning, match="does not hold duffing, even without a disturbance"
     ):
@@ -67,7 +71,8 @@ def test_a_frequency_decides_the_speed():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:classical with these gains")
 def test_an_amplitude_and_a_frequency_decide_size_and_speed():
-    wanted, fields = 60.0, {"u_max": 10.0, **LAG}
+    wanted = 60.0
+    fields = {"u_max": 10.0, **LAG}
     both = smc.design.gains_for(FAST, "duffing", amplitude=5e-3, frequency=wanted, **fields)
     assert both.chattering.amplitude_range[1] <= 5e-3
     assert both.chattering.frequency <= wanted

@@ -23,7 +23,8 @@ def test_the_law_is_given_what_it_measures_in_its_run():
         reference=smc.Sine(0.2, 3.0),
         duration=0.3,
     )
-    law, u = scenario.resolved.law, smc.run(scenario).u[:, 0]
+    law = scenario.resolved.law
+    u = smc.run(scenario).u[:, 0]
     memory = np.zeros(law.memory)
     seen = [Measurement(*row) for row in law_time._measured(scenario)]
     asked = np.array([called(law, y, memory)[0] for y in seen])

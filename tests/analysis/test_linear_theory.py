@@ -28,7 +28,8 @@ def growth(
 
     The largest |eigenvalue| of (x, x', u_-1, .. u_-m), worst mode.
     """
-    at, largest = linear_theory.linear(plant), 0.0
+    at = linear_theory.linear(plant)
+    largest = 0.0
     for stiffness in at.modes:
         e, gamma = linear_theory.sampled_mode(at, stiffness, control_period)
         whole = np.zeros((2 + periods, 2 + periods))
@@ -137,7 +138,8 @@ def test_without_k1_nothing_holds_a_pendulum_up():
 
 @each_plant
 def test_sampling_fast_leaves_the_smallest_lambda_and_bounds_the_largest(plant):
-    k1, h = own(plant).gains["k1"], 1e-6
+    k1 = own(plant).gains["k1"]
+    h = 1e-6
     low, high = (
         linear_theory.smallest_lam(plant, k1),
         2.0 * linear_theory.linear(plant).inertia / h,
@@ -217,7 +219,8 @@ def test_a_law_weaker_than_the_plants_own_damping_bears_every_delay():
 
 @each_plant
 def test_the_measured_steady_error_is_the_one_of_theory_within_one_percent(plant):
-    d, law = 0.2, own(plant)
+    d = 0.2
+    law = own(plant)
     trace = smc.run(
         smc.Scenario(plant=plant, law=law, disturbance=smc.Constant(d), x0=0.01, duration=15.0)
     )
@@ -229,7 +232,8 @@ def test_the_measured_steady_error_is_the_one_of_theory_within_one_percent(plant
 
 @each_plant
 def test_under_the_tolerated_force_the_plant_comes_to_rest_at_the_limit(plant):
-    law, most = own(plant), 0.02
+    law = own(plant)
+    most = 0.02
     push = smc.Constant(linear_theory.tolerated_force(plant, law, most) or math.nan)
     trace = smc.run(smc.Scenario(plant=plant, law=law, disturbance=push, x0=0.01, duration=15.0))
     assert steady_error(trace) == pytest.approx(most, rel=1e-3)
@@ -250,7 +254,8 @@ def test_the_tolerated_force_is_the_largest_up_to_the_limit(plant, k1, most):
 
 
 def test_the_actuators_bound_counts_where_it_is_below_lambda():
-    plant, law = smc.plant("inverted_pendulum"), smc.law("observer_free", lam=40.0, k1=9.7)
+    plant = smc.plant("inverted_pendulum")
+    law = smc.law("observer_free", lam=40.0, k1=9.7)
     bounded = linear_theory.tolerated_force(plant, law, 0.1, u_max=6.0)
     p = plant.parameters
     assert bounded == pytest.approx(

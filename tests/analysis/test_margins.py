@@ -289,7 +289,8 @@ def test_theory_knows_the_weakest_motor(poles):
 
 def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
     """Of a model that is not known, of two units, and of a pole without an actuator."""
-    law, runs = smc.law("boundary_layer", k=30.0, phi=0.1, c=5.0), {"duration": 1.5}
+    law = smc.law("boundary_layer", k=30.0, phi=0.1, c=5.0)
+    runs = {"duration": 1.5}
     tied = poles('<equality><joint joint1="a" joint2="b"/></equality>', ["a"])
     bases = [
         smc.Scenario(plant=tied, law=law, x0=0.2, **runs),

@@ -125,12 +125,16 @@ def test_from_six_to_forty_seeds_it_covers_93_percent_or_more():
 
 @pytest.mark.slow
 def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_pooled_runs_does_not():
-    rng, runs, covered, pooled = np.random.default_rng(0), 300, 0, 0
+    rng = np.random.default_rng(0)
+    runs = 300
+    covered = 0
+    pooled = 0
     for _ in range(runs):
         values = rng.normal(size=(1, 12)) + 0.1 * rng.normal(
             size=(8, 12)
         )  # the seed decides; median 0
-        one, other = interval(values), interval(values.ravel())
+        one = interval(values)
+        other = interval(values.ravel())
         covered += one.low <= 0 <= one.high
         pooled += other.low <= 0 <= other.high
     assert covered / runs > 0.92
@@ -161,7 +165,8 @@ def test_intervals_are_the_same_each_time_and_in_any_order():
 
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 17), (3, 20), (15, 15), (20, 20)])
 def test_the_interval_of_a_share_is_wilson_s(k, n):
-    wanted, found = stats.binomtest(k, n).proportion_ci(method="wilson"), share_interval(k / n, n)
+    wanted = stats.binomtest(k, n).proportion_ci(method="wilson")
+    found = share_interval(k / n, n)
     assert found[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
     assert found.low <= found.median <= found.high
 
@@ -234,7 +239,8 @@ def blocks(*factors: float, seeds: int = 20, seed: int = 0) -> np.ndarray:
 
 def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals_overlap():
     scores = {"a": blocks(1.0), "b": blocks(1.05)}
-    a, b = interval(scores["a"]), interval(scores["b"])
+    a = interval(scores["a"])
+    b = interval(scores["b"])
     assert a.high > b.low
     found = by_law(ranks(scores))
     assert (found["a"].best, found["b"].best) == (True, False)
@@ -298,7 +304,9 @@ def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_
     """The worst case of the hypothesis: a lead that just does not matter, and a third law far
     behind.
     """
-    rng, wrong, runs = np.random.default_rng(1), 0, 800
+    rng = np.random.default_rng(1)
+    wrong = 0
+    runs = 800
     for _ in range(runs):
         a, b, c = spreading(3, 1, 0.15, rng, tails=True)
         wrong += any(Comparison({"a": (1 - RELEVANT) * a, "b": b, "c": 9 * c}).winners)
@@ -308,7 +316,9 @@ def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_
 
 @pytest.mark.slow
 def test_a_lead_of_ten_percent_over_ten_laws_is_seen_with_a_probability_of_eighty_percent():
-    rng, seen, runs = np.random.default_rng(0), 0, 100
+    rng = np.random.default_rng(0)
+    seen = 0
+    runs = 100
     for _ in range(runs):
         cells = spreading(11, 5, 0.05, rng)
         cells[0] *= 0.9
@@ -317,7 +327,8 @@ def test_a_lead_of_ten_percent_over_ten_laws_is_seen_with_a_probability_of_eight
 
 
 def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relevant_difference():
-    rng, named = np.random.default_rng(2), 0
+    rng = np.random.default_rng(2)
+    named = 0
     for _ in range(100):
         cells = spreading(3, 2, 0.1, rng)
         cells[0] *= rng.choice([0.8, 0.9, 1.0])
@@ -351,7 +362,8 @@ def test_a_law_that_is_unbeaten_only_as_its_sets_are_few_is_not_among_the_best()
     scores = {}
     for law, size in (("a", 1.0), ("b", 1.2), ("c", 10.0)):
         scores[law] = size * np.exp(rng.normal(0.0, 0.01, 24))
-    own, few = np.arange(24), np.arange(24) % 3
+    own = np.arange(24)
+    few = np.arange(24) % 3
     found = Comparison(scores, sets={"a": own, "b": own, "c": few})
     assert found.beaten[:, 0].tolist() == [False, True, False]
     assert found.undecided[:, 0].tolist() == [False, False, True]
@@ -376,7 +388,8 @@ def test_runs_linked_by_sets_of_gains_of_either_law_are_one_sample():
 
 
 def test_the_difference_of_a_sample_is_the_median_of_its_runs():
-    a, b = np.ones((1, 9)), np.array([[1.1, 1.2, 9.0, 1.0, 1.3, INF, 2.0, 3.0, 1.0]])
+    a = np.ones((1, 9))
+    b = np.array([[1.1, 1.2, 9.0, 1.0, 1.3, INF, 2.0, 3.0, 1.0]])
     found = Comparison(
         {"a": a, "b": b}, sets={"a": np.arange(9)[None] // 3, "b": np.zeros((1, 9), int)}
     )
@@ -386,9 +399,11 @@ def test_the_difference_of_a_sample_is_the_median_of_its_runs():
 
 
 def test_intervals_of_medians_have_sets_of_gains_as_samples():
-    sets, rng = np.arange(24) % 3, np.random.default_rng(0)
+    sets = np.arange(24) % 3
+    rng = np.random.default_rng(0)
     values = np.exp(0.5 * sets + 0.01 * rng.normal(size=24))[None]
-    three, runs = median_of(values, linked(sets)), median_of(values)
+    three = median_of(values, linked(sets))
+    runs = median_of(values)
     assert (three.n, runs.n) == (3, 24)
     assert three.low < 1.1  # the whole range of the sets
     assert three.high > 2.6
@@ -440,7 +455,8 @@ def twelve(*factors: float, spread: float = 0.02, seed: int = 0) -> np.ndarray:
     )
 
 
-A, B = twelve(1.0), twelve(2.0, seed=1)
+A = twelve(1.0)
+B = twelve(2.0, seed=1)
 SOME = np.where(np.arange(12) % 4 == 0, 1.0, math.nan)  # one run in four is repeated
 WINS = [  # what a law and a rival with twice its values have besides, who wins, and the rule
     ({"halves": {"a": A, "b": B}}, "a", "half the step changes nothing"),
@@ -506,7 +522,8 @@ def test_a_law_that_grows_more_accurate_never_loses_its_win():
         def p(cells, halves=halves, trends=trends, floor=0.2):
             return Comparison(cells, floor, halves=halves, trends=trends).p[0, 0, 1]
 
-        before, runs = p(cells), rng.random((1, 12)) < 0.4
+        before = p(cells)
+        runs = rng.random((1, 12)) < 0.4
         lower = np.where(runs, rng.choice([0.9, 1e-3, 0.0]), 1.0)
         both = {law: np.all(np.isnan(y)) for law, y in halves.items()}
         assert (
@@ -570,7 +587,8 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
     """In all runs y, y' or rho fall alone; where one run in four is repeated, y and y' of a run
     fall together.
     """
-    rng, wins = np.random.default_rng(7), 0
+    rng = np.random.default_rng(7)
+    wins = 0
     again = np.arange(12) % repeated == 0
     for _ in range(120):
         cells = {
@@ -605,10 +623,8 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
 
 
 def test_laws_are_level_only_if_an_interval_of_twelve_units_says_so():
-    close, apart = (
-        {"a": twelve(1.0), "b": twelve(1.0, seed=1)},
-        {"a": twelve(1.0), "b": twelve(1.2, seed=1)},
-    )
+    close = {"a": twelve(1.0), "b": twelve(1.0, seed=1)}
+    apart = {"a": twelve(1.0), "b": twelve(1.2, seed=1)}
     noisy = {"a": twelve(1.0, spread=0.3), "b": twelve(1.0, spread=0.3, seed=1)}
     assert [Comparison(c).level[0, 0, 1] for c in (close, apart, noisy)] == [True, False, False]
     assert not Comparison({law: y[:, :11] for law, y in close.items()}).level[0, 0, 1]
@@ -636,7 +652,10 @@ def test_the_least_visible_lead_is_its_formula_and_charges_what_the_step_does():
 def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(
     units, blocks_of_family
 ):
-    rng, level, seen, runs = np.random.default_rng(units), 0.025 / blocks_of_family, 0, 400
+    rng = np.random.default_rng(units)
+    level = 0.025 / blocks_of_family
+    seen = 0
+    runs = 400
     for _ in range(runs):
         a, b, c, d = np.exp(0.1 * rng.normal(size=(4, units)))
         lead = least_visible_lead(np.log(b / a), level)  # of another sample of the same laws
@@ -680,7 +699,8 @@ def study(seeds: int = 20, seed: int = 0) -> Stand:
     """Two plants, three laws, two conditions; law c never settles on duffing, and fails in one run
     on van_der_pol.
     """
-    rng, rows = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    rows = []
     for plant in ("van_der_pol", "duffing"):
         for condition in ("nominal", "noise"):
             for s in range(seeds):
@@ -754,7 +774,8 @@ def test_the_order_of_rows_and_the_names_of_laws_change_nothing():
     renamed = table.taken(slice(None))
     renamed.columns["law"] = np.array([names[law] for law in table.column("law")])
     for before, after in zip(boards, leaderboard(renamed), strict=True):
-        old, new = by_law(before.entries), by_law(after.entries)
+        old = by_law(before.entries)
+        new = by_law(after.entries)
         for law, name in names.items():
             assert new[name].interval == old[law].interval
             assert new[name].rank.mean == pytest.approx(old[law].rank.mean)
@@ -886,9 +907,12 @@ def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0])
 def test_no_random_table_has_a_verdict_that_contradicts_it(seed):
-    rng, named = np.random.default_rng(seed), 0
+    rng = np.random.default_rng(seed)
+    named = 0
     for _ in range(12):
-        laws, conditions, seeds = rng.integers(2, 7), rng.integers(1, 5), rng.integers(14, 26)
+        laws = rng.integers(2, 7)
+        conditions = rng.integers(1, 5)
+        seeds = rng.integers(14, 26)
         common = rng.lognormal(size=(1, 1, seeds))
         values = common * rng.lognormal(
             sigma=rng.choice([0.01, 0.2, 1.0]), size=(laws, conditions, seeds)
@@ -904,7 +928,8 @@ def test_no_random_table_has_a_verdict_that_contradicts_it(seed):
 
 
 def test_a_seed_is_a_sample_of_two_laws_if_it_changes_one():
-    still, moved = np.ones((1, 20)), blocks(2.0)
+    still = np.ones((1, 20))
+    moved = blocks(2.0)
     (board,) = leaderboard(stand({"a": still, "b": moved}), ["itae"])
     assert (board.blocks[0].runs, board.winner) == (20, "a")
     other = stand({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
@@ -912,7 +937,8 @@ def test_a_seed_is_a_sample_of_two_laws_if_it_changes_one():
 
 
 def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
-    still, moved = np.ones((1, 20)), blocks(2.0)
+    still = np.ones((1, 20))
+    moved = blocks(2.0)
     (board,) = leaderboard(stand({"a": moved, "b": 0.01 * still, "c": 0.02 * still}), ["itae"])
     (block,) = board.blocks
     assert (block.runs, block.samples) == (20, 20)
@@ -931,7 +957,8 @@ def test_of_equal_laws_none_is_called_undefeated_because_runs_of_another_fail(la
 
     A law is defeated only where a test says that another is better.
     """
-    draws, undefeated = np.random.default_rng(3), 0
+    draws = np.random.default_rng(3)
+    undefeated = 0
     for _ in range(40):
         scores = {name: draws.lognormal(sigma=0.1, size=(1, 12)) for name in laws}
         for values in scores.values():

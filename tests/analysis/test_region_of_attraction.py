@@ -66,7 +66,8 @@ def counts_no_turns(y, gains, memory):
     ids=lambda value: value if isinstance(value, str) else value.name,
 )
 def test_states_that_leave_early_get_the_verdict_of_a_run_to_the_end(plant, law):
-    x, v = np.linspace(-2.2, 2.2, 5), np.linspace(-5.0, 5.0, 4)
+    x = np.linspace(-2.2, 2.2, 5)
+    v = np.linspace(-5.0, 5.0, 4)
     early = maps.basin_of(base(plant, law), x, v)
     late = to_the_end(base(plant, law), x, v)
     assert (early.outcome == late.outcome).all()
@@ -241,11 +242,13 @@ def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_rippl
     """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the
     end.
     """
-    x, v = np.linspace(-4.0, 4.0, 5), np.linspace(-12.0, 12.0, 5)
+    x = np.linspace(-4.0, 4.0, 5)
+    v = np.linspace(-12.0, 12.0, 5)
     assert (maps.basin_of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
     assert (to_the_end(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
 
-    state, h = np.array(np.meshgrid(x, v)), 1e-3
+    state = np.array(np.meshgrid(x, v))
+    h = 1e-3
     gain = np.full((5, 5), law.gains.get("k", 0.0))
     for sample in range(8000):
         s = state[1] + law.gains["c"] * state[0]
@@ -287,12 +290,15 @@ def test_a_pendulum_beyond_the_saddle_of_full_torque_comes_back_only_by_a_swing(
     So there is no way back from beyond the saddle with less than its E. With more, a pendulum
     swings down and back.
     """
-    p, torque = PENDULUM.parameters, WEAK.gains["lam"]
-    inertia, weight = p["m"] * p["l"] ** 2, p["m"] * p["grav"] * p["l"]
+    p = PENDULUM.parameters
+    torque = WEAK.gains["lam"]
+    inertia = p["m"] * p["l"] ** 2
+    weight = p["m"] * p["grav"] * p["l"]
     saddle = math.asin(torque / weight)
     x, v = np.meshgrid(weak.x, weak.v)
     energy = inertia * v**2 / 2 + weight * np.cos(x) + torque * np.abs(x)
-    beyond, low = np.abs(x) > saddle, energy < weight * math.cos(saddle) + torque * saddle
+    beyond = np.abs(x) > saddle
+    low = energy < weight * math.cos(saddle) + torque * saddle
     assert (beyond & low).sum() > 10
     assert (weak.outcome[beyond & low] == DOES_NOT).all()
     assert (weak.outcome[beyond & ~low] == CONVERGES).any()

@@ -41,7 +41,8 @@ CLASSES = {
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
-    base, within = scenario(duration=1.0), CLASSES[name]
+    base = scenario(duration=1.0)
+    within = CLASSES[name]
     worst = smc.worst_case(base, within=within, budget=8)
     again = smc.worst_case(base, within=within, budget=8, threads=1)
     assert (again.value, again.median, again.scenario) == (
@@ -108,14 +109,13 @@ def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_it
 
 
 def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
-    error, steps = (
-        smc.signals.Held([0.0, 0.05], [0.02, -0.02]),
-        smc.signals.TimeSeries([0.0, 0.2], [0.1, -0.1]),
-    )
+    error = smc.signals.Held([0.0, 0.05], [0.02, -0.02])
+    steps = smc.signals.TimeSeries([0.0, 0.2], [0.1, -0.1])
     made = scenario(
         duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps)
     )
-    fast, slow = smc.run(made), reference.run(made)
+    fast = smc.run(made)
+    slow = reference.run(made)
     plain = smc.run(dataclasses.replace(made, noise=smc.Noise(position=1e-3)))
     for name in ("x", "v", "u", "s"):
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
@@ -151,7 +151,8 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
 @pytest.mark.parametrize("hertz", [2.0, 5.0])
 def test_the_frequency_of_a_sine_is_its_own(hertz):
     t = np.linspace(0.0, 8.0, 8001)
-    x, clock = np.sin(2.0 * np.pi * hertz * t + 0.1)[:, None], SimpleNamespace(control_period=1e-3)
+    x = np.sin(2.0 * np.pi * hertz * t + 0.1)[:, None]
+    clock = SimpleNamespace(control_period=1e-3)
     found = loop_frequency(SimpleNamespace(t=t, x=x, r=0.0 * x, scenario=clock))
     assert found == pytest.approx(hertz, abs=0.5 / 6.0)  # half a period of the last 6 s
 
@@ -183,14 +184,17 @@ def test_it_finds_the_worst_of_a_linear_loop():
     """For M x'' = -k x - c v + d, |d| <= D, at rest at first, the largest x(T) is D times the
     integral of |h|.
     """
-    k, c, T = 20.0, 1.0, 4.0
+    k = 20.0
+    c = 1.0
+    T = 4.0
 
     @smc.law_function(gains={"k": k, "c": c})
     def linear(y, gains, memory):
         return -gains.k * y.x - gains.c * y.v, 0.0
 
     t = np.linspace(0.0, T, 40001)
-    w, a = np.sqrt(k - c * c / 4), c / 2
+    w = np.sqrt(k - c * c / 4)
+    a = c / 2
     gain = np.trapezoid(np.abs(np.exp(-a * t) * np.sin(w * t) / w), t)
     still = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}
     base = smc.Scenario(
@@ -381,7 +385,8 @@ def test_a_class_is_said_with_all_its_bounds_in_the_plant_s_units(plant, force, 
     assert defaults == [f"|d| <= 1 {force}", f"|d| <= 1 {force}, friction x 0.5 to 1.5"]
 
 
-THEOREM, WITHOUT = "its theorem needs ", "its theorem is without "
+THEOREM = "its theorem needs "
+WITHOUT = "its theorem is without "
 # changes of the run, the class, what lies outside of the theorem's conditions and what does not
 OUTSIDE = [
     ({}, {"disturbance": 1.8}, (), (THEOREM, WITHOUT)),
@@ -430,10 +435,8 @@ def test_a_table_says_which_law_has_its_defaults_beside_tuned_ones():
 
 def test_dry_friction_of_zero_does_not_halve_the_default_budget():
     smooth = smc.Scenario(plant=smc.plant("servo_axis", cf=0.0), law="pid")
-    within, rubbing = (
-        smc.Uncertainty(disturbance=1.0),
-        smc.Uncertainty(disturbance=1.0, friction=(0.0, 0.1)),
-    )
+    within = smc.Uncertainty(disturbance=1.0)
+    rubbing = smc.Uncertainty(disturbance=1.0, friction=(0.0, 0.1))
     assert default_budget(smooth, within) == pytest.approx(
         2 * default_budget(smooth, rubbing), abs=1
     )
@@ -464,7 +467,8 @@ def test_most_changes_are_of_the_worst_member_then_of_the_worst_of_other_origins
 
 
 def test_an_evolution_begins_with_the_worst_member_and_climbs():
-    start, means = [], []
+    start = []
+    means = []
 
     def moved(member, z, knots):
         start.append(member)

@@ -44,7 +44,9 @@ def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
             **fields,
         )
     )
-    p, x, v = plant.values({}), trace.x[1:, 0], trace.v[1:, 0]
+    p = plant.values({})
+    x = trace.x[1:, 0]
+    v = trace.v[1:, 0]
     f = (-p.delta * v - p.alpha * x - p.beta * x**3 + force(trace)) / (1.4 * p.M)
     np.testing.assert_allclose(trace.s[1:, 0], f, rtol=0, atol=1e-6)
 
@@ -55,7 +57,8 @@ def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
 def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
     (scenario,) = smc.problem(name).scenarios(controls.oracle(), [1])
     short = dataclasses.replace(scenario, duration=0.2)
-    compiled, plain = smc.run(short), reference.run(short)
+    compiled = smc.run(short)
+    plain = reference.run(short)
     np.testing.assert_allclose(compiled.u, plain.u, rtol=0, atol=1e-9)
     assert scenario.checked
 

@@ -127,10 +127,8 @@ def test_a_file_that_can_do_more_than_compute_is_told(line, words, tmp_path):
     cheat = entry.read(written(tmp_path / "entry", PLAIN.replace("\n\n\n", f"\n\n{line}\n\n", 1)))
     assert re.search(f"has {words}, which can do more than compute", cheat.why_unread)
     fair = "import numpy as np\nfrom math import pi\nK = np.array([np.sqrt(pi), np.inf])"
-    first, main = (
-        "from __future__ import annotations",
-        "if __name__ == '__main__':\n    K = max(K)\n",
-    )
+    first = "from __future__ import annotations"
+    main = "if __name__ == '__main__':\n    K = max(K)\n"
     assert (
         entry.read(written(tmp_path / "fair", f"{first}\n{fair}\n{PLAIN}\n{main}")).why_unread == ""
     )
@@ -139,7 +137,8 @@ def test_a_file_that_can_do_more_than_compute_is_told(line, words, tmp_path):
 def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(
     tmp_path, small, monkeypatch
 ):
-    folder, out = written(tmp_path / "entry"), tmp_path / "results"
+    folder = written(tmp_path / "entry")
+    out = tmp_path / "results"
     target = entering.enter(folder, out=out, instances=2)
     assert (
         entering.enter(folder, out=out, instances=2, verify=True) == target
@@ -174,7 +173,8 @@ def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(
 
 
 def test_a_table_does_not_depend_on_how_many_runs_are_in_memory_at_once(tmp_path, monkeypatch):
-    most, tables = [], []
+    most = []
+    tables = []
     rows = runs.rows
     monkeypatch.setattr(
         runs, "rows", lambda one, part, *rest: (most.append(len(part)), rows(one, part, *rest))[1]

@@ -67,7 +67,10 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.ids, self.links, self.tags = [], [], [], set()
+        self.open = []
+        self.ids = []
+        self.links = []
+        self.tags = set()
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
@@ -118,7 +121,8 @@ def test_pages_are_complete_and_their_links_lead_to_pages(site):
 
 def test_a_table_is_read_once_for_the_medians_and_once_for_each_board(site, monkeypatch):
     """Whatever the number of pages: else 43 entries take minutes, and 430 days."""
-    read, columns = list[str](), runs.Runs.columns
+    read = list[str]()
+    columns = runs.Runs.columns
     monkeypatch.setattr(
         runs.Runs, "columns", lambda self, name: (read.append(name), columns(self, name))[1]
     )

@@ -23,9 +23,11 @@ def philox(key: int, counter: int) -> list[int]:
     Salmon, Moraes, Dror, Shaw, SC 2011.
     """
     c0, c1, c2, c3 = ((counter >> 64 * i) % WORD for i in range(4))
-    k0, k1 = key % WORD, key >> 64
+    k0 = key % WORD
+    k1 = key >> 64
     for _ in range(10):
-        a, b = 0xD2E7470EE14C6C93 * c0, 0xCA5A826395121157 * c2
+        a = 0xD2E7470EE14C6C93 * c0
+        b = 0xCA5A826395121157 * c2
         c0, c1, c2, c3 = (b >> 64) ^ c1 ^ k0, b % WORD, (a >> 64) ^ c3 ^ k1, a % WORD
         k0, k1 = (k0 + 0x9E3779B97F4A7C15) % WORD, (k1 + 0xBB67AE8584CAA73B) % WORD
     return [c0, c1, c2, c3]

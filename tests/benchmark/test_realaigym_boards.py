@@ -106,7 +106,9 @@ def of_arrays(t, q, v, u, robot, **parameters):
 
 def test_criteria_of_a_motion_are_those_of_its_formula():
     t = np.arange(1001) * 0.01
-    q, v, u = np.zeros((1001, 2)), np.zeros((1001, 2)), np.where(np.arange(1001) % 2, 1.0, -1.0)
+    q = np.zeros((1001, 2))
+    v = np.zeros((1001, 2))
+    u = np.where(np.arange(1001) % 2, 1.0, -1.0)
     q[:, 0] = np.where(t < 3.995, 0.0, math.pi)  # up from the sample at 4 s
     v[:, 1] = 2.0
     found = of_arrays(t, q, v, u, "pendubot")
@@ -179,7 +181,8 @@ def test_changed_machines_of_the_published_simulator_are_mujocos(robot, machines
 
 
 def test_dry_friction_is_the_published_arctangent():
-    state, known = (0.4, -0.2, 0.03, -0.05), tuple((MODEL_1_1 | {"cf1": 0.2, "cf2": -0.1}).values())
+    state = (0.4, -0.2, 0.03, -0.05)
+    known = tuple((MODEL_1_1 | {"cf1": 0.2, "cf2": -0.1}).values())
     with_it = simulator._slope(state, 0.0, 0.0, known)
     without = simulator._slope(
         state, -0.2 * math.atan(3.0), -0.1 * math.atan(5.0), tuple(MODEL_1_1.values())
@@ -260,7 +263,8 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
     """Each torque from what the law may see of the states, each state from the one before by the
     equation of motion.
     """
-    noises, changed = {"velocity_noise": 0.1, "torque_noise": 0.2}, {"m2": 0.55, "b1": 0.03}
+    noises = {"velocity_noise": 0.1, "torque_noise": 0.2}
+    changed = {"m2": 0.55, "b1": 0.03}
     case = Case(
         response=1.3, delay=2, pulses=((0.02, 0.05, 1.5),), seed=4, parameters=changed, **noises
     )
@@ -269,9 +273,12 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
     )
     states, torque = Machine(scenario).simulate(case)
     noise = np.random.default_rng([simulator.SEED, 4, 6]).normal(size=(5000, 3)) * [0.1, 0.1, 0.2]
-    plant, driven = smc.plant(robot), ["pendubot", "acrobot"].index(robot)
-    p, order = type("P", (), dict(plant.parameters)), [driven, 1 - driven]
-    last, t = 0.0, 2e-3 * np.arange(60)
+    plant = smc.plant(robot)
+    driven = ["pendubot", "acrobot"].index(robot)
+    p = type("P", (), dict(plant.parameters))
+    order = [driven, 1 - driven]
+    last = 0.0
+    t = 2e-3 * np.arange(60)
     for k in range(60):
         seen = states[max(0, k - 2)]
         (x, q), (v, dq) = seen[:2][order], (seen[2:] + noise[k, :2])[order]
@@ -360,10 +367,12 @@ def test_upright_is_within_the_published_bounds_after_any_turns(k):
 
 def test_no_law_of_a_user_s_can_know_its_noise(monkeypatch):
     """Each call has a new key, which the result keeps, and a scenario repeats."""
-    grid, keys = simulator.cases, []
+    grid = simulator.cases
+    keys = []
     monkeypatch.setattr(simulator, "cases", lambda key=0: keys.append(key) or grid(key)[::200])
     scenario = boards.on_board("acrobot", mine)
-    one, other = boards.robustness(scenario), boards.robustness(scenario)
+    one = boards.robustness(scenario)
+    other = boards.robustness(scenario)
     assert boards.robustness(dataclasses.replace(scenario, noise_key=one.noise_key)) == one
     assert (
         boards.robustness(boards.entry("acrobot")).noise_key
@@ -428,7 +437,8 @@ def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, tr
     rows = boards.experiments(robot)
     assert rows[boards.NAME] == traces[robot].scenario
     found = dict(zip(rows, smc.run(list(rows.values())), strict=True))
-    gains, s = boards.FEEDBACKS["Riccati"], traces[robot].s[:, 0]
+    gains = boards.FEEDBACKS["Riccati"]
+    s = traces[robot].s[:, 0]
     assert np.abs(gains["k"] * np.tanh(s / gains["phi"])).max() < 0.015  # N m, of 6
     score = {name: boards.score(trace) for name, trace in found.items()}
     assert score["trajectory + linear"] == pytest.approx(score[boards.NAME], abs=1e-9)
@@ -451,7 +461,8 @@ def test_scores_of_the_page_and_of_readme_are_those_of_the_boards(robot):
     page, readme = (
         (ROOT / name).read_text(encoding="utf-8") for name in ("docs/boards.md", "README.md")
     )
-    rows, column = boards.experiments(robot), 2 * boards.ROBOTS.index(robot)
+    rows = boards.experiments(robot)
+    column = 2 * boards.ROBOTS.index(robot)
     score = {}
     for row in boards.board(dict(zip(rows, smc.run([*rows.values()]), strict=True))):
         score[row.name] = row.score
@@ -502,7 +513,8 @@ def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
 
 @ROBOTS
 def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_its_end(robot):
-    template, rng = getattr(entries, f"{robot}_swing_up"), np.random.default_rng(2)
+    template = getattr(entries, f"{robot}_swing_up")
+    rng = np.random.default_rng(2)
     table = {}
     for key, values in entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json").items():
         table[key] = np.array(values)
@@ -511,8 +523,10 @@ def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_i
     for a, b in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq")):
         paths.append(CubicHermiteSpline(nodes, table[a], table[b]))
     for t in (0.0, 0.0013, 1.2345, nodes[-2], nodes[-1] - 1e-4, nodes[-1] + 3.0):
-        now, h = min(t, nodes[-1]), 0.004
-        apart, turns = rng.uniform(-0.3, 0.3, 4), 2.0 * math.pi * np.array([1, 0, -2, 0])
+        now = min(t, nodes[-1])
+        h = 0.004
+        apart = rng.uniform(-0.3, 0.3, 4)
+        turns = 2.0 * math.pi * np.array([1, 0, -2, 0])
         x, v, q, dq = np.array([path(now) for path in paths]) + apart + turns
         rows = [np.interp(t, nodes, table[key]) for key in ("s_x", "s_v", "s_q", "s_dq")]
         y = SimpleNamespace(t=t, dt=h, x=x, v=v, q=q, dq=dq)
@@ -534,13 +548,14 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
     """At the end the law's linear part is the LQR of Q = diag(1, 1, 0.1, 0.1), R = 1."""
     from scipy.linalg import solve_continuous_are
 
-    table, plant = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json"), smc.plant(robot)
-    p, top = (
-        type("P", (), dict(plant.parameters)),
-        np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0]),
-    )
-    rest, e = np.zeros(2), 1e-6
-    A, b = np.zeros((4, 4)), np.zeros((4, 1))
+    table = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json")
+    plant = smc.plant(robot)
+    p = type("P", (), dict(plant.parameters))
+    top = np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0])
+    rest = np.zeros(2)
+    e = 1e-6
+    A = np.zeros((4, 4))
+    b = np.zeros((4, 1))
     A[:2, 2:] = np.eye(2)
     for i in range(2):
         b[2 + i] = plant.nominal(top, rest, i, p)[1]
@@ -630,7 +645,8 @@ def test_an_entry_is_described_and_runs_by_the_rules():
         }
         rules = boards.on_board(robot, "none")
         for name, run in boards.experiments(robot).items():
-            law, kind = run.law.of_channel(0), name.removeprefix("trajectory + ")
+            law = run.law.of_channel(0)
+            kind = name.removeprefix("trajectory + ")
             assert tuple(law.gains.values()) == pytest.approx(gains[kind.rstrip("*")])
             assert law.source.kind == "shipped"
             assert str(run.velocity).partition("(")[0] == (
@@ -660,11 +676,10 @@ def raising(y, gains, memory):
 
 
 def test_a_mistake_is_one_sentence(refused):
-    short, duffing = (
-        boards.entry("acrobot", duration=0.01),
-        smc.Scenario(plant="duffing", law="none", duration=0.01),
-    )
-    rows, law = boards.SIMULATION["acrobot"]["v2"], {"plant": "acrobot", "law": "none"}
+    short = boards.entry("acrobot", duration=0.01)
+    duffing = smc.Scenario(plant="duffing", law="none", duration=0.01)
+    rows = boards.SIMULATION["acrobot"]["v2"]
+    law = {"plant": "acrobot", "law": "none"}
     mistakes = [
         lambda: boards.entry("acrobat"),
         lambda: boards.entry("acrobot", "slide"),

@@ -72,7 +72,8 @@ def test_a_level_is_no_harder_than_the_oracles_worst_on_visible_instances(seen, 
 
 @pytest.mark.quick
 def test_a_suite_takes_each_plant_and_condition_equally_often_and_no_law_has_a_say():
-    thirty, fifty = suite.suite("smc-30@1"), suite.suite("smc-50@1")
+    thirty = suite.suite("smc-30@1")
+    fifty = suite.suite("smc-50@1")
     rules = problem.rules(1)
     chosen = []
     for j, plant in enumerate(rules["plants"]):

@@ -233,7 +233,8 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
     """What is done only after the work, such as writing a file, is seen in what commands write,
     below.
     """
-    words, paths = line.split(), CALLS[line]
+    words = line.split()
+    paths = CALLS[line]
     whole = reached(words, paths)
     assert [name for name, value in whole.items() if not value and "(" not in name] == [
         path.rpartition(".")[2] for path in paths
@@ -371,7 +372,8 @@ def test_every_option_says_what_it_is_in_which_unit_within_which_bounds_and_comp
     group, command = COMMANDS[name]
     assert group in main.GROUPS
     for written, (parameter, info) in parameters(command).items():
-        words, kind = info.help or "", str(parameter.annotation)
+        words = info.help or ""
+        kind = str(parameter.annotation)
         assert words.endswith("."), written
         assert len(words) < 450, written
         if "float" in kind:

@@ -382,7 +382,8 @@ def test_show_prints_every_metric_with_its_value(call, trace):
     for line in out.splitlines():
         if line and not line.startswith(" "):
             rows[line.split()[0]] = line.split()[1]
-    everything, realistic = score(smc.load(trace)), {m.name for m in metrics() if m.realistic}
+    everything = score(smc.load(trace))
+    realistic = {m.name for m in metrics() if m.realistic}
     assert set(everything) == {m.name for m in metrics() if not m.network}
     values = {name: value for name, value in everything.items() if name not in realistic}
     assert set(rows) & realistic == set()
@@ -867,7 +868,8 @@ scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a process")
 def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder, monkeypatch):
     (folder / "long.py").write_text(LONG)
-    simulate, before = show.simulate, signal.signal(signal.SIGINT, signal.default_int_handler)
+    simulate = show.simulate
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def stopped(*arguments):
         threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()

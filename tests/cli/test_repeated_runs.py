@@ -60,7 +60,8 @@ def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():
     scenario = smc.Scenario(
         plant="duffing", law="classical", noise=smc.Noise(position=0.01), x0=1.0
     )
-    half, moved = halved(scenario), nudged(scenario)
+    half = halved(scenario)
+    moved = nudged(scenario)
     assert half == dataclasses.replace(scenario, physics_step=5e-4)
     assert moved.x0 == (1.0 + 1e-9,)
     assert dataclasses.replace(moved, x0=1.0) == scenario
@@ -111,10 +112,8 @@ def cells(table) -> list[str]:
 def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
     fine = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.1))
     lost = dataclasses.replace(fine, diverged_at=0.05)
-    runs, again = (
-        {"a": fine, "b": lost, "c": lost},
-        {"a": [fine, lost], "b": [fine, fine], "c": [lost, lost]},
-    )
+    runs = {"a": fine, "b": lost, "c": lost}
+    again = {"a": [fine, lost], "b": [fine, fine], "c": [lost, lost]}
     (table,) = tables.scores("t", runs, again)
     shown = tables.number(smc.score(fine)["tv_rate"])
     for said in (
@@ -128,10 +127,8 @@ def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
 def test_a_limit_cycle_that_half_the_step_loses_is_marked_and_the_mark_explained():
     swing = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0))
     swing = dataclasses.replace(swing, s=np.sin(400.0 * swing.t)[:, None])
-    runs, again = (
-        {"nominal": {"a": swing}},
-        {"nominal": {"a": [dataclasses.replace(swing, s=0.0 * swing.s), swing]}},
-    )
+    runs = {"nominal": {"a": swing}}
+    again = {"nominal": {"a": [dataclasses.replace(swing, s=0.0 * swing.s), swing]}}
     (table,) = tables.answers(["chattering_amplitude", "chattering_frequency"], runs, again)
     amplitude, frequency = map(tables.number, channel_cycle(swing))
     assert f"none{MARK}\nto {amplitude}" in cells(table)[0]
@@ -186,6 +183,7 @@ def test_an_answer_that_half_the_step_changes_is_printed_too():
             f"step {outcome.traces['nominal']['pid'].scenario.resolved.physics_step:g} s"
         ),
     )
-    traces, again = show.simulate(scene, 1), show.repeat(scene, 1)
+    traces = show.simulate(scene, 1)
+    again = show.repeat(scene, 1)
     (said,) = show.other_answers(scene, traces, again, scene.sentence(traces))
     assert said == "At half the physics step: Step 0.0005 s."

@@ -57,7 +57,8 @@ def test_a_film_tells_the_arrow_of_the_control_in_volts():
 
 
 def test_a_table_of_tips_has_the_scores_in_its_units():
-    law, start = arms.hybrid(), arms.scenario("wall", arms.hybrid()).x0
+    law = arms.hybrid()
+    start = arms.scenario("wall", arms.hybrid()).x0
     free, pressing = smc.run(
         [
             smc.Scenario(plant="panda", law=law, x0=start, duration=0.005, contact=one)

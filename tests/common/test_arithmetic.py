@@ -31,7 +31,8 @@ def test_it_is_of_seven_functions_and_of_a_power_with_a_broken_exponent():
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_last_bit_of_one_value_of_a_function_changes_it(name, monkeypatch):
-    before, exact = fingerprint.arithmetic(), getattr(math, name)
+    before = fingerprint.arithmetic()
+    exact = getattr(math, name)
     other = {name: lambda x: math.nextafter(exact(x), 9.0) if x == INPUTS[500] else exact(x)}
     functions = {each: getattr(math, each) for each in FUNCTIONS} | other
     monkeypatch.setattr(fingerprint, "math", SimpleNamespace(**functions))

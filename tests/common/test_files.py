@@ -93,7 +93,8 @@ def margin(value: float, searched: float) -> Margin:
 
 
 def test_maps_of_both_versions(tmp_path):
-    axis, one = np.array([0.0]), np.ones((1, 1))
+    axis = np.array([0.0])
+    one = np.ones((1, 1))
     odd = Basin(
         plant="duffing",
         law="classical",
@@ -257,7 +258,8 @@ def test_a_compiler_without_room_for_its_files_is_not_blamed(compile_, tmp_path,
 
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
 def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
-    odd, made = margin(0.1, 0.2), []
+    odd = margin(0.1, 0.2)
+    made = []
 
     def make() -> list[Margin]:
         made.append(1)
@@ -362,10 +364,8 @@ def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
-    cells, beside = (
-        "give a CSV file, with commas or semicolons between cells",
-        Path(files.__file__).parents[1],
-    )
+    cells = "give a CSV file, with commas or semicolons between cells"
+    beside = Path(files.__file__).parents[1]
     cure = r"give a name without \0, which UTF-8 can encode"
     refusals = {
         lambda: files.with_ending(

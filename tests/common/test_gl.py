@@ -79,7 +79,8 @@ def test_choose_gl_sets_nothing_once_mujoco_is_imported():
     assert report(first="import os, mujoco; os.environ['MUJOCO_GL'] = 'glfw'\n")[0] == "glfw"
 
 
-EGL, MESA = {"libEGL.so.1", "libGL.so.1"}, {"libOSMesa.so.6"}
+EGL = {"libEGL.so.1", "libGL.so.1"}
+MESA = {"libOSMesa.so.6"}
 HERE = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
 NEITHER = "no film: neither libEGL with libGL nor libOSMesa is here"
 # MUJOCO_GL, libraries, PYOPENGL_PLATFORM, error of a trial -> backend, note, why pictures are

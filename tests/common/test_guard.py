@@ -103,11 +103,12 @@ def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
     if os.uname().machine != "x86_64" or ctypes.util.find_library("c") is None:
         pytest.skip("the numbers of the modes are those of x86 and of the GNU C library")
     modes = {"FE_DOWNWARD": 0x400, "FE_UPWARD": 0x800, "FE_TOWARDZERO": 0xC00}
-    arithmetic, three, ten, least = guard.Arithmetic(), 3.0, 10.0, 2.0**-1022
-    library, environment = (
-        arithmetic.library,
-        ctypes.create_string_buffer(bytes(arithmetic.environment), 256),
-    )
+    arithmetic = guard.Arithmetic()
+    three = 3.0
+    ten = 10.0
+    least = 2.0**-1022
+    library = arithmetic.library
+    environment = ctypes.create_string_buffer(bytes(arithmetic.environment), 256)
     assert not arithmetic.changed()
     if mode in modes:
         library.fesetround(modes[mode])

@@ -50,7 +50,8 @@ def test_there_are_no_colours_but_the_page_s():
 
 
 def test_a_film_and_a_picture_are_in_the_page_with_their_bytes_and_width():
-    film, picture = html.embedded(b"abc", "video/mp4", 12.6), html.embedded(b"abc", "image/png")
+    film = html.embedded(b"abc", "video/mp4", 12.6)
+    picture = html.embedded(b"abc", "image/png")
     assert "data:video/mp4;base64,YWJj" in film
     assert "data:image/png;base64,YWJj" in picture
     assert "13" in film

@@ -49,7 +49,8 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
 
 
 def test_code_is_kept_if_no_other_process_can_number_a_function_of_it_alike_and_the_linker_adds_no_address():
-    own, numbas = f"f_B1v{Numbers.FIRST}", "f_B1v7"
+    own = f"f_B1v{Numbers.FIRST}"
+    numbas = "f_B1v7"
     for names_of, declared, filled, kept in (
         ([own, own], [], "x", True),
         ([own, numbas], [], "x", False),

@@ -105,7 +105,8 @@ def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp
     trace.save(tmp_path / "own.npz")
     for kept in (scenario.mechanism_model, prepared, toppling):  # as the first time in a process
         kept.cache_clear()
-    asked, found = [], []
+    asked = []
+    found = []
 
     def act(observation):
         asked.append(observation)
@@ -136,7 +137,9 @@ def in_thread(work):
 
 
 def test_another_thread_compiles_once_the_run_of_a_policy_is_over():
-    asked, let, found = threading.Event(), threading.Event(), []
+    asked = threading.Event()
+    let = threading.Event()
+    found = []
 
     def act(observation):
         asked.set()
@@ -164,7 +167,8 @@ class Slow:
     """A spec that compiles until it is told to stop."""
 
     def __init__(self):
-        self.begun, self.let = threading.Event(), threading.Event()
+        self.begun = threading.Event()
+        self.let = threading.Event()
 
     def compile(self):
         self.begun.set()
@@ -174,7 +178,8 @@ class Slow:
 
 @pytest.mark.parametrize("python", [True, False], ids=["python", "native"])
 def test_no_python_callback_comes_while_a_model_compiles(python):
-    slow, entered = Slow(), threading.Event()
+    slow = Slow()
+    entered = threading.Event()
     native = callback.callback().ctypes
 
     def enter():
@@ -219,7 +224,9 @@ def test_a_wrong_model_is_an_error_also_within_a_policy(tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_forked_child_waits_for_no_thread_of_its_parent():
-    slow, entered, leave = Slow(), threading.Event(), threading.Event()
+    slow = Slow()
+    entered = threading.Event()
+    leave = threading.Event()
 
     def hold():
         with callback.installed():
@@ -327,7 +334,8 @@ def test_a_user_s_other_callback_is_removed_in_a_run_and_restored(name):
 
 def test_timers_are_off_while_a_callback_is_installed_and_on_afterwards():
     model = smc.plant("duffing").load()
-    inside, after = mujoco.MjData(model), mujoco.MjData(model)
+    inside = mujoco.MjData(model)
+    after = mujoco.MjData(model)
     with mjcb.installed(None), mjcb.installed(None):
         mujoco.mj_step(model, inside)
     mujoco.mj_step(model, after)
@@ -343,7 +351,8 @@ def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monke
         smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed)
         for seed in range(2)
     ]
-    whole, done = smc.run(two), []
+    whole = smc.run(two)
+    done = []
 
     def report(steps):
         done.append(steps)
@@ -374,7 +383,8 @@ def lets_touch(model, data, one, other):
 def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkeypatch):
     """Such a callback would change the forces of a run in silence."""
     scenario = smc.Scenario(plant="duffing", law="classical", duration=0.2)
-    given, asked = (lets_touch if name == "contactfilter" else native).ctypes, itertools.count()
+    given = (lets_touch if name == "contactfilter" else native).ctypes
+    asked = itertools.count()
     monkeypatch.setattr(runs, "SLICE_STEPS", 20)
 
     def set_it(*_):
@@ -394,7 +404,8 @@ def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkey
 
 
 def test_a_callback_that_is_cleared_beside_the_reference_loop_is_one_sentence():
-    law, stop = smc.policy(lambda observation: [-0.5 * observation[0]]), threading.Event()
+    law = smc.policy(lambda observation: [-0.5 * observation[0]])
+    stop = threading.Event()
 
     def clear():
         while not stop.is_set():

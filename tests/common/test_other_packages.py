@@ -207,7 +207,8 @@ def test_a_package_brings_the_gains_of_its_law(install):
         match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune",
     ):
         gain_sets.law("duffing", "tuned_law")
-    budget, brief = 8, Objective(conditions=("nominal",), duration=0.2)
+    budget = 8
+    brief = Objective(conditions=("nominal",), duration=0.2)
     tuned = smc.tune("duffing", "tuned_law", budget, objective=brief, searches=2)
     tuned.save(folder / "tuned_gains" / "tuned" / "duffing-tuned_law.json")
     assert [
@@ -327,7 +328,8 @@ def test_an_entry_that_fails_is_loaded_once(install, monkeypatch):
     kind = type(
         catalogue.points("smc_mujoco.laws")[0]
     )  # of importlib.metadata, or of its backport, if imported
-    loads, real = [], kind.load
+    loads = []
+    real = kind.load
     monkeypatch.setattr(kind, "load", lambda point: loads.append(point.name) or real(point))
     sentences = set()
     for _ in range(3):
@@ -451,10 +453,8 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 def test_the_template_installs_offline_and_passes_its_tests(tmp_path):
-    target, clean = (
-        tmp_path / "site",
-        {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))},
-    )
+    target = tmp_path / "site"
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))}
 
     def run(*command: object) -> str:
         words = [sys.executable, *map(str, command)]

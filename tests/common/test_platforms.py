@@ -53,7 +53,8 @@ def test_every_text_file_is_read_and_written_as_utf_8():
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="it is about systems that have it")
 def test_without_process_groups_a_late_command_dies_with_its_children(monkeypatch):
-    asked, real = [], subprocess.run
+    asked = []
+    real = subprocess.run
 
     def taskkill(command: list[str], **options: object) -> object:
         if command[0] != "taskkill":

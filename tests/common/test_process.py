@@ -36,7 +36,8 @@ def test_a_command_that_does_not_end_is_stopped_with_all_that_it_started(tmp_pat
 
 
 def test_ctrl_c_waits_for_the_end_of_the_block(monkeypatch):
-    before, reached = signal.signal(signal.SIGINT, signal.default_int_handler), False
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    reached = False
     try:
         with pytest.raises(KeyboardInterrupt):  # noqa: PT012
             with delay_ctrl_c():
@@ -69,7 +70,8 @@ def test_other_threads_need_no_delay():
 
 def test_a_class_comes_before_those_derived_from_it():
     base = type("Base", (), {})
-    first, second = type("First", (base,), {}), type("Second", (base,), {})
+    first = type("First", (base,), {})
+    second = type("Second", (base,), {})
     below = type("Below", (first,), {})
     assert subclasses(base) == [first, second, below]
 

@@ -22,7 +22,8 @@ def cell(monkeypatch) -> list[str]:
     """A notebook's cell: what it showed, in order."""
     shown: list[str] = []
     handle = types.SimpleNamespace(update=shown.append)
-    ipython, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
+    ipython = types.ModuleType("IPython")
+    display = types.ModuleType("IPython.display")
     display.HTML = str
     display.display = lambda text, display_id: shown.append(text) or handle
     ipython.display = display
@@ -106,7 +107,8 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
 def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    shared, counted = progress.Bar("runs", 8.0), progress.Bar("claims", 8.0, counted=True)
+    shared = progress.Bar("runs", 8.0)
+    counted = progress.Bar("claims", 8.0, counted=True)
     assert [str(shared), str(counted)] == ["runs 0 %", "claims 0/8"]
     now[0] = 106.0
     for bar in (shared, counted):

@@ -45,7 +45,9 @@ def free(law, **fields):
 
 def test_pid_on_a_free_mass_moves_as_its_three_poles_say():
     """z = (integral of e, e, de), z' = A z, to the order of the control period."""
-    kp, ki, kd = 10.0, 5.0, 6.0
+    kp = 10.0
+    ki = 5.0
+    kd = 6.0
     trace = free(smc.law("pid", kp=kp, ki=ki, kd=kd, tau=0.0), duration=4.0, control_period=5e-4)
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-ki, -kp, -kd]])
     exact = np.array([expm(A * t) @ (0.0, 1.0, 0.0) for t in trace.t[::200]])
@@ -62,13 +64,15 @@ def test_pid_is_stable_just_where_routh_says(ki, stable):
         with pytest.warns(GainWarning, match="kp kd > ki"):
             law = smc.law("pid", kp=1.0, kd=1.0, ki=ki, tau=0.0)
     size = np.abs(free(law, duration=120.0, control_period=1e-2).x[:, 0])
-    early, late = size[:3000].max(), size[-3000:].max()
+    early = size[:3000].max()
+    late = size[-3000:].max()
     assert late < 0.5 * early if stable else late > 2.0 * early
 
 
 def test_only_the_integral_leaves_no_error_under_a_constant_force():
     """Without it the mass rests where kp e = d."""
-    with_it, without = smc.law("pid"), smc.law("pid", ki=0.0)
+    with_it = smc.law("pid")
+    without = smc.law("pid", ki=0.0)
     for law, rest in ((with_it, 0.0), (without, 0.2), (smc.law("computed_torque", kp=10.0), 0.2)):
         trace = free(law, disturbance=smc.Constant(2.0), duration=15.0, u_max=10.0)
         assert trace.x[-1, 0] == pytest.approx(rest, abs=2e-3)
@@ -79,7 +83,8 @@ def test_the_filter_takes_the_noise_from_the_derivative():
     """White noise through tau D' = n - D, backward Euler: sigma sqrt(h / (2 tau + h)), and delta u
     = kd D.
     """
-    law, rng = smc.law("pid", kp=0.0, ki=0.0, kd=2.0, tau=9.5e-3), np.random.default_rng(0)
+    law = smc.law("pid", kp=0.0, ki=0.0, kd=2.0, tau=9.5e-3)
+    rng = np.random.default_rng(0)
     memory = np.zeros(law.memory)
     u = [called(law, memory=memory, de=n) for n in 0.1 * rng.normal(size=20_000)]
     assert np.std(u[100:]) == pytest.approx(
@@ -115,7 +120,8 @@ def closed_form(law, **y):
 
 def riccati(a1, a2, b, q, r):
     """The optimal gains and cost matrix, by scipy."""
-    A, B = np.array([[0.0, 1.0], [a1, a2]]), np.array([[0.0], [b]])
+    A = np.array([[0.0, 1.0], [a1, a2]])
+    B = np.array([[0.0], [b]])
     P = solve_continuous_are(A, B, np.diag(q), np.array([[r]]))
     return (B.T @ P / r)[0], P
 
@@ -186,7 +192,8 @@ def test_swing_up_lifts_the_hanging_pendulum_by_a_torque_that_cannot_hold_it(u_m
     trace = smc.run(
         smc.Scenario(plant=plant, law="swing_up", x0=math.pi, u_max=u_max, duration=15.0)
     )
-    E, up = energy(trace), np.cos(trace.x[:, 0])
+    E = energy(trace)
+    up = np.cos(trace.x[:, 0])
     caught = np.argmax(up > math.cos(1.0))
     assert E[0] == pytest.approx(-2 * J * W**2)
     rising = E[:caught]

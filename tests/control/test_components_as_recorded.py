@@ -27,7 +27,9 @@ KINDS = {"law": laws, "joint law": joint_law, "surface": surface, "estimator": e
 TEMPLATES = {
     f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room.catalogue().items()
 }
-COUNT, DT, JOINTS = 60, 0.05, 3
+COUNT = 60
+DT = 0.05
+JOINTS = 3
 
 
 def moved(template):
@@ -89,7 +91,8 @@ def joint_measurements(model, n):
     dynamics = SimpleNamespace(
         coriolis=lambda w: turned @ w, jacobian=lambda: np.eye(JOINTS) + turned
     )
-    M, ones = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]]), np.ones(n)
+    M = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]])
+    ones = np.ones(n)
     M = np.kron(np.eye(n // JOINTS), M)
     for k, (e, de, other) in enumerate(seen((n,))):
         yield JointMeasurement(
@@ -133,11 +136,13 @@ def ways(template):
 
 def computed(component, inputs):
     """Weighted sums of each result over all samples, and of the memory at the end."""
-    function, joint = rebuild(component.function, lambda plain: plain), component.joint
+    function = rebuild(component.function, lambda plain: plain)
+    joint = component.joint
     memory = np.zeros((joints(component), component.memory) if joint else component.memory)
     gains = python_controller.gains_of(component, joints(component))
     results = np.array([function(y, gains, memory) for y in inputs]).reshape(COUNT, -1)
-    weights, last = np.random.default_rng(8).uniform(0.5, 1.5, results.shape), memory.ravel()
+    weights = np.random.default_rng(8).uniform(0.5, 1.5, results.shape)
+    last = memory.ravel()
     sums = [*(weights * results).sum(axis=0), last @ np.linspace(0.5, 1.5, last.size)]
     return ", ".join(f"{value:.7g}" for value in sums)
 

@@ -12,14 +12,16 @@ from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.simulation import python_controller
 
 FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")
-LAM, K1 = 6.0, 2.5
+LAM = 6.0
+K1 = 2.5
 HALF = np.linspace(0.0, 12.0, 6001)
 GRID = np.concatenate([-HALF[:0:-1], HALF])
 
 
 def forces(law, e, de):
     """u and s at many states, (N, 2)."""
-    gains, memory = python_controller.gains_of(law), np.zeros(law.memory)
+    gains = python_controller.gains_of(law)
+    memory = np.zeros(law.memory)
     return np.array(
         [
             law.function(measured(float(a), float(b)), gains, memory)
@@ -83,7 +85,8 @@ def test_every_form_is_odd_bounded_and_rises(name):
 
 @pytest.mark.parametrize("name", FORMS)
 def test_every_form_is_bounded_by_lam_however_wild_the_state(name):
-    law, wild = smc.law(name, lam=LAM), [-1e30, -1e9, -100.0, 0.0, 100.0, 1e9, 1e30]
+    law = smc.law(name, lam=LAM)
+    wild = [-1e30, -1e9, -100.0, 0.0, 100.0, 1e9, 1e30]
     u = forces(law, *(a.ravel() for a in np.meshgrid(wild, wild)))[:, 0]
     assert np.isfinite(u).all()
     assert np.abs(u).max() <= LAM
@@ -110,7 +113,8 @@ def test_what_a_form_cannot_hold_is_said(name, gains):
 
 def test_single_precision_rounds_every_operation_to_24_bits():
     """The same operations on numpy's float32 arrays, bit by bit."""
-    rng, f = np.random.default_rng(0), np.float32
+    rng = np.random.default_rng(0)
+    f = np.float32
     e, de = rng.normal(scale=2.0, size=(2, 5000))
     s = de.astype(f) + f(K1) * e.astype(f)
     a = f(0.25) * np.clip(s, f(-9.0), f(9.0))
@@ -131,7 +135,8 @@ def firmware(e, de, lam=LAM, k1=K1, e_range=4.0, de_range=8.0, u_range=8.0):
     """The fixed-point law as its C would run: int16 words and int32 sums of numpy, where an
     overflow would wrap.
     """
-    word, wide = np.int16, np.int32
+    word = np.int16
+    wide = np.int32
 
     def held(n):
         return np.clip(n, -32767, 32767).astype(word)
@@ -156,7 +161,8 @@ def firmware(e, de, lam=LAM, k1=K1, e_range=4.0, de_range=8.0, u_range=8.0):
     table = q15.TABLE.astype(word)
     assert np.array_equal(table, q15.TABLE)
     size = np.abs(s.astype(wide))
-    i, part = size >> 7, size & 127
+    i = size >> 7
+    part = size & 127
     T = table[i] + multiply(table[i + 1] - table[i], part.astype(word), 7)
     u = held(multiply(gain[2], held(np.sign(s) * T), 15))
     return -u * (u_range / 32768.0), s * (8.0 / 32768.0)
@@ -174,7 +180,8 @@ def test_fixed_point_is_what_16_bit_words_and_32_bit_sums_compute():
 
 def test_fixed_point_is_as_close_as_its_words_allow():
     rng = np.random.default_rng(1)
-    e, de = rng.uniform(-1.2, 1.2, 40_000), rng.uniform(-4.0, 4.0, 40_000)
+    e = rng.uniform(-1.2, 1.2, 40_000)
+    de = rng.uniform(-4.0, 4.0, 40_000)
     u = forces(smc.law("observer_free_q15", lam=LAM, k1=K1), e, de)[:, 0]
     error = np.abs(u + LAM * np.tanh(de + K1 * e)).max()
     bound = LAM * (1.6e-4 + (K1 * 4.0 + 8.0 + 16.0) / 2**16) + 8.0 / 2**16

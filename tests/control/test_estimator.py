@@ -26,11 +26,9 @@ SECOND = ("extended_state_observer", "kalman", "integral_chain", "savitzky_golay
 
 def both(estimator, x, v=None, h=H):
     """Velocities and accelerations on samples x and sensor readings v, (2, K)."""
-    function, gains, memory = (
-        rebuild(estimator.function, lambda f: f),
-        python_controller.gains_of(estimator),
-        np.zeros(estimator.memory),
-    )
+    function = rebuild(estimator.function, lambda f: f)
+    gains = python_controller.gains_of(estimator)
+    memory = np.zeros(estimator.memory)
     x = np.asarray(x, float)
     v = np.zeros_like(x) if v is None else v
     readings = (Reading(h, *xv) for xv in zip(x.tolist(), v.tolist(), strict=True))
@@ -195,7 +193,8 @@ def test_the_integral_chain_passes_less_noise_than_the_observer_of_its_poles(w):
 @pytest.mark.parametrize("w", [20.0, 100.0, 3000.0])
 def test_high_gain_lags_by_two_over_w_on_a_parabola(w):
     """(1 + 3 b) / (2 (1 - b)) periods, which is 2 / w for small w h; stable for any w h."""
-    t, b = np.arange(2000) * H, math.exp(-w * H)
+    t = np.arange(2000) * H
+    b = math.exp(-w * H)
     lag = t - estimates(smc.estimator("high_gain", w=w), t**2 / 2)
     np.testing.assert_allclose(lag[-100:], H * (1 + 3 * b) / (2 * (1 - b)), rtol=1e-6)
     if w * H <= 0.1:
@@ -219,11 +218,13 @@ def test_the_extended_state_observer_s_errors_are_bounded_by_the_jerk_and_attain
 @pytest.mark.parametrize("lam", [1e-15, 1e-9, 1e-3, 1.0, 1e3, 1e6])
 def test_kalman_s_gains_are_those_of_the_riccati_equation(lam):
     """From poles a thousand periods slow to those of a jerk that swamps the noise."""
-    A, C = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]]), np.array([[1.0, 0.0, 0.0]])
+    A = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])
+    C = np.array([[1.0, 0.0, 0.0]])
     Q = lam * np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
     P = solve_discrete_are(A.T, C.T, Q, np.eye(1))
     K = P[:, 0] / (P[0, 0] + 1.0)
-    z, expected = np.array([0.5, 0.0, 0.0]), []
+    z = np.array([0.5, 0.0, 0.0])
+    expected = []
     x = np.append(0.5, np.random.default_rng(0).normal(size=200))
     for reading in x:
         z = A @ z

@@ -20,7 +20,8 @@ from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.units import Gain
 
 TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
-J, G = 16.8e-6, 9.81
+J = 16.8e-6
+G = 9.81
 TORQUE = 3e-4  # N m
 SLIDING = ["quaternion_sliding", "adaptive_quaternion_sliding"]
 LAWS = [
@@ -126,10 +127,8 @@ def test_an_unknown_torque_turns_the_body_by_the_closed_form(drone):
     """The body hovers level, so that the wanted attitude is the one that is off, and the position
     with it.
     """
-    law, common = (
-        smc.law("quaternion_sliding"),
-        {"plant": drone, "duration": 10.0, "control_period": 2e-3},
-    )
+    law = smc.law("quaternion_sliding")
+    common = {"plant": drone, "duration": 10.0, "control_period": 2e-3}
     s = math.atanh(TORQUE / (J * law.gains["K"])) / law.gains["rho"]
     trace = smc.run(smc.Scenario(law=pushed(law), **common))
     assert trace.s[-1, 3] == pytest.approx(s, rel=1e-6)
@@ -194,7 +193,8 @@ def test_an_unknown_torque_turns_the_cascade_without_integrals_by_its_closed_for
 
 def test_the_cascades_gains_are_those_of_the_firmware_in_si_units():
     pwm, degree = 0.12 / 65535.0, math.pi / 180.0  # N of a motor
-    roll, yaw = 2.0 * 0.03253 * pwm / degree / 16.57e-6, 4.0 * 0.00735 * pwm / degree / 29.26e-6
+    roll = 2.0 * 0.03253 * pwm / degree / 16.57e-6
+    yaw = 4.0 * 0.00735 * pwm / degree / 29.26e-6
     expected = {
         "Pr": 250.0 * roll,
         "Ir": 500.0 * roll,
@@ -271,13 +271,12 @@ def test_times_to_five_degrees_are_those_of_another_coding(original, law, publis
 def test_the_adaptive_gains_grow_by_the_published_rule_and_stay_within_their_bounds():
     """K grows above eps / rho, falls below it, creeps by mu at K0, and stays at K_up."""
     law = smc.law("adaptive_quaternion_sliding", K_up=430.0, Kx_up=4.4)
-    base, memory, gains, dt = (
-        plain(law),
-        np.zeros((6, law.memory)),
-        SimpleNamespace(**law.gains),
-        0.05,
-    )
-    K0, up = np.array([4.0, 4.0, 3.0, 400.0, 400.0, 400.0]), [4.4, 430]
+    base = plain(law)
+    memory = np.zeros((6, law.memory))
+    gains = SimpleNamespace(**law.gains)
+    dt = 0.05
+    K0 = np.array([4.0, 4.0, 3.0, 400.0, 400.0, 400.0])
+    up = [4.4, 430]
     K = K0.copy()
     seen = {"grows": 0, "falls": 0, "creeps": 0, "stays": 0}
     for k in range(400):
@@ -290,9 +289,15 @@ def test_the_adaptive_gains_grow_by_the_published_rule_and_stay_within_their_bou
         _, s = base(y, gains, memory)
         for i in range(6):
             if i < 3:
-                G, rho, eps, mu = (0.1, 0.9, 0.001, 0.01)
+                G = 0.1
+                rho = 0.9
+                eps = 0.001
+                mu = 0.01
             else:
-                G, rho, eps, mu = (20.0, 0.2, 0.005, 0.01)
+                G = 20.0
+                rho = 0.2
+                eps = 0.005
+                mu = 0.01
             if K[i] > K0[i]:
                 change = G * abs(s[i]) * math.tanh(rho * abs(s[i]) - eps)
             else:
@@ -312,11 +317,10 @@ def plain(law):
 def measured(x, v, dt, r=None, J=(16.8e-6, 16.8e-6, 29.8e-6), m=0.0319, limit=1.0):
     """What a law of a Crazyflie measures; r has r, r' and r'', (3, 6), all 0 by default."""
     r, dr, ddr = np.zeros((3, 6)) if r is None else r
-    M, w = np.diag([m, m, m, *J]), v[3:]
-    h, g = (
-        np.array([0.0, 0.0, m * G, *np.cross(w, np.array(J) * w)]),
-        np.array([0.0, 0.0, m * G, 0.0, 0.0, 0.0]),
-    )
+    M = np.diag([m, m, m, *J])
+    w = v[3:]
+    h = np.array([0.0, 0.0, m * G, *np.cross(w, np.array(J) * w)])
+    g = np.array([0.0, 0.0, m * G, 0.0, 0.0, 0.0])
     limits = np.broadcast_to(limit, 6).copy()
     return JointMeasurement(0.0, dt, 1.0, 0, x, v, x - r, v - dr, r, dr, ddr, ddr, limits, M, h, g)
 
@@ -326,14 +330,17 @@ def test_adrc_turns_its_states_round_on_the_other_side_of_half_a_turn():
     wc z1 / 2.
     """
     law = smc.law("adrc_attitude", **NOWHERE["adrc_attitude"])
-    memory, x = np.zeros((6, law.memory)), np.array([0.0, 0.0, 0.0, math.radians(-179.9), 0.0, 0.0])
+    memory = np.zeros((6, law.memory))
+    x = np.array([0.0, 0.0, 0.0, math.radians(-179.9), 0.0, 0.0])
     memory[3, 2:5] = 1.0, 2.0, -3.0
     _, s = plain(law)(measured(x, np.zeros(6), 1e-3), SimpleNamespace(**law.gains), memory)
     assert s[3] == pytest.approx(3.0 - 4.0, abs=0.05)
 
 
 def test_the_cascade_adds_no_gyroscopic_torque():
-    law, J, w = smc.law("cascaded_pid"), np.array([12e-6, 20e-6, 29.8e-6]), [3.0, -5.0, 4.0]
+    law = smc.law("cascaded_pid")
+    J = np.array([12e-6, 20e-6, 29.8e-6])
+    w = [3.0, -5.0, 4.0]
     seen = measured(np.zeros(6), np.array([0.0, 0.0, 0.0, *w]), 1e-9, J=J)
     u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
     np.testing.assert_allclose(u[3:], -J * [103.0, 103.0, 12.65] * s[3:], rtol=1e-6)
@@ -344,7 +351,9 @@ def test_indi_adds_no_torque_that_it_measures_already():
 
     J v alone.
     """
-    law, x, w = smc.law("indi_attitude", **NOWHERE["indi_attitude"]), np.zeros(6), [3.0, -5.0, 4.0]
+    law = smc.law("indi_attitude", **NOWHERE["indi_attitude"])
+    x = np.zeros(6)
+    w = [3.0, -5.0, 4.0]
     x[3:5] = 0.3, -0.2
     J = (12e-6, 20e-6, 29.8e-6)
     seen = measured(x, np.array([0, 0, 0, *w]), 2e-3, J=J)
@@ -359,7 +368,8 @@ def test_the_cascade_bounds_speed_tilt_and_the_least_thrust():
     """Level and at rest, 3 m too high and 3 m too far ahead; the period is so short that nothing
     integrates.
     """
-    law, weight = smc.law("cascaded_pid"), 0.0319 * G
+    law = smc.law("cascaded_pid")
+    weight = 0.0319 * G
     seen = measured(np.array([3.0, 0.0, 3.0, 0.0, 0.0, 0.0]), np.zeros(6), 1e-9)
     u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
     assert s[:3] == pytest.approx([1.0, 0.0, 1.0])  # v - v*
@@ -381,7 +391,8 @@ def test_the_cascade_bounds_speed_tilt_and_the_least_thrust():
     ids=["rate", "attitude", "climb", "height"],
 )
 def test_each_integral_of_the_cascade_leaves_no_error_alone(drone, torque, gains):
-    law, common = smc.law("cascaded_pid", **gains), {"duration": 12.0, "control_period": 2e-3}
+    law = smc.law("cascaded_pid", **gains)
+    common = {"duration": 12.0, "control_period": 2e-3}
     heavy = {} if torque else {"mismatch": {"m": 1.19}}
     trace = smc.run(
         smc.Scenario(plant=drone, law=pushed(law) if torque else law, **common, **heavy)
@@ -399,8 +410,10 @@ def test_commands_are_those_of_the_law_in_python(drone, law):
             plant=drone, law=law, reference=PATH, duration=0.2, control_period=2e-3, **start
         )
     )
-    own, limits = smc.law(law), np.array(trace.scenario.limits)
-    function, gains = plain(own), SimpleNamespace(**own.gains)
+    own = smc.law(law)
+    limits = np.array(trace.scenario.limits)
+    function = plain(own)
+    gains = SimpleNamespace(**own.gains)
     memory = np.zeros((6, own.memory))
     for k, t in enumerate(trace.t[:-1]):
         r = np.array([[of(one, t) for one in PATH] for of in (value, rate, acceleration)])
@@ -421,7 +434,8 @@ def test_super_twisting_stays_within_the_square_of_the_period_without_a_lag_and_
     text = TEXT.replace('dyntype="filter" dynprm="0.0625" ', "").replace(
         ' act="0.0782 0.0782 0.0782 0.0782"', ""
     )
-    quick, L = smc.plant_from(text, channels=["body"], name="quick", keyframe="hover"), 45.0
+    quick = smc.plant_from(text, channels=["body"], name="quick", keyframe="hover")
+    L = 45.0
     law = pushed(smc.law("super_twisting_attitude"), wave)
     law = law(k1=1.5 * math.sqrt(L), k2=1.1 * L, **NOWHERE["super_twisting_attitude"])
     common = {"plant": quick, "law": law, "duration": 3.0, "x0": (0.0, 0.0, 30.0, 0.1, 0.0, 0.2)}
@@ -470,7 +484,8 @@ def turn(plant, law, axis, **fields):
 
 def linear(A, x0, times):
     """States of x' = A x at the times, which are a period apart."""
-    step, states = expm(A * times[1]), [np.array(x0)]
+    step = expm(A * times[1])
+    states = [np.array(x0)]
     for _ in times[1:]:
         states.append(step @ states[-1])
     return np.array(states)
@@ -479,10 +494,8 @@ def linear(A, x0, times):
 @pytest.mark.parametrize("axis", range(3))
 def test_indi_leaves_the_rotors_lag_between_what_it_asks_for_and_the_acceleration(drone, axis):
     """lag a' + a = -kq angle - kw w, whatever the filter."""
-    trace, A = (
-        turn(drone, "indi_attitude", axis),
-        np.array([[0, 1, 0], [0, 0, 1], [-120.0, -24.0, -1.0]]),
-    )
+    trace = turn(drone, "indi_attitude", axis)
+    A = np.array([[0, 1, 0], [0, 0, 1], [-120.0, -24.0, -1.0]])
     A[2] /= 0.0625
     angle = linear(A, [0.05, 0.0, 0.0], trace.t)[:, 0]
     np.testing.assert_allclose(trace.x[:, 3 + axis], angle, atol=0.03 * 0.05)
@@ -497,10 +510,8 @@ def test_adrc_near_its_attitude_is_its_linear_observer_and_loop(drone, axis):
         np.zeros((7, 7)),
     )  # z1, z2, z3, A v, angle, w, acceleration
     loop[0, 1] = loop[1, 2] = loop[1, 3] = loop[4, 5] = loop[5, 6] = 1.0
-    corrections, feedback = (
-        np.array([3.0 * wo, 3.0 * wo**2, wo**3]),
-        np.array([wc**2, 2.0 * wc, 1.0]),
-    )
+    corrections = np.array([3.0 * wo, 3.0 * wo**2, wo**3])
+    feedback = np.array([wc**2, 2.0 * wc, 1.0])
     loop[:3, 0] -= corrections
     loop[:3, 4] += corrections
     loop[[3, 6], :3] = -feedback / lag
@@ -517,7 +528,9 @@ def test_indi_takes_the_torque_of_rotors_that_speed_up_into_account():
     Without it the yaw is off by 10 %.
     """
     plant = smc.plant("quadrotor")
-    p, lag, off = plant.parameters, np.array([[0, 1, 0], [0, 0, 1], [-1920.0, -384.0, -16.0]]), []
+    p = plant.parameters
+    lag = np.array([[0, 1, 0], [0, 0, 1], [-1920.0, -384.0, -16.0]])
+    off = []
     force_per_speed = math.sqrt(p["k1"] ** 2 + p["k2"] * p["m"] * p["grav"])  # at hover
     for spin in (0.0, p["Jr"] / (force_per_speed * p["c"])):
         law = smc.law("indi_attitude", **NOWHERE["indi_attitude"], spin=spin)
@@ -619,7 +632,8 @@ def test_the_rate_of_the_wanted_attitude_is_that_of_its_differences(F):
 
 
 def test_the_rate_of_an_attitude_along_the_heading_turns_with_it():
-    r, dr = np.array([0.2, -0.3, 0.6]), np.array([1.0, 0.5, -2.0])
+    r = np.array([0.2, -0.3, 0.6])
+    dr = np.array([1.0, 0.5, -2.0])
 
     def F(t):
         return Rotation.from_rotvec(r + t * dr).apply([0.7, 0.0, 0.0])
@@ -659,7 +673,8 @@ def adaptive_torque(error, turning):
 
 
 def adaptive_force(e, de):
-    c, K = np.array([3.0, 3.0, 2.0]), np.array([4.0, 4.0, 3.0])
+    c = np.array([3.0, 3.0, 2.0])
+    K = np.array([4.0, 4.0, 3.0])
     return -c * de - K * np.tanh(0.9 * (de + c * e))
 
 
@@ -694,28 +709,26 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
             plant=body, law=law, reference=PATH, duration=0.1, control_period=2e-3, **start
         )
     )
-    J, dt, before, limits = (
-        np.diag([12e-6, 20e-6, 29.8e-6]),
-        2e-3,
-        None,
-        np.array(trace.scenario.limits),
-    )
+    J = np.diag([12e-6, 20e-6, 29.8e-6])
+    dt = 2e-3
+    before = None
+    limits = np.array(trace.scenario.limits)
     free, h = 0, 1e-5  # torques within their bounds
     for k, t in enumerate(trace.t[:-1]):
         r, dr, ddr = (
             np.array([of(one, t) for one in PATH[:3]]) for of in (value, rate, acceleration)
         )
-        R, w, e, de = (
-            Rotation.from_rotvec(trace.x[k, 3:].copy()),
-            trace.v[k, 3:],
-            trace.x[k, :3] - r,
-            trace.v[k, :3] - dr,
-        )
+        R = Rotation.from_rotvec(trace.x[k, 3:].copy())
+        w = trace.v[k, 3:]
+        e = trace.x[k, :3] - r
+        de = trace.v[k, :3] - dr
         slow, earlier = before or (de, ddr)
         slow = (slow + dt * 20.0 * de) / (
             1.0 + dt * 20.0
         )  # the implicit step of slow' = 20 (de - slow)
-        dde, jerk, before = 20.0 * (de - slow), (ddr - earlier) / dt, (slow, ddr)
+        dde = 20.0 * (de - slow)
+        jerk = (ddr - earlier) / dt
+        before = (slow, ddr)
 
         def wanted(ahead, t=t, e=e, de=de, ddr=ddr, dde=dde, jerk=jerk):
             F = 0.0319 * (

@@ -34,7 +34,8 @@ def inertia(x):
 
 
 def test_computed_torque_sliding_reaches_its_layer_at_the_predicted_time():
-    k, width = 5.0, 0.05
+    k = 5.0
+    width = 0.05
     trace = run(
         smc.law("computed_torque_sliding", k=k, c=4.0, width=width),
         control_period=2e-4,
@@ -54,7 +55,10 @@ def test_computed_torque_sliding_leaves_width_times_d_over_k():
     """At rest |s| = width M^-1 d / k and |e| = |s| / c, joint by joint, with different gains for
     each.
     """
-    k, c, width, d = np.array([8.0, 20.0, 15.0]), np.array([4.0, 6.0, 5.0]), 0.1, 0.3
+    k = np.array([8.0, 20.0, 15.0])
+    c = np.array([4.0, 6.0, 5.0])
+    width = 0.1
+    d = 0.3
     law = smc.law("computed_torque_sliding", k=k, c=c, width=width)
     trace = run(law, reference=smc.Constant(0.3), disturbance=smc.Constant(d), duration=4.0)
     expected = width * np.linalg.solve(inertia(trace.x[-1]), np.full(3, d)) / k
@@ -82,7 +86,8 @@ def test_super_twisting_reaches_and_stays_at_second_order_in_the_period():
             np.diff(calm.s[:, i])[before] / 2e-4, rate, atol=0.01 * np.abs(rate).max()
         )
     # |d_a'| stays below L, so k1 = 1.5 sqrt(L) and k2 = 1.1 L are enough
-    L, d = 60.0, smc.Sine(0.5, 3.0)
+    L = 60.0
+    d = smc.Sine(0.5, 3.0)
     law = smc.law("super_twisting_computed_torque", k1=1.5 * np.sqrt(L), k2=1.1 * L, c=4.0)
     residuals = []
     for dt in (1e-3, 5e-4):
@@ -100,7 +105,10 @@ def test_passivity_based_lowers_v_as_its_theorem_says():
     """V' of V = s' M s / 2 along a run is -s' (K s + k sat(s / width) - d), under a disturbance
     known to us alone.
     """
-    K, k, width, dt = 1.5, np.array([0.6, 0.9, 0.4]), 0.2, 1e-4
+    K = 1.5
+    k = np.array([0.6, 0.9, 0.4])
+    width = 0.2
+    dt = 1e-4
     law = smc.law("passivity_based", K=K, k=k, c=4.0, width=width)
     trace = run(law, control_period=dt, duration=0.6, disturbance=smc.Sine(0.2, 7.0))
     s = trace.s
@@ -114,7 +122,10 @@ def test_passivity_based_lowers_v_as_its_theorem_says():
 
 
 def test_passivity_based_leaves_the_disturbance_over_its_slope():
-    K, k, width, d = 1.5, 0.6, 0.2, 0.3
+    K = 1.5
+    k = 0.6
+    width = 0.2
+    d = 0.3
     law = smc.law("passivity_based", K=K, k=k, c=4.0, width=width)
     trace = run(law, reference=smc.Constant(0.3), disturbance=smc.Constant(d), duration=5.0)
     np.testing.assert_allclose(trace.s[-1], d / (K + k / width), rtol=1e-5)
@@ -125,7 +136,8 @@ def test_observer_free_joint_rests_at_its_reference_where_gravity_is_compensated
     """With gravity compensation e = 0, and V never grows on the way; without it, see
     test_panda_laws.py.
     """
-    lam, k1 = np.array([20.0, 6.0, 9.0]), np.array([3.0, 2.0, 4.0])
+    lam = np.array([20.0, 6.0, 9.0])
+    k1 = np.array([3.0, 2.0, 4.0])
     law = smc.law("observer_free_joint", lam=lam, k1=k1)
     given = run(law, model="nominal", reference=smc.Constant(0.3), duration=30.0)
     e = given.x - given.r
@@ -157,7 +169,9 @@ def test_unit_vector_keeps_its_direction_and_reaches_all_surfaces_at_once():
 
 
 def test_unit_vector_leaves_the_predicted_s_under_a_disturbance():
-    rho, eps, d = 12.0, 0.1, 0.3
+    rho = 12.0
+    eps = 0.1
+    d = 0.3
     trace = run(
         smc.law("unit_vector", rho=rho, eps=eps),
         reference=smc.Constant(0.3),
@@ -208,7 +222,8 @@ def test_time_delay_sliding_is_stable_below_twice_the_inertia_and_not_above():
 def test_solve_inverts_a_positive_definite_matrix():
     rng = np.random.default_rng(3)
     for n in (1, 3, 7):
-        root, b = rng.normal(size=(n, n)), rng.normal(size=n)
+        root = rng.normal(size=(n, n))
+        b = rng.normal(size=n)
         M = root @ root.T + 0.1 * np.eye(n)
         np.testing.assert_allclose(joint_law.solve(M, b), np.linalg.solve(M, b), rtol=1e-9)
         assert joint_law.solve.py_func(M, b).tolist() == joint_law.solve(M, b).tolist()

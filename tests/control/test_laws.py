@@ -57,13 +57,15 @@ def test_a_sampled_law_ends_within_a_multiple_of_a_power_of_the_period_and_not_f
 
 @pytest.mark.parametrize(("k", "phi", "d"), [(6.0, 0.5, 1.5), (2.0, 1.0, 1.9), (6.0, 0.01, 5.0)])
 def test_boundary_layer_ends_within_phi_d_over_k_and_a_constant_attains_it(k, phi, d):
-    law, bound = smc.law("boundary_layer", k=k, phi=phi), phi * d / k
+    law = smc.law("boundary_layer", k=k, phi=phi)
+    bound = phi * d / k
     assert plant_a(law, constant(d), duration=30).s[-1] == pytest.approx(bound, rel=1e-9)
     assert plant_a(law, sine(d, 7.0), duration=30).residual() <= bound
 
 
 def test_boundary_layer_is_the_sign_outside_its_layer():
-    law, classical = smc.law("boundary_layer", k=2.0, phi=0.1), smc.law("classical", k=2.0)
+    law = smc.law("boundary_layer", k=2.0, phi=0.1)
+    classical = smc.law("classical", k=2.0)
     for s in (-3.0, -0.1, 0.1, 5.0):
         assert one(law, de=s) == one(classical, de=s)
 
@@ -92,12 +94,14 @@ def test_adaptive_gain_ends_above_an_unknown_disturbance_and_holds_it():
 
 def test_noise_winds_up_the_adaptive_gain_without_end_and_the_leak_bounds_it():
     noise = 0.05 * np.random.default_rng(1).normal(size=80_000)
-    plain_law, leaky = smc.law("adaptive", gamma=15.0), smc.law("adaptive_leak", gamma=15.0)
+    plain_law = smc.law("adaptive", gamma=15.0)
+    leaky = smc.law("adaptive_leak", gamma=15.0)
     growing = plant_a(plain_law, wave, noise=noise, duration=80)
     bounded = plant_a(leaky, wave, noise=noise, duration=80)
     early, late = (gain(plain_law, growing)[k] for k in (40_000, 79_999))
     assert late - early > 15.0 * 40 * 0.05 * math.sqrt(2 / math.pi) * 0.9  # gamma T E|noise|
-    K, g = gain(leaky, bounded), leaky.gains
+    K = gain(leaky, bounded)
+    g = leaky.gains
     assert K[40_000:].max() < 1.3 * K[20_000:40_000].max()
     assert K.max() <= g["gamma"] * np.abs(bounded.s + noise).max() / g["leak"]
     assert K.max() < late / 4

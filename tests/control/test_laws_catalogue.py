@@ -106,7 +106,8 @@ def test_a_law_is_odd_in_what_it_measures_and_commands_nothing_where_there_is_no
     for _ in range(3):
         assert called(law, measured(limit=6.0), memory) == (0.0, 0.0)
     for model in (0.0, 1.0):
-        ours, mirrored = np.zeros(law.memory), np.zeros(law.memory)
+        ours = np.zeros(law.memory)
+        mirrored = np.zeros(law.memory)
         for k, (e, de, f, a) in enumerate(np.random.default_rng(0).normal(size=(100, 4))):
             common = {"g": 2.0, "t": k * 1e-3, "limit": 6.0, "model": model}
             u, s = called(law, measured(e, de, f=f, a=a, **common), ours)

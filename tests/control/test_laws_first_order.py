@@ -34,14 +34,17 @@ DECADES = pytest.mark.parametrize("s0", [10.0**p for p in range(-2, 5)])
 
 @pytest.mark.parametrize("s0", [0.3, -1.0, 5.0, 100.0])
 def test_exponential_reaching_takes_the_time_of_its_formula(s0):
-    k, q = 2.0, 3.0
+    k = 2.0
+    q = 3.0
     run = plant_a(smc.law("exponential_reaching", k=k, q=q), s=s0, h=1e-4)
     assert run.reached(1e-4 * k) == pytest.approx(math.log(1 + q * abs(s0) / k) / q, abs=2e-3)
 
 
 @pytest.mark.parametrize("s0", [0.3, 5.0, 100.0])
 def test_exponential_reaching_keeps_its_time_against_a_disturbance_and_classical_residual(s0):
-    k, q, h = 2.0, 3.0, 1e-3
+    k = 2.0
+    q = 3.0
+    h = 1e-3
     run = plant_a(smc.law("exponential_reaching", k=k, q=q), wave, s=s0)
     assert run.reached(h * (k + D)) <= math.log(1 + q * s0 / (k - D)) / q + 2 * h
     assert (
@@ -70,7 +73,12 @@ def test_power_rate_ends_where_it_balances_a_constant_disturbance(d):
 
 @DECADES
 def test_fixed_time_reaches_before_its_bound_over_six_decades(s0):
-    k1, k2, a, b, k, h = 2.0, 2.0, 0.5, 1.5, 1.6, 1e-3
+    k1 = 2.0
+    k2 = 2.0
+    a = 0.5
+    b = 1.5
+    k = 1.6
+    h = 1e-3
     law = smc.law("fixed_time", k1=k1, k2=k2, a=a, b=b, k=k)
     bound = 1 / (k1 * (1 - a)) + 1 / (k2 * (b - 1))
     assert plant_a(law, wave, s=s0, duration=4.0).reached(2 * h * (k + D)) <= bound
@@ -83,7 +91,8 @@ def test_fixed_time_reaches_before_its_bound_over_six_decades(s0):
 
 
 def test_fixed_time_explicit_diverges_beyond_the_bound_of_its_docstring():
-    law, h = smc.law("fixed_time", k2=2.0, b=1.5), 1e-3
+    law = smc.law("fixed_time", k2=2.0, b=1.5)
+    h = 1e-3
     edge = (2 / (2.0 * h)) ** 2
     assert abs(plant_a(law, s=1.1 * edge, duration=0.01).s[-1]) > edge * 1.2
     assert abs(plant_a(law, s=0.9 * edge, duration=0.01).s[-1]) < edge * 0.5
@@ -92,7 +101,10 @@ def test_fixed_time_explicit_diverges_beyond_the_bound_of_its_docstring():
 @DECADES
 def test_prescribed_time_is_kept_over_six_decades_and_not_beaten_by_far(s0):
     """s = s0 (1 - t/T)^m without d: at T it is 0, and half-way as the formula says."""
-    law, T, m, h = smc.law("prescribed_time", T=2.0, m=2.0, k=2.0), 2.0, 2.0, 1e-3
+    law = smc.law("prescribed_time", T=2.0, m=2.0, k=2.0)
+    T = 2.0
+    m = 2.0
+    h = 1e-3
     run = plant_a(law, wave, s=s0, duration=4.0)
     assert run.reached(h * (2.0 + D)) <= T + 2 * h
     alone = plant_a(smc.law("prescribed_time", T=T, m=m, k=0.0), s=s0, duration=4.0)
@@ -132,7 +144,8 @@ def test_implicit_model_free_chatters_from_g_of_two_on_and_never_with_the_model(
 
 
 def test_discrete_time_does_not_wind_up_at_an_actuator_weaker_than_k():
-    h, limit = 1e-3, 2.0
+    h = 1e-3
+    limit = 2.0
     run = plant_a(smc.law("discrete_time", k=6.0), wave, s=20.0, duration=60.0, limit=limit)
     assert run.s.min() > -(h**2) * RATE * 3
     assert run.reached(h**2 * RATE * 1.01) < math.inf
@@ -145,7 +158,10 @@ def test_discrete_time_settles_just_where_jury_says(g, settles):
 
 
 def test_discrete_reaching_follows_its_recursion_on_the_sampled_double_integrator():
-    eps, q, c, h = 3.0, 4.0, 2.5, 1e-2
+    eps = 3.0
+    q = 4.0
+    c = 2.5
+    h = 1e-2
     law = smc.law("discrete_reaching", eps=eps, q=q, c=c)
     run = plant_b(law, x=(1.0, 0.3), h=h, f=-2.0, g=3.0, model=1.0)
     s = run.sigma
@@ -163,7 +179,8 @@ def test_discrete_reaching_follows_its_recursion_on_the_sampled_double_integrato
 
 @pytest.mark.parametrize("q", [0.0, 4.0, 60.0])
 def test_discrete_reaching_ends_in_its_quasi_sliding_band(q):
-    eps, h = 3.0, 1e-2
+    eps = 3.0
+    h = 1e-2
     run = plant_b(smc.law("discrete_reaching", eps=eps, q=q), x=(1.0, 0.0), h=h, model=1.0)
     s = run.sigma
     crossed = np.flatnonzero(s[1:] * s[:-1] < 0)[0] + 1
@@ -183,7 +200,8 @@ def test_discrete_reaching_ends_in_its_quasi_sliding_band(q):
 def test_barrier_holds_its_bound_when_the_period_is_short_enough_and_a_constant_attains_it(d):
     eps = 0.1
     h = 0.9 * eps / (1 + d) ** 2 if d > 2 else 5e-3
-    law, bound = smc.law("barrier_adaptive", eps=eps, k_max=50.0), eps * d / (1 + d)
+    law = smc.law("barrier_adaptive", eps=eps, k_max=50.0)
+    bound = eps * d / (1 + d)
     run = plant_a(law, sine(d, 3.0), h=h)
     assert run.residual() <= bound * (1 + 1e-9)
     entered = np.flatnonzero(np.abs(run.s) <= eps / 2)[0]
@@ -192,7 +210,8 @@ def test_barrier_holds_its_bound_when_the_period_is_short_enough_and_a_constant_
 
 
 def test_barrier_is_left_when_the_period_is_too_long_for_it():
-    eps, d = 0.1, 5.0
+    eps = 0.1
+    d = 5.0
     h = 8 * eps / (1 + d) ** 2
     run = plant_a(smc.law("barrier_adaptive", eps=eps, k_max=50.0), sine(d, 3.0), h=h)
     assert run.residual() > eps
@@ -220,7 +239,9 @@ def test_fuzzy_gain_interpolates_its_nine_rules():
 
 
 def test_fuzzy_gain_reaches_in_classical_time_and_chatters_with_the_lesser_gain():
-    low, high, s0 = 2.0, 6.0, 3.0
+    low = 2.0
+    high = 6.0
+    s0 = 3.0
     run = plant_a(smc.law("fuzzy_gain", k_min=low, k_max=high), wave, s=s0)
     hard, soft = (plant_a(smc.law("classical", k=k), wave, s=s0) for k in (high, low))
     K = np.abs(run.u[run.u != 0])
@@ -241,7 +262,10 @@ def nominal_loop(t, c, q, x):
 
 @pytest.mark.parametrize(("f", "g", "model"), [(0.0, 1.0, 0.0), (-3.0, 2.0, 1.0)])
 def test_integral_has_no_reaching_phase_and_runs_the_nominal_loop(f, g, model):
-    M, c, q, h = 4.0, 2.5, 1.5, 1e-3
+    M = 4.0
+    c = 2.5
+    q = 1.5
+    h = 1e-3
     law = smc.law("integral", M=M, c=c, q=q)
     run = plant_b(law, wave, x=(1.0, 0.0), f=f, g=g, model=model)
     assert np.abs(run.sigma).max() <= 1.01 * h * (M + D), "from t = 0"
@@ -257,7 +281,9 @@ def test_integral_residual_is_first_order_in_the_control_period():
 
 
 def test_dynamic_is_continuous_in_u_and_decays_with_q():
-    k, q, h = 10.0, 3.0, 1e-3
+    k = 10.0
+    q = 3.0
+    h = 1e-3
     run = plant_a(smc.law("dynamic", k=k, q=q), wave, s=1.0)
     assert np.abs(np.diff(run.u)).max() <= h * k * (1 + 1e-9)
     assert run.variation() < 0.01 * plant_a(smc.law("classical", k=2.0), wave).variation()
@@ -331,13 +357,12 @@ def test_observer_free_integral_does_not_wind_up():
     assert lost.s[-1] > 10
     assert np.ptp(lost.memory[2000:, 0]) == 0.0
     assert abs(lost.memory[-1, 0]) < 2.0
-    gains, common = (
-        {"lam": 2.0, "k1": 1.0, "ki": 0.3},
-        {"x": (30.0, 0.0), "h": 1e-2, "duration": 60.0},
-    )
+    gains = {"lam": 2.0, "k1": 1.0, "ki": 0.3}
+    common = {"x": (30.0, 0.0), "h": 1e-2, "duration": 60.0}
     near = plant_b(smc.law("observer_free_integral", **gains), constant(0.5), **common)
     far = plant_b(winding(**gains), constant(0.5), **common)
-    z, s = near.memory[:, 0], near.sigma - 0.3 * near.memory[:, 0]
+    z = near.memory[:, 0]
+    s = near.sigma - 0.3 * near.memory[:, 0]
     grew = np.flatnonzero(np.diff(np.abs(z)) > 0)
     assert np.all(0.3 * np.abs(z[grew]) <= 2.0 + np.abs(s[grew]))
     assert near.residual() < 1e-6
@@ -346,7 +371,10 @@ def test_observer_free_integral_does_not_wind_up():
 
 @pytest.mark.parametrize("d", [0.05, 2.0, 8.0])
 def test_observer_free_adaptive_rests_where_its_docstring_says(d):
-    lam, gamma, leak, zone = 6.0, 200.0, 1.0, 0.1
+    lam = 6.0
+    gamma = 200.0
+    leak = 1.0
+    zone = 0.1
     law = smc.law("observer_free_adaptive", lam=lam, gamma=gamma, leak=leak, deadzone=zone)
     run = plant_a(law, constant(d), duration=30.0)
     b = brentq(lambda b: (lam + gamma * max(b - zone, 0.0) / leak) * math.tanh(b) - d, 0.0, 5.0)
@@ -354,10 +382,8 @@ def test_observer_free_adaptive_rests_where_its_docstring_says(d):
 
 
 def test_observer_free_adaptive_is_the_plain_law_within_its_dead_zone_and_forgets():
-    law, base = (
-        smc.law("observer_free_adaptive", lam=4.0, leak=2.0),
-        smc.law("observer_free", lam=4.0),
-    )
+    law = smc.law("observer_free_adaptive", lam=4.0, leak=2.0)
+    base = smc.law("observer_free", lam=4.0)
     y = measured(0.01, 0.02)
     assert one(law, e=0.01, de=0.02) == one(base, e=0.01, de=0.02)
     memory = np.array([30.0])
@@ -392,7 +418,8 @@ def test_surface_and_own_sliding_variable_give_the_same_first_order_law():
     forms = [f"observer_free_{form}" for form in ("table", "taylor", "single", "q15")]
     state = {"f": 0.7, "g": 2.0, "model": 1.0}
     for name in (*EXACT, "power_rate", "fuzzy_gain", "prescribed_time", "integral", *forms):
-        law, slope = smc.law(name), "k1" if name in forms else "c"
+        law = smc.law(name)
+        slope = "k1" if name in forms else "c"
         own = one(smc.law(name, **{slope: 1.7}), e=0.2, de=-0.3, **state)
         y = on_surface(-0.3 + 1.7 * 0.2, eq=1.7 * 0.3, **state)
         given = called(law, y._replace(e=0.2, de=-0.3), np.zeros(law.memory))

@@ -49,7 +49,8 @@ def law(name, **gains):
 
 
 def test_implicit_laws_vary_their_command_as_the_disturbance_does_and_the_explicit_one_chatters():
-    d, turns = constant(0.5), {}
+    d = constant(0.5)
+    turns = {}
     for name in ("super_twisting", "implicit_super_twisting", "proper_super_twisting", "classical"):
         if name == "classical":
             gains = {"k": 2.0}
@@ -70,17 +71,21 @@ def test_implicit_laws_solve_their_inclusion(name):
     k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (5_000, 3)).T
     s, w = rng.normal(size=(2, 5_000)) * 10.0 ** rng.uniform(-6, 0, (2, 5_000))
     s *= np.where(rng.random(5_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
-    function, on = law(name).function, 0
+    function = law(name).function
+    on = 0
     assert function is not None
     for values in zip(k1.tolist(), k2.tolist(), dt.tolist(), s.tolist(), w.tolist(), strict=True):
         k1_, k2_, h, s_, w_ = values
         memory = np.array([w_])
         u, _ = function(on_surface(s_, dt=h), SimpleNamespace(k1=k1_, k2=k2_, c=0.0), memory)
         after = memory[0]
-        ahead, root = s_ + h * u, (after - u) / k1_
+        ahead = s_ + h * u
+        root = (after - u) / k1_
         if name == "proper_super_twisting":
-            ahead, root = s_ + h * (u - after), (2.0 * after - w_ - u) / k1_
-        z, scale = root * abs(root), abs(s_) + h * (abs(u) + abs(w_) + abs(after))
+            ahead = s_ + h * (u - after)
+            root = (2.0 * after - w_ - u) / k1_
+        z = root * abs(root)
+        scale = abs(s_) + h * (abs(u) + abs(w_) + abs(after))
         assert abs(ahead - z) <= 1e-12 * (scale + abs(z)), values
         if abs(z) <= 1e-12 * scale:
             on += 1
@@ -143,8 +148,15 @@ def test_clamped_super_twisting_on_van_der_pol_is_that_of_an_independent_integra
     """The study's first gains, held input, Runge and Kutta's rule in steps of 0.25 ms: to 1e-3 m
     over 10 s.
     """
-    k1, k2, c, bound, h = 4.567, 45.47, 2.16, 6.0, 1e-3
-    x, v, w, states = 2.0, 0.0, 0.0, np.empty((10_001, 2))
+    k1 = 4.567
+    k2 = 45.47
+    c = 2.16
+    bound = 6.0
+    h = 1e-3
+    x = 2.0
+    v = 0.0
+    w = 0.0
+    states = np.empty((10_001, 2))
 
     def rate(x, v):
         return v, (1.0 - x * x) * v - x + u
@@ -176,7 +188,9 @@ def test_clamped_super_twisting_on_van_der_pol_is_that_of_an_independent_integra
 
 def test_adaptive_super_twisting_finds_gains_for_disturbances_of_any_size_and_lets_them_go():
     rule = law("adaptive_super_twisting")
-    k0, least, mu = rule.gains["k0"], rule.gains["least"], rule.gains["mu"]
+    k0 = rule.gains["k0"]
+    least = rule.gains["least"]
+    mu = rule.gains["mu"]
     for size in (0.5, 5.0, 20.0):
         run = plant_a(rule, sine(size), duration=20.0)
         assert run.residual() < 10 * mu
@@ -206,7 +220,8 @@ def test_twisting_takes_the_time_of_its_geometric_spiral(r1, r2):
 
 
 def test_suboptimal_stops_without_overshoot_at_a_fixed_part_of_where_it_was():
-    r1, r2 = 4.0, 1.5
+    r1 = 4.0
+    r2 = 1.5
     run = plant_b(law("suboptimal", r1=r1, r2=r2), h=1e-4, duration=4.0)
     v = run.x[:, 1]
     stops = run.s[1:][(v[:-1] < 0) & (v[1:] >= 0)]
@@ -216,7 +231,8 @@ def test_suboptimal_stops_without_overshoot_at_a_fixed_part_of_where_it_was():
 
 def test_suboptimal_takes_no_value_of_the_velocity_but_its_sign():
     rule = law("suboptimal")
-    known, scaled = np.zeros(rule.memory), np.zeros(rule.memory)
+    known = np.zeros(rule.memory)
+    scaled = np.zeros(rule.memory)
     for e, de in np.random.default_rng(0).normal(size=(500, 2)):
         assert call(rule, measured(e, de), known) == call(rule, measured(e, 7.0 * de), scaled)
 
@@ -281,7 +297,9 @@ TERMINAL_LAWS = pytest.mark.parametrize(
 
 @pytest.mark.parametrize("name", ["terminal", "nonsingular_terminal", "nonsingular_fast_terminal"])
 def test_a_terminal_law_is_the_classical_law_on_its_surface(name):
-    rule, slid, first = law(name), surface(name), law("classical", k=4.0)
+    rule = law(name)
+    slid = surface(name)
+    first = law("classical", k=4.0)
     if "rate" in rule.gains:
         first = law("exponential_reaching", k=4.0, q=rule.gains["rate"])
     assert {key: rule.gains[key] for key in slid.gains} == dict(slid.gains)
@@ -309,7 +327,9 @@ def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_t
     """From the surface, g = 3, |f| = 1: s stays where k g > |f| + |g - 1| |eq|, and leaves where k
     g > |f| alone.
     """
-    e, f, g = 1.5, 1.0, 3.0
+    e = 1.5
+    f = 1.0
+    g = 3.0
     rule = law(name)
     start = (e, -speed(rule.gains, e))
     slid = surface(name)
@@ -404,7 +424,8 @@ def test_laws_of_degree_3_settle_a_plant_behind_an_actuator_lag(plant, L, name):
     """With a differentiator of order 2 whose L is of the size of x''': claim 15 of the paper."""
     common = {"plant": plant, "law": name, "actuator": smc.Lag(0.05)}
     trace = smc.run(smc.Scenario(velocity=smc.estimator("levant", order=2, L=L), **common))
-    score, size = smc.score(trace), np.abs(trace.x[0]).max()
+    score = smc.score(trace)
+    size = np.abs(trace.x[0]).max()
     assert trace.failure is None
     assert score["ultimate_bound"] <= 0.02 * size
     assert score["settling_time"] < 6.0

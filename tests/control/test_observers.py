@@ -52,7 +52,8 @@ def test_the_estimate_is_within_the_bound_that_the_rate_of_the_disturbance_gives
     each.
     """
     run = plant_b(observer(name, **{SPEED[name]: speed}), sine(2.0, omega))
-    J, share = 2.0 * omega, 3.0 if name == "extended_state" else 1.0
+    J = 2.0 * omega
+    share = 3.0 if name == "extended_state" else 1.0
     miss = np.abs(2.0 * np.sin(omega * run.t[:-1]) - estimate(name, run))[3000:]
     assert miss.max() <= share * J / speed + J * H
 

@@ -87,7 +87,8 @@ def test_their_controller_is_a_law_in_one_line():
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_reaching_laws_agree(law, theirs):
-    ours, other = own(law), theirs()
+    ours = own(law)
+    other = theirs()
     along(lambda e, de: ours(0.0, de)[0], lambda e, de: other.compute(de))
 
 
@@ -121,16 +122,15 @@ def test_reaching_laws_agree(law, theirs):
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_controllers_agree(law, theirs):
-    ours, other = own(law, model=1.0), controlled(theirs())
+    ours = own(law, model=1.0)
+    other = controlled(theirs())
     along(lambda e, de: ours(e, de)[0], other, rtol=1e-9)
 
 
 def test_the_integral_of_a_pid_agrees_but_for_one_sample():
     """Theirs counts the sample's own error before it acts, ours after."""
-    ours, theirs = (
-        own(smc.law("pid", kp=5.0, ki=3.0, kd=2.0, tau=0.0)),
-        controlled(controllers.PID(5.0, 2.0, 3.0, H)),
-    )
+    ours = own(smc.law("pid", kp=5.0, ki=3.0, kd=2.0, tau=0.0))
+    theirs = controlled(controllers.PID(5.0, 2.0, 3.0, H))
     along(lambda e, de: ours(e, de)[0] - 3.0 * H * e, theirs)
 
 
@@ -138,7 +138,8 @@ def test_the_adaptive_gain_agrees_but_for_one_sample():
     """Theirs grows before it acts, ours after."""
     theirs = controllers.AdaptiveSMC(c=2.0, gamma=5.0, eta0=0.5, eta_max=1e9, lam=0.0, dt=H)
     law = smc.law("adaptive", gamma=5.0, c=2.0, k0=0.5)
-    ours, gain = own(law, model=1.0), own(law, model=1.0)
+    ours = own(law, model=1.0)
+    gain = own(law, model=1.0)
     gain(*STATES[0])
     for (e, de), after in zip(STATES.tolist(), STATES[1:].tolist(), strict=False):
         u, s = ours(e, de)
@@ -157,10 +158,8 @@ def test_the_adaptive_gain_agrees_but_for_one_sample():
 )
 def test_second_order_laws_agree_when_theirs_are_told_sigma_and_its_rate(law, theirs):
     name, alpha, betas = theirs
-    ours, other = (
-        own(law),
-        getattr(controllers, name)(order=2, alpha=alpha, betas=betas, g_sign=1.0),
-    )
+    ours = own(law)
+    other = getattr(controllers, name)(order=2, alpha=alpha, betas=betas, g_sign=1.0)
     along(
         lambda e, de: ours(e, de)[0],
         lambda e, de: other.compute(0.0, None, None, sigma_derivs=[e, de])[0],
@@ -176,10 +175,8 @@ class Itself(core.SlidingSurface):
 
 
 def test_twisting_agrees_when_theirs_is_handed_a_variable_of_relative_degree_2():
-    ours, theirs = (
-        own(smc.law("twisting", r1=3.0, r2=2.0)),
-        controllers.TwistingSMC(3.0, 2.0, surface=Itself()),
-    )
+    ours = own(smc.law("twisting", r1=3.0, r2=2.0))
+    theirs = controllers.TwistingSMC(3.0, 2.0, surface=Itself())
     along(lambda e, de: ours(e, de)[0], controlled(theirs))
 
 
@@ -199,12 +196,14 @@ def test_twisting_agrees_when_theirs_is_handed_a_variable_of_relative_degree_2()
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_surfaces_agree(ours, theirs):
-    mine, other = own(ours), theirs()
+    mine = own(ours)
+    other = theirs()
     along(lambda e, de: mine(e, de)[0], lambda e, de: float(other.compute(e, de)))
 
 
 def test_the_global_surface_agrees():
-    ours, theirs = own(surface("global_", c=3.0, q=2.0)), surfaces.GlobalSurface(c=3.0, alpha=2.0)
+    ours = own(surface("global_", c=3.0, q=2.0))
+    theirs = surfaces.GlobalSurface(c=3.0, alpha=2.0)
     for k, (e, de) in enumerate(STATES.tolist()):
         assert ours(e, de, t=k * H)[0] == pytest.approx(
             float(theirs.compute(e, de, t=k * H)), abs=1e-12
@@ -212,17 +211,17 @@ def test_the_global_surface_agrees():
 
 
 def test_the_integral_of_a_pid_surface_agrees_but_for_one_sample():
-    ours, theirs = (
-        own(surface("pid", kp=3.0, ki=2.0)),
-        surfaces.PIDSurface(alpha=1.0, beta=3.0, gamma=2.0, dt=H),
-    )
+    ours = own(surface("pid", kp=3.0, ki=2.0))
+    theirs = surfaces.PIDSurface(alpha=1.0, beta=3.0, gamma=2.0, dt=H)
     along(lambda e, de: ours(e, de)[0] + 2.0 * H * e, theirs.compute)
 
 
 def estimated(ours, theirs, h, until):
     """Both estimates of the velocity of sin t: ours, theirs, (K,) each, from t = 0 on."""
     t = np.arange(0.0, until, h)
-    gains, memory, rows = python_controller.gains_of(ours), np.zeros(ours.memory), []
+    gains = python_controller.gains_of(ours)
+    memory = np.zeros(ours.memory)
+    rows = []
     for x in np.sin(t):
         out = ours.function(Reading(h, float(x), 0.0), gains, memory)
         theirs.estimate(0.0, [float(x)], 0.0)

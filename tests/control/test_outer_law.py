@@ -49,7 +49,8 @@ def test_an_observer_knows_the_acceleration_that_the_motor_can_give():
     """Where the motors saturate for long, its estimate stays bounded; told of no bound it would
     swing up.
     """
-    law, changes = smc.law("adrc", wc=20.0, w=60.0), {"x0": [1.0, 0.5], "duration": 6.0}
+    law = smc.law("adrc", wc=20.0, w=60.0)
+    changes = {"x0": [1.0, 0.5], "duration": 6.0}
     trace = run(law, **changes, control_period=1e-3)
     assert (np.abs(trace.u) == 6.0).sum() > 200  # the limit of its motors
     assert np.abs(trace.x[-1]).max() < 1e-3

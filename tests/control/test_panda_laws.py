@@ -36,7 +36,8 @@ def moving(period, **fields):
 
 def test_computed_torque_with_the_perfect_model_follows_minimum_jerk_to_a_microradian():
     """What remains is that u is held between samples: the error is proportional to the period."""
-    coarse, fine = moving(1e-3), moving(5e-4)
+    coarse = moving(1e-3)
+    fine = moving(5e-4)
     assert fine < 1e-6
     assert coarse / fine == pytest.approx(2.0, rel=0.1)
     assert moving(5e-4, mismatch={"mass": 1.01}) > 5e-6
@@ -44,7 +45,8 @@ def test_computed_torque_with_the_perfect_model_follows_minimum_jerk_to_a_micror
 
 @pytest.mark.parametrize("name", ["observer_free_joint", "observer_free"])
 def test_without_gravity_compensation_gravity_over_lam_k1_remains(name):
-    lam, k1 = np.array([30.0, 400.0, 20.0, 150.0, 20.0, 20.0, 3.0]), 2.0
+    lam = np.array([30.0, 400.0, 20.0, 150.0, 20.0, 20.0, 3.0])
+    k1 = 2.0
     panda = smc.plant("panda")
     law = smc.law(name, lam=lam, k1=k1)
     trace = smc.run(smc.Scenario(plant=panda, law=law, model="none", x0=panda.rest, duration=6.0))

@@ -25,7 +25,9 @@ JUMP = 4e-3  # of the range of u; the words of the fixed-point law make steps of
 @functools.cache
 def changes(name):
     """The fields of the measurement that change u or memory of a law in any of many states."""
-    law, found, random = smc.law(name), set(), np.random.default_rng(0)
+    law = smc.law(name)
+    found = set()
+    random = np.random.default_rng(0)
     for _ in range(40):
         numbers = random.normal(size=len(Measurement._fields))
         model, has_surface = random.choice([0.0, 1.0], size=2)
@@ -86,15 +88,14 @@ def jump(name, model):
     """The largest step of u, as a share of its range, along short dense lines through states where
     laws switch.
     """
-    law, random = smc.law(name), np.random.default_rng(1)
+    law = smc.law(name)
+    random = np.random.default_rng(1)
     slope = next((value for gain, value in law.gains.items() if gain in ("c", "k1")), 2.5)
     on_surface = [(0.4, -0.4 * slope, 0.0), (-0.3, 0.3 * slope, 0.0)]
     centres = [(0.0, 0.0, 0.0), *on_surface, (2.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0)]
-    along, common, worst = (
-        np.linspace(-1e-8, 1e-8, 101),
-        {"limit": 6.0, "model": model, "g": 1.1},
-        0.0,
-    )
+    along = np.linspace(-1e-8, 1e-8, 101)
+    common = {"limit": 6.0, "model": model, "g": 1.1}
+    worst = 0.0
     for centre, fresh in itertools.product(centres, (True, False)):
         memory = np.zeros(law.memory)
         for k in range(20):  # what a run would leave in it
@@ -126,7 +127,8 @@ def arrival(name):
     """From 1, how long s (or e) takes from 0.01 to 0.001, over how long from 0.1 to 0.01: 1 if it
     falls as exp(-t).
     """
-    law, known = smc.law(name), catalogue()[name]
+    law = smc.law(name)
+    known = catalogue()[name]
     h = 1e-4 if known.relative_degree == 1 else 5e-4
     ran = plant_a(law, rest, h=h, duration=2.0)
     if known.relative_degree > 1:

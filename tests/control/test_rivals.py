@@ -42,7 +42,8 @@ def call(law, memory, **fields):
 
 def answer(law, memory, omega, h, samples=80_000):
     """The complex factor from e = cos(omega t) to the law's u, once it has settled."""
-    t, gains = h * np.arange(samples), python_controller.gains_of(law)
+    t = h * np.arange(samples)
+    gains = python_controller.gains_of(law)
     u = np.array(
         [
             law.function(measured(e=math.cos(omega * one), de=0.0, dt=h), gains, memory)[0]
@@ -107,8 +108,11 @@ def test_an_observer_that_knows_the_plant_is_right_about_it(name, cell, truth):
     """The estimate of no disturbance, and the prediction of e, are wrong by what changes within a
     sample.
     """
-    a1, a2, b = 5.0, -4.0, 0.4
-    law, wrong = smc.law(name, a1=a1, a2=a2, b=b), []
+    a1 = 5.0
+    a2 = -4.0
+    b = 0.4
+    law = smc.law(name, a1=a1, a2=a2, b=b)
+    wrong = []
     for h in (1e-3, 1e-4):
         run = plant_b(law, x=(0.1, 0.0), g=b, rates=(a1, a2), limit=2.0, h=h, duration=2.0)
         wrong.append(np.abs(run.memory[1:, cell] - truth * run.x[1:, 0]).max() / 0.1)
@@ -125,11 +129,14 @@ def test_with_the_model_the_law_controls_the_acceleration(name, limit):
 
     Where u has a bound, f is r'', so that the bound on v is symmetric and g times as large.
     """
-    plain, rng = bounded(name), np.random.default_rng(0)
+    plain = bounded(name)
+    rng = np.random.default_rng(0)
     informed = smc.law(
         name, **{key: value for key, value in plain.gains.items() if key not in UNIT}
     )
-    own, other, g = np.zeros(plain.memory), np.zeros(plain.memory), -2.0
+    own = np.zeros(plain.memory)
+    other = np.zeros(plain.memory)
+    g = -2.0
     for _ in range(200):
         e, de, f = rng.normal(size=3)
         ddr = rng.normal() if limit == math.inf else f
@@ -158,7 +165,8 @@ def test_a_law_of_the_linear_theory_is_for_plants_that_have_one():
 
 def test_adrc_gives_the_control_of_a_foreign_implementation(vectors):
     for case in vectors["adrc"]:
-        law, memory = smc.law("adrc", wc=case["wc"], w=case["w"], b=case["b"]), np.zeros(5)
+        law = smc.law("adrc", wc=case["wc"], w=case["w"], b=case["b"])
+        memory = np.zeros(5)
         for k, (e, u) in enumerate(zip(case["e"], case["u"], strict=True)):
             got = call(
                 law,
@@ -176,9 +184,15 @@ def test_adrc_is_a_pid_controller_with_a_filter_of_second_order():
     """Its answer to e = cos(omega t), at a short period, is that of the transfer function in its
     docstring.
     """
-    wc, w, b, omega, h = 3.0, 8.0, 0.7, 5.0, 1e-4
-    law, memory = smc.law("adrc", wc=wc, w=w, b=b), np.zeros(5)
-    got, p = answer(law, memory, omega, h), 1j * omega
+    wc = 3.0
+    w = 8.0
+    b = 0.7
+    omega = 5.0
+    h = 1e-4
+    law = smc.law("adrc", wc=wc, w=w, b=b)
+    memory = np.zeros(5)
+    got = answer(law, memory, omega, h)
+    p = 1j * omega
     top = (
         wc**2 * w**3
         + (3 * wc**2 * w**2 + 2 * wc * w**3) * p
@@ -193,9 +207,14 @@ def test_adrc_is_a_pid_controller_with_a_filter_of_second_order():
 
 def test_pd_observer_is_incremental_dynamic_inversion():
     """u = F(u) + (v - F(e'')) / b, one filter F of first order on both."""
-    wc, l, b, h = 4.0, 30.0, 0.6, 1e-3
-    law, memory = smc.law("pd_observer", wc=wc, l=l, b=b), np.zeros(4)
-    share, rng = 1.0 - math.exp(-l * h), np.random.default_rng(0)
+    wc = 4.0
+    l = 30.0
+    b = 0.6
+    h = 1e-3
+    law = smc.law("pd_observer", wc=wc, l=l, b=b)
+    memory = np.zeros(4)
+    share = 1.0 - math.exp(-l * h)
+    rng = np.random.default_rng(0)
     of_u = of_a = last = u = 0.0
     for k in range(300):
         e, de = rng.normal(size=2)
@@ -214,20 +233,23 @@ def test_pd_observer_is_incremental_dynamic_inversion():
 @pytest.mark.parametrize("q", [(1.0, 10.0, 2.0), (300.0, 5.0, 0.0), (1e-3, 100.0, 16.0)])
 def test_lqi_solves_its_riccati_equation(plant, q):
     a1, a2, b = plant
-    A, B = (
-        np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]]),
-        np.array([[0.0], [0.0], [b]]),
-    )
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]])
+    B = np.array([[0.0], [0.0], [b]])
     ki, k1, k2 = (B.T @ solve_continuous_are(A, B, np.diag(q), np.eye(1)))[0]
     np.testing.assert_allclose(lqi.feedback(a1, a2, b, *q), (k1, k2, ki), rtol=1e-9)
 
 
 def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
     """At a constant reading u - sat(u) tends to -ki e tt, by Euler's factor 1 - dt / tt a sample."""
-    q0, tt, e, h = 9.0, 0.4, 2.0, 1e-3
-    law, memory = smc.law("lqi", q0=q0, tt=tt, **UNIT), np.zeros(5)
+    q0 = 9.0
+    tt = 0.4
+    e = 2.0
+    h = 1e-3
+    law = smc.law("lqi", q0=q0, tt=tt, **UNIT)
+    memory = np.zeros(5)
     asked = [called(law, measured(e=e, de=0.0, dt=h, limit=1.0), memory)[0] for _ in range(3000)]
-    end, k = -math.sqrt(q0) * e * tt, np.arange(3000)
+    end = -math.sqrt(q0) * e * tt
+    k = np.arange(3000)
     beyond = np.array(asked) + 1.0
     np.testing.assert_allclose(beyond, end + (beyond[0] - end) * (1.0 - h / tt) ** k, rtol=1e-9)
 
@@ -256,24 +278,29 @@ def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, 
     One of 200 jumps to another state may end before its solution, as the law's docstring says.
     Small moves of e, de and d, some of them out of the active set, follow each jump.
     """
-    rng, n = np.random.default_rng(0), mpc.MOVES
+    rng = np.random.default_rng(0)
+    n = mpc.MOVES
     law = smc.law("mpc", q1=q1, q2=q2, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
-    memory, missed, state, limit = np.zeros(mpc.SLOTS), 0, rng.normal(size=3), 1.0
+    memory = np.zeros(mpc.SLOTS)
+    missed = 0
+    state = rng.normal(size=3)
+    limit = 1.0
     for k in range(800):
         if k % 4 == 0:
-            state, limit = rng.normal(size=3), 10.0 ** rng.uniform(-1, 1.5)
+            state = rng.normal(size=3)
+            limit = 10.0 ** rng.uniform(-1, 1.5)
         else:
             state[k % 4 - 1] += 10.0 ** rng.uniform(-2, 0) * rng.normal()
         e, de, d = state.tolist()
         memory[:5] = 1.0, e, de, d, 0.0
         u = call(law, memory, e=e, de=de, dt=1e-12, limit=limit)
         us = -d / plant[2]
-        H, rows = (
-            memory[mpc.HESSIAN : mpc.FACTOR].reshape(n, n),
-            memory[mpc.PLAN : mpc.GRADIENT].reshape(n, mpc.ROW),
-        )
+        H = memory[mpc.HESSIAN : mpc.FACTOR].reshape(n, n)
+        rows = memory[mpc.PLAN : mpc.GRADIENT].reshape(n, mpc.ROW)
         g = rows[:, mpc.BY_E - mpc.PLAN] * e + rows[:, mpc.BY_DE - mpc.PLAN] * de
-        v, factor, index = np.zeros(n), np.zeros((n, n + 7)), np.zeros(n, np.int32)
+        v = np.zeros(n)
+        factor = np.zeros((n, n + 7))
+        index = np.zeros(n, np.int32)
         rank = mujoco.mju_boxQP(
             v,
             factor,
@@ -305,7 +332,8 @@ def test_only_the_ratios_of_mpc_s_weights_matter():
 
 def test_mpc_keeps_to_bounds_that_the_nominal_model_moves():
     """With f = 3 and g = 2 the law's own input, the acceleration, lies in 3 +- 2 u_max."""
-    law, memory = smc.law("mpc", **UNIT), np.zeros(mpc.SLOTS)
+    law = smc.law("mpc", **UNIT)
+    memory = np.zeros(mpc.SLOTS)
     assert call(law, memory, e=50.0, de=0.0, f=3.0, g=2.0, model=1.0, limit=1.5) == -1.5
     plan = memory[mpc.PLAN : mpc.GRADIENT : mpc.ROW]
     assert plan.min() >= 3.0 - 3.0 - 1e-12
@@ -325,10 +353,8 @@ def shaped(a1, a2, b, k, wi):
 @pytest.mark.parametrize(("k", "wi"), [(20.0, 0.5), (4.0, 2.0), (100.0, 5.0)])
 def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
     A, B, C = shaped(*plant, k, wi)
-    X, Z = (
-        solve_continuous_are(A, B, C.T @ C, np.eye(1)),
-        solve_continuous_are(A.T, C.T, B @ B.T, np.eye(1)),
-    )
+    X = solve_continuous_are(A, B, C.T @ C, np.eye(1))
+    Z = solve_continuous_are(A.T, C.T, B @ B.T, np.eye(1))
     gamma = 1.1 * math.sqrt(1.0 + np.linalg.eigvals(Z @ X).real.max())
     F = -np.linalg.solve((1.0 - gamma**-2) * np.eye(3) - gamma**-2 * X @ Z, np.eye(3)).T @ B
     got = loop_shaping.design(*plant, k, wi)
@@ -339,19 +365,27 @@ def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
 
 def test_loop_shaping_s_law_answers_as_its_controller():
     """Sampled shortly and unsaturated, u over e is k (1 + wi / p) times the design's controller."""
-    h, omega = 1e-4, 6.0
-    k, wi, plant = 20.0, 0.5, (1.0, -0.2, 1.0)
+    h = 1e-4
+    omega = 6.0
+    k = 20.0
+    wi = 0.5
+    plant = (1.0, -0.2, 1.0)
     law = smc.law("loop_shaping", k=k, wi=wi, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
     got = answer(law, np.zeros(loop_shaping.SLOTS), omega, h)
     A, B, C = shaped(*plant, k, wi)
     FH = loop_shaping.design(*plant, k, wi)
-    F, Hs, p = np.array([FH[:3]]), np.array([FH[3:6]]).T, 1j * omega
+    F = np.array([FH[:3]])
+    Hs = np.array([FH[3:6]]).T
+    p = 1j * omega
     Ks = (F @ np.linalg.solve(p * np.eye(3) - A - B @ F - Hs @ C, -Hs)).item()
     assert got == pytest.approx(k * (1.0 + wi / p) * Ks, rel=5e-3)
 
 
 def test_loop_shaping_s_observer_is_sampled_exactly():
-    k, wi, plant, h = 20.0, 0.5, (5.0, -1.0, 0.4), 0.05
+    k = 20.0
+    wi = 0.5
+    plant = (5.0, -1.0, 0.4)
+    h = 0.05
     law = smc.law("loop_shaping", k=k, wi=wi, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
     memory = np.zeros(loop_shaping.SLOTS)
     called(law, measured(e=0.1, de=0.0, dt=h), memory)

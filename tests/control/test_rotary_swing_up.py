@@ -17,8 +17,11 @@ def surface(plant, torque_per_command=1.0, back_emf=0.0):
     """b'P of the Riccati equation upright, over the weight of u, 2000 for a torque, on a level
     table.
     """
-    p, rest, e = SimpleNamespace(**plant.parameters | {"tx": 0.0, "ty": 0.0}), np.zeros(2), 1e-6
-    A, b = np.zeros((4, 4)), np.zeros((4, 1))
+    p = SimpleNamespace(**plant.parameters | {"tx": 0.0, "ty": 0.0})
+    rest = np.zeros(2)
+    e = 1e-6
+    A = np.zeros((4, 4))
+    b = np.zeros((4, 1))
     A[:2, 2:] = np.eye(2)
     for i in range(2):
         b[2 + i] = torque_per_command * plant.nominal(rest, rest, i, p)[1]
@@ -38,12 +41,14 @@ def surface(plant, torque_per_command=1.0, back_emf=0.0):
 
 def test_the_default_surface_solves_the_riccati_equation_of_the_default_plant():
     plant = smc.plant("furuta")
-    p, rest = SimpleNamespace(**plant.parameters), np.zeros(2)
+    p = SimpleNamespace(**plant.parameters)
+    rest = np.zeros(2)
     gains = smc.law("rotary_swing_up").gains
     np.testing.assert_allclose(
         [gains[name] for name in ("c1", "c2", "c3", "c4")], surface(plant), rtol=1e-5
     )
-    inertia, lever = p.Jc + p.m * p.l**2, p.m * p.grav * p.l
+    inertia = p.Jc + p.m * p.l**2
+    lever = p.m * p.grav * p.l
     assert gains["w0"] == pytest.approx(np.sqrt(lever / inertia), rel=1e-6)
     assert gains["J"] == pytest.approx(1.0 / plant.nominal(rest, rest, 0, p)[1], rel=1e-3)
 

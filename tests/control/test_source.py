@@ -15,7 +15,8 @@ from smc_mujoco.control.law import law_function
 
 pytestmark = pytest.mark.quick
 
-PLANT, LAW = "inverted_pendulum", "super_twisting"
+PLANT = "inverted_pendulum"
+LAW = "super_twisting"
 
 
 @law_function(gains={"k": 2.0})
@@ -66,7 +67,8 @@ def test_a_law_is_the_users_only_with_gains_of_the_user():
 
 
 def test_the_search_is_that_of_the_file():
-    law, tuning = gain_sets.law("duffing", "classical"), gain_sets.tuned("duffing", "classical")
+    law = gain_sets.law("duffing", "classical")
+    tuning = gain_sets.tuned("duffing", "classical")
     spread = max(tuning.objectives) / min(tuning.objectives) - 1.0
     assert law.source.search == source.Search(
         rule=tuning.rule, evaluations=tuning.evaluations, searches=len(tuning.sets), spread=spread
@@ -102,7 +104,8 @@ def test_replaced_gains_are_the_users():
 
 
 def test_gains_by_channel_are_of_their_common_source():
-    default, shipped = smc.law("pid"), gain_sets.law("duffing", "pid")
+    default = smc.law("pid")
+    shipped = gain_sets.law("duffing", "pid")
     both = by_channel(
         [
             shipped,

@@ -53,11 +53,14 @@ def test_eq_is_the_acceleration_that_keeps_s(name):
     """From any state, one short step under e'' = eq changes s by O(h^2), and under another e'' by
     O(h).
     """
-    slid, h, random = surface(name), 1e-6, np.random.default_rng(0)
+    slid = surface(name)
+    h = 1e-6
+    random = np.random.default_rng(0)
     for _ in range(100):
         e, de = np.sign(random.normal(size=2)) * random.uniform(0.2, 1.5, size=2)
         for extra in (0.0, 1.0):
-            memory, t = np.zeros(slid.memory), 0.0
+            memory = np.zeros(slid.memory)
+            t = 0.0
             for before in random.normal(size=(3, 2)):
                 at(slid, memory, *before, t=t, h=h)
                 t += h

@@ -40,7 +40,8 @@ def converted(component, system):
 
 def called(component, ys):
     """What the component returns at each sample, (k, 2)."""
-    memory, gains = np.zeros(component.memory), type("Gains", (), dict(component.gains))
+    memory = np.zeros(component.memory)
+    gains = type("Gains", (), dict(component.gains))
     return np.array([component.function(y, gains, memory) for y in ys])
 
 
@@ -54,7 +55,8 @@ def test_surface_does_the_same_in_every_system_of_units(name):
 
     plain = called(surface.surface(name), seen(1.0, 1.0))
     for system in ALIKE.get(name, SYSTEMS):
-        X, T = system["X"], system["T"]
+        X = system["X"]
+        T = system["T"]
         s, eq = called(converted(surface.surface(name), system), seen(X, T)).T
         ratio = s[-1] / plain[-1, 0]  # s has its own unit
         np.testing.assert_allclose(s, plain[:, 0] * ratio, rtol=1e-9, atol=1e-12)
@@ -75,7 +77,8 @@ def test_estimator_does_the_same_in_every_system_of_units(name, gains):
     one = estimator.estimator(name, **gains)
     plain = called(one, seen(1.0, 1.0)).reshape(len(WAY), -1)
     for system in SYSTEMS:
-        X, T = system["X"], system["T"]
+        X = system["X"]
+        T = system["T"]
         units = [X / T, X / T**2][: plain.shape[1]]
         found = called(converted(one, system), seen(X, T)).reshape(len(WAY), -1)
         np.testing.assert_allclose(found, plain * units, rtol=1e-9, atol=1e-9)

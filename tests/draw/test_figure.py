@@ -149,9 +149,9 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
         (dataclasses.replace(calm[0], reaction=spikes), "|reaction| up to 900 N"),
         (calm[0], ""),
     ):
-        ax, shown = (
-            Figure().add_subplot(),
-            types.SimpleNamespace(traces=[first, calm[1]], group=groups(first.scenario.plant)[0]),
+        ax = Figure().add_subplot()
+        shown = types.SimpleNamespace(
+            traces=[first, calm[1]], group=groups(first.scenario.plant)[0]
         )
         panels.clip_impacts(ax, shown, ["r", "b"])  # pyright: ignore[reportArgumentType]
         # pyright: ignore
@@ -207,7 +207,8 @@ def test_long_and_odd_labels_stay_inside(pair, tmp_path):
 
 
 def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
-    t, y = np.arange(5) * 0.1, np.array([[0.0], [4.0], [2.0], [6.0], [1.0]])
+    t = np.arange(5) * 0.1
+    y = np.array([[0.0], [4.0], [2.0], [6.0], [1.0]])
     e = decimate.windows(t, y, np.array([-0.05, 0.0, 0.25, 0.26, 0.4]))
     assert e.low.ravel().tolist() == [0.0, 0.0, 2.0, 1.0]
     assert e.high.ravel().tolist() == [0.0, 4.0, 2.0, 6.0]
@@ -215,7 +216,8 @@ def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
 
 
 def test_chattering_is_drawn_as_its_mean_without_teeth():
-    t, rng = np.arange(10_001) * 1e-3, np.random.default_rng(0)
+    t = np.arange(10_001) * 1e-3
+    rng = np.random.default_rng(0)
     switching = np.where(
         np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0
     )  # each value held 1 sample, or more
@@ -250,7 +252,9 @@ def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests
     def switching(count, size=1.0):
         return np.resize([size, -size], count)
 
-    rest, low, high = np.zeros(50), np.full(50, -1.0), np.ones(50)
+    rest = np.zeros(50)
+    low = np.full(50, -1.0)
+    high = np.ones(50)
     assert parts(rest[:10], switching(100), rest[:40]) == [(0, 150)]
     assert parts(rest[:11], switching(100), rest[:41]) == [(11, 111)]
     assert parts(switching(40), low[:39], switching(40)) == [(0, 119)]
@@ -300,7 +304,8 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
     (part,) = decimate.chattering_parts(u, 40)
     assert (part.start, part.stop) == (300, 300 + len(within))
-    mean, line = triangle(within, 20), decimate.smooth(u, 40)
+    mean = triangle(within, 20)
+    line = decimate.smooth(u, 40)
     np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)
     np.testing.assert_allclose(
         line[300:319], mean[0]
@@ -330,7 +335,8 @@ def test_the_line_is_the_same_read_backwards(seed):
 
 
 def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
-    k, noise = np.arange(2001), np.random.default_rng(0).normal(0.0, 0.03, 2001)
+    k = np.arange(2001)
+    noise = np.random.default_rng(0).normal(0.0, 0.03, 2001)
     for y in (
         np.exp(-k / 40) + noise,
         np.exp((k - 2000) / 40) + noise,
@@ -359,10 +365,8 @@ def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
 def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(
     pair, tmp_path
 ):
-    alone, listed = (
-        figure(pair[0], tmp_path / "deep" / "lam_0.5", None),
-        figure(pair[:1], tmp_path / "b.png", None),
-    )
+    alone = figure(pair[0], tmp_path / "deep" / "lam_0.5", None)
+    listed = figure(pair[:1], tmp_path / "b.png", None)
     assert [path.name for path in (*alone, *listed)] == [
         "lam_0.5.svg",
         "lam_0.5.png",
@@ -396,7 +400,8 @@ def test_the_close_up_shows_no_round_off(pair, level):
 
 def test_where_a_joint_is_is_drawn_as_it_is(pair):
     """x that chatters has no mean for a line: the legend speaks of none."""
-    t, ripple = pair[0].t, 0.01 * np.where(np.arange(len(pair[0].t)) % 2, 1.0, -1.0)
+    t = pair[0].t
+    ripple = 0.01 * np.where(np.arange(len(pair[0].t)) % 2, 1.0, -1.0)
     x = np.exp(-t / 0.02) + ripple
     for name in ("x", "spread"):
         _, y = panels.curve(pair[0], x, name)

@@ -21,7 +21,8 @@ from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation.trace import ARRAYS
 
-PAGE, COLUMN = "ieee-page", "ieee-column"
+PAGE = "ieee-page"
+COLUMN = "ieee-column"
 TEN = (
     "observer_free",
     "classical",
@@ -46,10 +47,8 @@ def one() -> smc.Trace:
 def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
     """The trace as if another law had made it, a little otherwise."""
     scenario = dataclasses.replace(trace.scenario, law=smc.law(law))
-    x, changed = (
-        trace.r + factor * (trace.x - trace.r),
-        {name: factor * getattr(trace, name) for name in "vus"},
-    )
+    x = trace.r + factor * (trace.x - trace.r)
+    changed = {name: factor * getattr(trace, name) for name in "vus"}
     return dataclasses.replace(trace, scenario=scenario, x=x, **changed)
 
 
@@ -270,7 +269,8 @@ def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
 
 
 def test_a_reference_that_moves_is_in_the_phase_portrait_without_its_jumps(one):
-    sine, step = 2.0 * np.sin(3.0 * one.t)[:, None], np.where(one.t < 0.5, 0.0, 1.0)[:, None]
+    sine = 2.0 * np.sin(3.0 * one.t)[:, None]
+    step = np.where(one.t < 0.5, 0.0, 1.0)[:, None]
     (ax,) = figure(dataclasses.replace(one, r=sine), panels=["phase"]).axes
     (line,) = [line for line in ax.lines if line.get_gid() == panels.REFERENCE]
     assert np.abs(line.get_ydata()).max() == pytest.approx(6.0, rel=1e-3)
@@ -506,7 +506,9 @@ class Rows:
         mixed=False,
         tiny=False,
     ):
-        self.still, self.mixed, self.tiny = still, mixed, tiny
+        self.still = still
+        self.mixed = mixed
+        self.tiny = tiny
         cells = itertools.product(
             ("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds)
         )

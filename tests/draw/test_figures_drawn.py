@@ -111,11 +111,10 @@ def lags():
     """Two laws whose amplitudes are equal at a lag of 50 ms; half the step changes the run at 10
     ms.
     """
-    times, laws = (
-        (0.002, 0.01, 0.05),
-        {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)},
-    )
-    sizes, runs = {}, {f"{tau:g} s": {} for tau in times}
+    times = (0.002, 0.01, 0.05)
+    laws = {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)}
+    sizes = {}
+    runs = {f"{tau:g} s": {} for tau in times}
     for label, (law, factor, power) in laws.items():
         for tau in times:
             trace = duffing(law, actuator=smc.Lag(tau), duration=0.01)
@@ -352,7 +351,8 @@ def test_a_figure_has_the_panels_that_its_mechanism_has_in_their_units_and_no_ot
 
 def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
     traces = machines()
-    page, colours = figure(traces), style.law_colours([trace.scenario.law for trace in traces])
+    page = figure(traces)
+    colours = style.law_colours([trace.scenario.law for trace in traces])
     ends = [1.2, 1.2, 0.699]
     for label, values in {
         "position x (m)": "x",

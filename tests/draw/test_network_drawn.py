@@ -27,7 +27,8 @@ def test_no_drawn_range_is_smaller_than_the_data_s(n):
     ax = Figure().subplots()
     panels.over_time(ax, panel, ["#0072B2"])
     curves = [np.asarray(line.get_ydata(), float) for line in ax.lines if len(line.get_xdata()) > 2]
-    lowest, highest = min(curve.min() for curve in curves), max(curve.max() for curve in curves)
+    lowest = min(curve.min() for curve in curves)
+    highest = max(curve.max() for curve in curves)
     assert (lowest, highest) == pytest.approx((trace.x.min(), trace.x.max()), abs=1e-3)
     assert len(curves) >= min(n, panels.MAX_DRAWN_CHANNELS)
     thick = max(ax.lines, key=lambda line: line.get_linewidth())

@@ -32,7 +32,8 @@ def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_long
     handles = [Line2D([], [], label="law " * (1 + 7 * k % 5)) for k in range(count)]
     with style.page(width):
         labels, columns = page._legend(handles, width)
-        size, room = style.points(page.TEXT_SIZE), 72 * width - 16
+        size = style.points(page.TEXT_SIZE)
+        room = 72 * width - 16
         assert columns == 1 or wide(labels, columns, size) < room
         assert all(wide(labels, more, size) >= room for more in range(columns + 1, count + 1))
         longest = max(wide([label], 1, size) for label in labels)

@@ -43,7 +43,8 @@ def pareto(tunings, path) -> list:
 @pytest.fixture
 def page(monkeypatch) -> list[Figure]:
     """The pages that are drawn."""
-    drawn, write = [], pages.write
+    drawn = []
+    write = pages.write
     monkeypatch.setattr(
         pages, "write", lambda page, paths: (drawn.append(page), write(page, paths))[1]
     )
@@ -80,7 +81,8 @@ def test_a_front_is_the_best_that_was_tried_each_axis_has_its_unit_and_the_bette
 def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pair, page, tmp_path):
     pareto(pair, tmp_path / "fronts")
     (ax,) = page[0].axes
-    stairs, rings = ax.lines[0:4:2], ax.lines[1:4:2]
+    stairs = ax.lines[0:4:2]
+    rings = ax.lines[1:4:2]
     for tuned, stair, ring in zip(
         sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True
     ):

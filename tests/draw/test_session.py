@@ -44,7 +44,8 @@ def watch(session):
 def same(session, scenarios):
     """The session's samples are those of smc.run, to the bit."""
     for run, scenario in enumerate(scenarios):
-        trace, log = smc.run(scenario), session.log(run)
+        trace = smc.run(scenario)
+        log = session.log(run)
         assert len(log) == scenario.samples
         for name in ("x", "v", "u", "s", "d"):
             assert np.array_equal(log[name], getattr(trace, name)[: len(log)]), name
@@ -129,7 +130,8 @@ class Page:
     """A stand-in for Studio's, which tells the mouse's pull, N, in some frames only."""
 
     def __init__(self, pulls):
-        self.pulls, self.frame = pulls, 0
+        self.pulls = pulls
+        self.frame = 0
 
     def set_model(self, model, data):
         self.body = model.body("cart").id
@@ -144,7 +146,8 @@ class Page:
 
 
 def test_a_body_is_pushed_once_when_the_mouse_lets_go():
-    session, panel = Session([DUFFING]), types.SimpleNamespace(asked=queue.Queue())
+    session = Session([DUFFING])
+    panel = types.SimpleNamespace(asked=queue.Queue())
     panel.asked.put(lambda: session.save(Path("no/folder/view.py")))
     studio.show(session, Page({2: 1.0, 4: 3.0, 7: 0.0}), panel, lambda session: True)
     (push,) = session.scenarios[0].disturbance

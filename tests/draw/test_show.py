@@ -79,7 +79,8 @@ def test_frames_are_those_of_the_film_again_and_again(trace):
     frames = smc.film(trace, title="twice", **FILM)
     assert len(frames) == 5
     assert np.allclose(frames.clock.times, [0.0, 0.05, 0.1, 0.15, 0.2])
-    first, second = list(frames), list(frames)
+    first = list(frames)
+    second = list(frames)
     assert np.array_equal(first, second)
     assert first[0].shape == (180, 320, 3)
     assert not np.array_equal(first[0], first[-1])

@@ -90,9 +90,11 @@ def test_laws_of_a_dot_plot_that_share_a_mark_have_colours_that_nobody_mistakes(
 
 
 def test_a_law_has_one_colour_in_every_picture_unless_it_would_be_mistaken():
-    laws, kept = sorted(smc.laws()), 0
+    laws = sorted(smc.laws())
+    kept = 0
     for pair in itertools.combinations(laws, 2):
-        wanted, given = [style.law_colour(law) for law in pair], style.law_colours(pair)
+        wanted = [style.law_colour(law) for law in pair]
+        given = style.law_colours(pair)
         assert given[0] == wanted[0] or given[1] == wanted[1]
         assert style.law_colours(pair[::-1]) == given[::-1]
         assert (given == wanted) == (style.distance(*wanted) >= style.MIN_DISTANCE)
@@ -106,7 +108,8 @@ def test_in_a_picture_of_many_laws_only_those_change_that_would_be_mistaken_for_
 ):
     """New colours had pushed others out in turn: of 16 laws 11 changed, and 8 do now."""
     laws = random.Random(seed).sample(sorted(smc.laws()), 16)
-    wanted, given = [style.law_colour(law) for law in laws], style.law_colours(laws)
+    wanted = [style.law_colour(law) for law in laws]
+    given = style.law_colours(laws)
     kept = [colour for colour, its in zip(wanted, given, strict=True) if colour == its]
     for colour in set(wanted) - set(kept):
         assert min(style.distance(colour, other) for other in kept) < style.MIN_DISTANCE

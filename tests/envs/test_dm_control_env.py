@@ -71,7 +71,8 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
 def test_what_makes_a_mechanism_real_is_in_the_environment_too(changes):
     changes = {"duration": 0.3, "x0": 0.5} | changes
     environment = suite.load("inverted_pendulum", changes=changes)
-    trace, act = smc.run(run_of(environment.task.setting, LAW)), smc.envs.agent(LAW, environment)
+    trace = smc.run(run_of(environment.task.setting, LAW))
+    act = smc.envs.agent(LAW, environment)
     for _ in range(2):  # nothing is left of the episode before
         assert np.abs(driven_by_dm(environment, act) - columns(trace)).max() < 1e-9
 
@@ -89,7 +90,8 @@ def test_an_agent_has_the_memories_model_surface_and_estimator_of_its_law(law, f
     environment = suite.load("duffing", "track", changes={"duration": 0.2, "x0": 0.7})
     trace = smc.run(run_of(environment.task.setting, smc.law(law), fields))
     act = smc.envs.agent(law, environment, **fields)
-    first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
+    first = driven_by_dm(environment, act)
+    second = driven_by_dm(environment, act)
     assert np.abs(first - columns(trace)).max() < 1e-9
     assert np.array_equal(first, second)  # nothing is left of the episode before
 
@@ -104,7 +106,8 @@ def test_an_agent_with_a_model_of_coupled_channels_starts_afresh_too():
     act = smc.envs.agent(
         smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal"
     )
-    first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
+    first = driven_by_dm(environment, act)
+    second = driven_by_dm(environment, act)
     assert np.array_equal(first, second)
 
 
@@ -145,7 +148,8 @@ def test_making_an_environment_waits_for_runs_in_the_plain_loop():
 
 
 def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
-    found, random = Setting("duffing"), np.random.default_rng(0)
+    found = Setting("duffing")
+    random = np.random.default_rng(0)
     for x, v in random.normal(scale=(1.0, 5.0), size=(20, 2)):
         calm = rewards.tolerance(v, margin=5.0)
         expected = rewards.tolerance(x, margin=1.0) * (4.0 + calm) / 5.0
@@ -232,7 +236,8 @@ def test_writing_into_an_observation_changes_nothing():
 class Checked(test_utils.EnvironmentTestMixin):
     """dm_env's own tests; `make_action_sequence` goes beyond an episode's end."""
 
-    plant, task = "duffing", "regulate"
+    plant = "duffing"
+    task = "regulate"
 
     def make_object_under_test(self, **unused_kwargs):
         return suite.load(self.plant, self.task, random=0, changes={"duration": 0.015})
@@ -257,7 +262,8 @@ def test_it_runs_in_the_runtime_of_dm_control_s_viewer():
     from dm_control.viewer import runtime
 
     environment = suite.load("duffing", random=0)
-    shown, faults = runtime.Runtime(environment, smc.envs.agent(LAW, environment)), []
+    shown = runtime.Runtime(environment, smc.envs.agent(LAW, environment))
+    faults = []
     shown.on_error += faults.append
     for _ in range(3):
         shown.tick(0.02, paused=False)
@@ -283,10 +289,12 @@ def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
         "flat_observation": True,
     }
     theirs = {"random": 3, "time_limit": 0.2}, {"control_timestep": 0.02, "flat_observation": True}
-    one, other = suite.load("duffing", "track", *theirs), suite.load("duffing", "track", **ours)
+    one = suite.load("duffing", "track", *theirs)
+    other = suite.load("duffing", "track", **ours)
     assert one.control_timestep() == 0.02
     for k in range(12):
-        first, second = one.step([0.5]), other.step([0.5])
+        first = one.step([0.5])
+        second = other.step([0.5])
         assert (
             first.observation["observations"].tolist()
             == second.observation["observations"].tolist()
@@ -308,7 +316,9 @@ def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
 )
 def test_an_environment_says_what_it_takes_and_gives(plant, task, sizes):
     one = suite.load(plant, task, random=0, changes={"duration": 0.05, "control_period": 0.01})
-    first, action, discount = one.reset(), one.action_spec(), one.discount_spec()
+    first = one.reset()
+    action = one.action_spec()
+    discount = one.discount_spec()
     assert (action.shape, action.minimum, action.maximum, action.dtype) == (
         (1,),
         -1.0,

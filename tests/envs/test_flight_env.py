@@ -49,7 +49,8 @@ def test_thrusts_of_a_run_as_actions_give_its_motion():
         assert (terminated, truncated) == (False, k == len(trace.t) - 2)
     assert np.abs(trace.e[:, :3]).max() > 0.1
     counted = [0, 1, 2, 5]
-    e, w = info["error"][counted], observation[6:12] - observation[18:24]
+    e = info["error"][counted]
+    w = observation[6:12] - observation[18:24]
     wanted = Rotation.from_rotvec(observation[15:18]) * Rotation.identity()
     w[3:] = observation[9:12] - (Rotation.from_rotvec(observation[3:6]).inv() * wanted).apply(
         observation[21:24]

@@ -40,7 +40,8 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(1))
 def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
-    many, random = BatchEnv(plant, 3, task, SHORT), np.random.default_rng(0)
+    many = BatchEnv(plant, 3, task, SHORT)
+    random = np.random.default_rng(0)
     singles = [PlantEnv(plant, task, SHORT) for _ in range(3)]
     observations, _ = many.reset(seed=5)
     assert np.array_equal(observations, [e.reset(seed=5 + i)[0] for i, e in enumerate(singles)])
@@ -64,10 +65,8 @@ def test_friction_and_drives_hold_in_a_batch_too(drives):
         "actuator": (*drives, smc.Backlash(0.01)),
         "duration": 0.1,
     }
-    many, single = (
-        BatchEnv("inverted_pendulum", 2, changes=changes),
-        PlantEnv("inverted_pendulum", changes=changes),
-    )
+    many = BatchEnv("inverted_pendulum", 2, changes=changes)
+    single = PlantEnv("inverted_pendulum", changes=changes)
     for _ in range(2):  # nothing is left of the episode before
         many.reset(seed=0)
         single.reset(seed=0)
@@ -93,7 +92,8 @@ class Giving(Batch):
 def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypatch):
     changes = {"actuator": (smc.Lag(0.01), smc.Lag(0.02)), "duration": 0.1, "control_period": 0.05}
     monkeypatch.setattr("smc_mujoco.envs.vector_env.Batch", Giving)
-    many, single = BatchEnv("cart_pole", 2, changes=changes), PlantEnv("cart_pole", changes=changes)
+    many = BatchEnv("cart_pole", 2, changes=changes)
+    single = PlantEnv("cart_pole", changes=changes)
     many.reset(seed=0)
     single.reset(seed=0)
     o, _, terminated, *_ = many.step([[0.5], [0.5]])
@@ -104,7 +104,8 @@ def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypa
 
 def test_an_agent_that_joins_an_episode_late_has_no_old_memory():
     one = PlantEnv("duffing", changes={"x0": 0.5, "duration": 0.1})
-    act, episodes = smc.envs.agent("adaptive", one), []
+    act = smc.envs.agent("adaptive", one)
+    episodes = []
     for _ in range(2):
         one.reset(seed=0)
         observation = one.step([0.0])[0]
@@ -154,8 +155,10 @@ FLOOR = """
 
 def test_a_model_of_one_s_own_keeps_its_floor_in_a_batch(tmp_path):
     (tmp_path / "arm.xml").write_text(FLOOR)
-    arm, changes = smc.plant_from(tmp_path / "arm.xml", ["a"]), {"x0": 0.6, "u_max": 5.0}
-    many, single = BatchEnv(arm, 2, changes=changes), PlantEnv(arm, changes=changes)
+    arm = smc.plant_from(tmp_path / "arm.xml", ["a"])
+    changes = {"x0": 0.6, "u_max": 5.0}
+    many = BatchEnv(arm, 2, changes=changes)
+    single = PlantEnv(arm, changes=changes)
     many.reset(seed=0)
     single.reset(seed=0)
     for _ in range(500):
@@ -179,7 +182,8 @@ def test_a_batch_resets_as_gymnasium_s_own_vector_does():
     ours = BatchEnv("duffing", 3, "track", changes)
     assert ours.metadata["autoreset_mode"] is theirs.metadata["autoreset_mode"]
     same(theirs.reset(seed=[3, 4, 5]), ours.reset(seed=[3, 4, 5]))
-    random, ends = np.random.default_rng(0), 0
+    random = np.random.default_rng(0)
+    ends = 0
     resets = {4: {"seed": 4, "options": {"x0": 0.25}}, 8: {}}
     for k in range(45):
         if k in resets:
@@ -230,10 +234,8 @@ def test_a_copy_that_is_over_begins_a_new_episode_and_the_others_go_on():
 
 def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space():
     changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
-    single, many = (
-        PlantEnv("inverted_pendulum", changes=changes),
-        BatchEnv("inverted_pendulum", 2, changes=changes),
-    )
+    single = PlantEnv("inverted_pendulum", changes=changes)
+    many = BatchEnv("inverted_pendulum", 2, changes=changes)
     single.reset(seed=0)
     assert not single.setting.diverged(
         single.x, single.v
@@ -266,7 +268,8 @@ def test_an_arm_tracks_a_reference_of_each_joint():
     """By default each swings about its pose at rest, within its range; or the user's own."""
     arm = smc.plant("panda")
     one = PlantEnv(arm, "track", {"duration": 2.0})
-    found, rest = one.setting, np.array(arm.rest)
+    found = one.setting
+    rest = np.array(arm.rest)
     observation, info = one.reset(seed=0)
     assert observation.shape == found.observe(rest, 0 * rest, 0).shape == (14 + 21,)
     np.testing.assert_array_equal(

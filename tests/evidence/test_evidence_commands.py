@@ -143,12 +143,14 @@ def repeated(name):
     twin = SimpleNamespace(
         name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated
     )
-    twin.columns, twin.members = SimpleNamespace(time="t"), lambda: {"set 1": twin}
+    twin.columns = SimpleNamespace(time="t")
+    twin.members = lambda: {"set 1": twin}
     if name == "stepper_furuta":
         twin.prediction = PREDICTION
     else:
         twin.prediction = None
-    twin.fit, twin.idle = (lambda _: {"x": 99.04, "u": 1.25}), (lambda _: {"x": -0.04, "u": 0.0})
+    twin.fit = lambda _: {"x": 99.04, "u": 1.25}
+    twin.idle = lambda _: {"x": -0.04, "u": 0.0}
     twin.fits = lambda _: [{"x": Fall(8.44), "u": -20.0}]
     twin.predictions = lambda _: [(f"{name} predicted", "measured", "times")]
     twin.replay = lambda record, start, duration: f"{name} from {start} for {duration}"
@@ -160,7 +162,8 @@ def predicted(twin, seeds, report):
     """Predictions in which the first law has its recorded figures, the second twice these, and the
     third falls.
     """
-    about, values = PREDICTION, {}
+    about = PREDICTION
+    values = {}
     for without in ("", "queue"):
         for i, law in enumerate(about.order):
             for condition in ("hold",) if without else about.conditions:

@@ -66,7 +66,8 @@ def test_an_action_in_si_units_is_the_fraction_times_u_max():
 @pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
 def test_an_object_that_keeps_state_is_fresh_in_each_run():
     law = smc.law_from(Adaptive(), name="mine", units="SI")
-    first, second = run(law), run(law)
+    first = run(law)
+    second = run(law)
     assert (law.name, first.failure) == ("mine", None)
     assert same(first, second)
     assert np.abs(first.u).max() > 0.1
@@ -78,10 +79,14 @@ class Twin:
     """
 
     def __init__(self, law, dt, limit):
-        self.law, self.dt, self.limit, self.memory = law, dt, limit, np.zeros(law.memory)
+        self.law = law
+        self.dt = dt
+        self.limit = limit
+        self.memory = np.zeros(law.memory)
 
     def compute(self, t, x, xref, plant=None, **kwargs):
-        e, de = x[0] - xref[0], x[1] - xref[1]
+        e = x[0] - xref[0]
+        de = x[1] - xref[1]
         y = Measurement(t, self.dt, *x, e, de, *xref, 0.0, 1.0, limit=self.limit)
         u, s = called(self.law, y, self.memory)
         return u, {"s": s}
@@ -92,7 +97,9 @@ def test_a_controller_of_opensmc_s_kind_is_a_law_in_one_line():
     where = {"reference": smc.Sine(0.3, 2.0), "plant": "pendulum_network"}
     own = smc.law("pid", kp=20.0, ki=5.0, kd=4.0)
     law = smc.law_from(Twin(own, 1e-3, 6.0))
-    first, again, truth = run(law, **where), run(law, **where), run(own, **where)
+    first = run(law, **where)
+    again = run(law, **where)
+    truth = run(own, **where)
     assert law.name == "Twin"
     np.testing.assert_allclose(first.u, truth.u, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(first.s, truth.s, rtol=1e-9, atol=1e-9)

@@ -38,7 +38,8 @@ def sampled(K: control.StateSpace) -> control.StateSpace:
 
 
 def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
-    A, B = np.array([[0.0, 1.0], [1.0, -0.2]]), np.array([[0.0], [1.0]])
+    A = np.array([[0.0, 1.0], [1.0, -0.2]])
+    B = np.array([[0.0], [1.0]])
     K = control.lqr(A, B, np.eye(2), np.eye(1))[0]
     law = smc.law_from(K)
     assert law.checked
@@ -79,7 +80,9 @@ def test_a_loop_is_that_of_python_control(name, discrete):
     trace = smc.run(scenario)
     G = control.sample_system(smc.design.state_space(LINEAR), H, "zoh")
     Kd = sampled(K)
-    x, w, found = np.array([0.3, -0.4]), np.zeros(Kd.nstates), []
+    x = np.array([0.3, -0.4])
+    w = np.zeros(Kd.nstates)
+    found = []
     for _ in trace.t:
         found.append(x[0])
         e = -x[:1] if one else -x
@@ -208,8 +211,10 @@ def test_a_and_b_are_the_derivatives_of_the_nominal_model(name):
 
 def test_a_body_that_hovers_leans_to_move_and_its_rotors_turn_it():
     plant = smc.plant("quadrotor")
-    G, p = smc.design.state_space(plant), plant.parameters
-    A, B = np.zeros((12, 12)), np.zeros((12, 4))
+    G = smc.design.state_space(plant)
+    p = plant.parameters
+    A = np.zeros((12, 12))
+    B = np.zeros((12, 4))
     A[:6, 6:] = np.eye(6)
     A[6, 4], A[7, 3] = p["grav"], -p["grav"]
     B[8] = 1.0 / p["m"]

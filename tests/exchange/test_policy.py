@@ -304,7 +304,9 @@ class Module:
     """A stand-in for a torch module, which gives -x/2 in evaluation and nonsense in training."""
 
     def __init__(self, dtype=np.float32):
-        self.training, self.gain, self.dtype = True, -0.5, dtype
+        self.training = True
+        self.gain = -0.5
+        self.dtype = dtype
 
     def eval(self):
         self.training = False

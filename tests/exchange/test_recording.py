@@ -71,7 +71,8 @@ def test_bodies_are_where_mujoco_puts_them(run):
                 "world",
                 round(1e9 * time),
             )
-            place, turn = each.translation, each.rotation
+            place = each.translation
+            turn = each.rotation
             np.testing.assert_allclose([place.x, place.y, place.z], data.xpos[body], atol=1e-12)
             np.testing.assert_allclose(
                 [turn.w, turn.x, turn.y, turn.z], data.xquat[body], atol=1e-12

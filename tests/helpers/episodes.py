@@ -50,7 +50,8 @@ def dm_control_suite() -> ModuleType:
 def driven_by_dm(environment, act):
     """x, v, u of every sample of an episode."""
     limit = np.array(environment.task.setting.scenario.limits)
-    timestep, states = environment.reset(), []
+    timestep = environment.reset()
+    states = []
     while True:
         u = act(timestep)
         states.append(
@@ -63,9 +64,11 @@ def driven_by_dm(environment, act):
 
 def driven_by_gym(environment, act):
     """The same of a gymnasium environment."""
-    n, limit = environment.setting.scenario.plant.n, np.array(environment.setting.scenario.limits)
+    n = environment.setting.scenario.plant.n
+    limit = np.array(environment.setting.scenario.limits)
     observation, _ = environment.reset(seed=0)
-    states, over = [], False
+    states = []
+    over = False
     while True:
         u = act(observation)
         assert environment.action_space.contains(

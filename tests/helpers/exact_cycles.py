@@ -56,14 +56,18 @@ class ExactLoop:
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """Return A (n, n) and B (n,) of the state (x, v, ...) under u."""
-        M, motor = self.M, self.motor
+        M = self.M
+        motor = self.motor
         if motor is not None:
             M += motor.inertia
-            R, L, K = motor.resistance, motor.inductance, motor.constant
+            R = motor.resistance
+            L = motor.inductance
+            K = motor.constant
             A = [[0.0, 1.0, 0.0], [-self.alpha / M, -self.delta / M, K / M], [0.0, -K / L, -R / L]]
             return np.array(A), np.array([0.0, 0.0, R / K / L])
         n = 2 + len(self.lags)
-        A, B = np.zeros((n, n)), np.zeros(n)
+        A = np.zeros((n, n))
+        B = np.zeros(n)
         A[0, 1], A[1, 0], A[1, 1] = 1.0, -self.alpha / M, -self.delta / M
         for i, lag in enumerate(self.lags, 2):
             A[i, i] = -1.0 / lag
@@ -85,7 +89,8 @@ class ExactLoop:
         start = np.zeros(n)
         start[0] = self.x0
         samples = round(duration / self.period)
-        Phi, Gamma = np.ascontiguousarray(moved[:n, :n]), np.ascontiguousarray(moved[:n, n])
+        Phi = np.ascontiguousarray(moved[:n, :n])
+        Gamma = np.ascontiguousarray(moved[:n, n])
         s = _run(
             self.kind,
             np.array(self.gains),
@@ -152,10 +157,8 @@ def random_loop(rng: np.random.Generator) -> ExactLoop:
     motor = None
     if drive == "motor":
         resistance = float(10.0 ** rng.uniform(-1.0, 1.0))
-        lag, constant = (
-            float(10.0 ** rng.uniform(-3.0, -1.5)),
-            float(10.0 ** rng.uniform(-1.5, 0.0)),
-        )
+        lag = float(10.0 ** rng.uniform(-3.0, -1.5))
+        constant = float(10.0 ** rng.uniform(-1.5, 0.0))
         motor = Motor(resistance, lag * resistance, constant, 0.0)
     return ExactLoop(
         kind=kind,
@@ -206,7 +209,10 @@ def _law(kind, g, m, h, x, v):
 
 @njit(cache=True)
 def _run(kind, gains, samples, h, late, Phi, Gamma, start):
-    z, memory, us, s = start.copy(), np.zeros(3), np.zeros(samples), np.empty(samples)
+    z = start.copy()
+    memory = np.zeros(3)
+    us = np.zeros(samples)
+    s = np.empty(samples)
     for k in range(samples):
         us[k], s[k] = _law(kind, gains, memory, h, z[0], z[1])
         z = Phi @ z + Gamma * (us[k - late] if k >= late else 0.0)

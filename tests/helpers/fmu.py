@@ -87,7 +87,8 @@ def fmi3(folder: Path) -> Path:
 
 def archived(folder: Path, sources: list[Path], name: str, system: str, about: str) -> Path:
     """C files as an FMU with a binary for this machine."""
-    headers, library = Path(fmpy.__file__).parent / "c-code", folder / f"{name}.so"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    library = folder / f"{name}.so"
     if not library.exists():
         command = [
             *build.compiler(),

@@ -28,7 +28,9 @@ def titled(page: Path) -> dict[str, str]:
 @contextlib.contextmanager
 def beside(page: Path, folder: Path) -> Iterator[None]:
     """The page's files in a folder, and modules among them importable, for as long as it lasts."""
-    path, written, files = sys.path[:], sys.dont_write_bytecode, titled(page)
+    path = sys.path[:]
+    written = sys.dont_write_bytecode
+    files = titled(page)
     for name, text in files.items():
         (folder / name).write_text(text)
     sys.path.insert(0, str(folder))

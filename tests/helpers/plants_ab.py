@@ -148,26 +148,28 @@ def chain(
       rates: of the last state by each state, (n,): with them a linear plant, without d.
       memory: the first cells of the law's memory at the start.
     """
-    count, n = round(duration / h), len(x)
+    count = round(duration / h)
+    n = len(x)
     function = cfunctions.compile_component(law)  # as the callback calls it
     y = np.array(measured(dt=h, f=f, g=g, limit=limit if told is None else told, model=model))
     y[HAS_SURFACE] = float(n == 1)
-    gains, out, cells = np.array([*law.gains.values(), 0.0]), np.zeros(2), np.zeros(law.memory + 1)
+    gains = np.array([*law.gains.values(), 0.0])
+    out = np.zeros(2)
+    cells = np.zeros(law.memory + 1)
     cells[: len(memory)] = memory
     shift = np.diag(np.ones(n), 1)  # of the states and the push, which is held
     if rates is not None:
         shift[n - 1, :n] = rates
     step, x = expm(h * shift)[:n].copy(), np.array(x, dtype=float)
-    kicks, errors = kicked(d, n, h, count), np.zeros((count, n))
+    kicks = kicked(d, n, h, count)
+    errors = np.zeros((count, n))
     if noise is None:
         errors += 0.0
     else:
         errors += np.reshape(noise, (count, -1))
-    states, log, memories = (
-        np.empty((count, n)),
-        np.empty((count, 2)),
-        np.empty((count, law.memory)),
-    )
+    states = np.empty((count, n))
+    log = np.empty((count, 2))
+    memories = np.empty((count, law.memory))
     arrays = [y, gains, cells, out, x, step, kicks, errors, states, log, memories]
     numbers = h, f, sign * g, limit
     raised = _chain(
@@ -203,15 +205,16 @@ def _chain(
 
     Return 1 if the law raised.
     """
-    at, memory, answer, state, moved = (
-        pointer(y),
-        pointer(cells),
-        pointer(out),
-        pointer(x),
-        pointer(step),
-    )
-    kick, noise, kept = pointer(kicks), pointer(errors), pointer(states)
-    logged, remembered = pointer(log), pointer(memories)
+    at = pointer(y)
+    memory = pointer(cells)
+    answer = pointer(out)
+    state = pointer(x)
+    moved = pointer(step)
+    kick = pointer(kicks)
+    noise = pointer(errors)
+    kept = pointer(states)
+    logged = pointer(log)
+    remembered = pointer(memories)
     for k in range(count):
         at[T], row = k * h, k * n
         first = state[0] + noise[row]

@@ -75,14 +75,16 @@ class Motor:
     """A stepper motor, by the functions of hardware.stepper, without their compilation."""
 
     def __init__(self, part: stepper.Stepper, values: dict[str, float]):
-        self.state, self.numbers = SimpleNamespace(**values), stepper.pulsing(part)
+        self.state = SimpleNamespace(**values)
+        self.numbers = stepper.pulsing(part)
         self.queue = [0.0] * (2 * part.queued)
 
     def step(self, u: float | None, step: int, h: float) -> None:
         """Turn the field through a physics step of h s; u is a command that arrives at its start,
         or None.
         """
-        start, end = step * h, (step + 1) * h
+        start = step * h
+        end = (step + 1) * h
         if u is not None:
             stepper.command(self.state, self.numbers, u, start)
         stepper.advance(self.state, self.numbers, self.queue, start, end)
@@ -101,8 +103,10 @@ class Loop:
     """One simulation and its controller; `control` is the control callback."""
 
     def __init__(self, scenario: Scenario, mechanism: models.Mechanism):
-        self.scenario, n = scenario.resolved, scenario.plant.n
-        self.base, table = mechanism.model, mechanism.channels
+        self.scenario = scenario.resolved
+        n = scenario.plant.n
+        self.base = mechanism.model
+        table = mechanism.channels
         self.model = models.with_values(self.base, scenario)
         self.data = mujoco.MjData(self.model)
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
@@ -110,10 +114,8 @@ class Loop:
             self.channels["ctrl"] >= 0,
             self.channels["hinge_body"] >= 0,
         )  # (n,) bool
-        self.has_friction, self.has_drive = (
-            self.channels["friction_force"] >= 0,
-            self.channels["force"] >= 0,
-        )
+        self.has_friction = self.channels["friction_force"] >= 0
+        self.has_drive = self.channels["force"] >= 0
         models.put_initial_state(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.loops = self.with_pauses()
@@ -134,7 +136,8 @@ class Loop:
         self.middle, self.rise = np.zeros(
             (2, n)
         )  # the mean force in a step of RK4, and its rise to the last stage
-        inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
+        inertia = self.model.dof_M0[self.channels["qvel"]]
+        formula = self.scenario.formula_friction
         if formula is None:
             self.bristles = []
         else:
@@ -183,7 +186,8 @@ class Loop:
         else:
             other = ""
         if (other or self.calls != expected_calls) and self.failure is None:
-            self.failure, self.failed_step = interrupted(other), step
+            self.failure = interrupted(other)
+            self.failed_step = step
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Control callback: run the law at the first stage of a sample, and apply the disturbances
@@ -205,13 +209,15 @@ class Loop:
             if self.scenario.formula_friction:
                 self.apply_friction(data, d, self.scenario.formula_friction)
             if stage == 0 and within == 0:
-                x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
+                x = data.qpos[self.channels["qpos"]]
+                v = data.qvel[self.channels["qvel"]]
                 held = self.drive_step or self.motors
                 if held:
                     delayed = self.delayed
                 else:
                     delayed = data.ctrl[self.channels["ctrl"]] / self.controller.scale
-                applied, limits = np.zeros(len(x)), self.controller.limits
+                applied = np.zeros(len(x))
+                limits = self.controller.limits
                 # the quotient may round to just beyond the limit
                 applied[self.driven] = np.clip(delayed[self.driven], -limits, limits)
                 sample = (
@@ -232,7 +238,8 @@ class Loop:
             if self.scenario.exact_friction:
                 self.apply_exact_friction(data, d, stage)
         except Failure as failure:
-            self.failure, self.failed_step = " ".join(str(failure).split()), step
+            self.failure = " ".join(str(failure).split())
+            self.failed_step = step
 
     def begin_step(self, data: mujoco.MjData, step: int) -> None:
         """Begin a physics step: run the law if it is a sample, and apply the command whose delay
@@ -266,7 +273,8 @@ class Loop:
             for motor, u in zip(self.motors, self.delayed, strict=False):
                 motor.step(float(u) if arrives else None, step, self.scenario.physics_step)
             return
-        command, v = self.delayed, data.qvel[self.channels["shaft"]]
+        command = self.delayed
+        v = data.qvel[self.channels["shaft"]]
         if self.drive_step:
             self.rise = self.controller.scale * self.drive_step.rise(command, self.first)
             command, self.first, self.second = self.drive_step(command, self.first, self.second, v)
@@ -303,7 +311,8 @@ class Loop:
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late; -1 if it does not run."""
-        clock, seed = self.scenario.clock, self.scenario.seed
+        clock = self.scenario.clock
+        seed = self.scenario.seed
         if k in (0, self.scenario.samples):
             return 0
         if (
@@ -321,7 +330,9 @@ class Loop:
         """Return the samples of a loop with pauses, and by how many physics steps each is late;
         None without pauses.
         """
-        s, late, step = self.scenario, {}, 0
+        s = self.scenario
+        late = {}
+        step = 0
         length, samples = s.clock.pauses(s.control_period, s.physics_step)
         if not length:
             return None
@@ -339,7 +350,8 @@ class Loop:
 
         Return their generalised forces, (n,).
         """
-        xfrc, at = data.xfrc_applied.ravel(), self.channels
+        xfrc = data.xfrc_applied.ravel()
+        at = self.channels
         xfrc[at["xfrc"]] = xfrc[at["horizontal"]] = 0.0
         self.apply_pushes(data, t)
         joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
@@ -370,9 +382,12 @@ class Loop:
         else:
             d = at["sign"] * xfrc[at["xfrc"]]
         if self.hinged.any():
-            anchor, axis = data.xanchor[at["anchor"] // 3], data.xaxis[at["anchor"] // 3]
+            anchor = data.xanchor[at["anchor"] // 3]
+            axis = data.xaxis[at["anchor"] // 3]
             arm = data.xipos[at["hinge_body"] // 3] - anchor
-            channel, j, k = np.arange(len(d)), at["axis"] + 1, (at["axis"] + 2) % 3
+            channel = np.arange(len(d))
+            j = at["axis"] + 1
+            k = (at["axis"] + 2) % 3
             turn = axis[channel, j] * arm[channel, k] - axis[channel, k] * arm[channel, j]
             d[self.hinged] += (turn * xfrc[at["horizontal"]])[self.hinged]
         if not np.isfinite(d).all():
@@ -387,12 +402,14 @@ class Loop:
         """
         k, rest = divmod(self.calls - 1, self.scenario.stages * self.scenario.steps)
         if rest == 0:
-            r, s = float(self.controller.r[0]), float(self.controller.s[0])
+            r = float(self.controller.r[0])
+            s = float(self.controller.s[0])
             if k:
                 dr = (r - self.log["r"][k - 1, 0]) / self.scenario.control_period
             else:
                 dr = 0.0
-            x, v = data.qpos[self.channels["qpos"][0]], data.qvel[self.channels["qvel"][0]]
+            x = data.qpos[self.channels["qpos"][0]]
+            v = data.qvel[self.channels["qvel"][0]]
             evaluate(signal, t, memory, float(x - r), float(v - dr), s)
         return memory[0]
 
@@ -410,7 +427,8 @@ class Loop:
         """
         at = self.channels
         for i, dof in enumerate(at["qvel"]):
-            x, v = float(data.qpos[at["qpos"][i]]), float(data.qvel[dof])
+            x = float(data.qpos[at["qpos"][i]])
+            v = float(data.qvel[dof])
             if self.has_drive[i]:
                 motor = float(data.actuator_force[at["force"][i]])
             else:
@@ -418,7 +436,8 @@ class Loop:
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             load += float(data.qfrc_constraint[dof] + d[i])
             friction, low, high = sliding_friction(formula, self.numbers[i], v, motor, load)
-            stuck, before = not math.isnan(self.stuck_at[i]), self.speed[i]
+            stuck = not math.isnan(self.stuck_at[i])
+            before = self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
             if not stuck and (slows or v * before < 0.0):
                 stuck, self.stuck_at[i] = True, x
@@ -435,7 +454,8 @@ class Loop:
         """Give the joints the moments of their Coulomb friction at a stage of RK4; d are the
         disturbances, (n,).
         """
-        at, h = self.channels, self.scenario.physics_step
+        at = self.channels
+        h = self.scenario.physics_step
         for i, dof in enumerate(at["qvel"]):
             if self.driven[i]:
                 drive = float(data.ctrl[at["ctrl"][i]])
@@ -448,11 +468,9 @@ class Loop:
                     middle = self.middle[i]
                 else:
                     middle = drive
-                smooth, v, mobility = (
-                    others + middle,
-                    float(data.qvel[dof]),
-                    float(data.qLDiagInv[dof]),
-                )
+                smooth = others + middle
+                v = float(data.qvel[dof])
+                mobility = float(data.qLDiagInv[dof])
                 mean, rise, held = coulomb_step(v, smooth, level, mobility, h)
                 sliding = 1.0 - held / h
                 self.rubbing[i] = mean, rise, smooth, 1.0 - sliding * sliding if held > 0.0 else 0.0

@@ -55,7 +55,8 @@ def assert_loops_agree(scenarios, rounding=0.0):
         assert trace.failure is None
         other = reference.run(one)
         for name in ARRAYS:
-            a, b = getattr(trace, name), getattr(other, name)
+            a = getattr(trace, name)
+            b = getattr(other, name)
             np.testing.assert_allclose(
                 a, b, rtol=rounding, atol=rounding, err_msg=f"{name} of {trace!r}"
             )

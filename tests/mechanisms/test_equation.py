@@ -18,7 +18,8 @@ import smc_mujoco as smc
 
 def springs(x):
     """Pull of the neighbours in a chain with free ends: x[i-1] - 2 x[i] + x[i+1]."""
-    gap, pull = x[..., 1:] - x[..., :-1], np.zeros_like(x)
+    gap = x[..., 1:] - x[..., :-1]
+    pull = np.zeros_like(x)
     pull[..., :-1] += gap
     pull[..., 1:] -= gap
     return pull
@@ -71,9 +72,13 @@ def oracle(scenarios, factor=1.0):
     """
     s = scenarios[0].resolved
     assert all(dataclasses.replace(other, law=s.law) == scenarios[0] for other in scenarios)
-    equation, h = EQUATION[s.plant.name], s.physics_step
-    delay, jump = round(s.input_delay / h), math.inf if s.jump is None else round(s.jump.time / h)
-    y, commands, states = np.array([[s.x0, s.v0]] * len(scenarios)).swapaxes(0, 1), [], []
+    equation = EQUATION[s.plant.name]
+    h = s.physics_step
+    delay = round(s.input_delay / h)
+    jump = math.inf if s.jump is None else round(s.jump.time / h)
+    y = np.array([[s.x0, s.v0]] * len(scenarios)).swapaxes(0, 1)
+    commands = []
+    states = []
     before = s.plant.values({**s.mismatch, "mass": factor * s.mismatch.get("mass", 1.0)})
     if s.jump:
         after = s.plant.values(s.factors(jump))

@@ -47,7 +47,8 @@ def test_two_preloaded_springs_have_duffings_wells_and_their_stiffness(parameter
     p = plant("duffing", **parameters)
     model, data = built(p)
     a, b, m = (p.parameters[key] for key in ("alpha", "beta", "M"))
-    well, small = np.sqrt(-a / b), 1e-5
+    well = np.sqrt(-a / b)
+    small = 1e-5
     for place in (-well, 0.0, well):
         assert pull(model, data, place) == pytest.approx(0.0, abs=1e-12)
     slope = (pull(model, data, well + small) - pull(model, data, well - small)) / (2 * small)
@@ -118,10 +119,12 @@ def test_in_a_row_the_equation_is_the_same(name):
     p = catalogue()[name]
     spec = p.spec()
     p.contacts["bobs"](spec)
-    row, chain = spec.compile(), p.load()
+    row = spec.compile()
+    chain = p.load()
     rng = np.random.default_rng(2)
     for _ in range(5):
-        x, v = rng.uniform(-0.02, 0.02, p.n), rng.uniform(-1.0, 1.0, p.n)
+        x = rng.uniform(-0.02, 0.02, p.n)
+        v = rng.uniform(-1.0, 1.0, p.n)
         expected = pull(chain, mujoco.MjData(chain), x, v)
         np.testing.assert_allclose(pull(row, mujoco.MjData(row), x, v), expected, rtol=1e-9)
 
@@ -179,7 +182,8 @@ def test_an_unknown_mechanism_is_refused():
 
 
 def test_a_coil_winds_as_often_as_it_says_at_its_radius_about_its_line():
-    spec, fixed = mujoco.MjSpec(), ("world", (0.0, 0.0, 0.0))
+    spec = mujoco.MjSpec()
+    fixed = ("world", (0.0, 0.0, 0.0))
     coil.draw(
         spec,
         "coil",

@@ -72,7 +72,9 @@ def equation(one):
 
 def machine(one, how):
     """What a plant's file and its code name, and the compiled model with each parameter moved."""
-    spec, fields, values = one.spec(), one.fields, parameters(one)
+    spec = one.spec()
+    fields = one.fields
+    values = parameters(one)
     if how in one.contacts:
         one.contacts[how](spec)
     if how in one.mechanisms:

@@ -81,11 +81,9 @@ def worst_error(p, model, rng, trials=20):
     data = mujoco.MjData(model)
     worst = 0.0
     for _ in range(trials):
-        x, v, u = (
-            within(p, rng.uniform(-2, 2, p.n)),
-            rng.uniform(-3, 3, p.n),
-            rng.uniform(-6, 6, p.n),
-        )
+        x = within(p, rng.uniform(-2, 2, p.n))
+        v = rng.uniform(-3, 3, p.n)
+        u = rng.uniform(-6, 6, p.n)
         acc, size = expected(p, x, v, u)
         worst = max(worst, np.abs(acceleration(model, data, x, v, u) - acc).max() / size)
     return worst
@@ -117,11 +115,9 @@ def test_every_parameter_is_felt_by_the_model(name, n):
     size = {"n": n} if n > 1 else {}
     p = catalogue()[name]
     values = {key: value or 0.01 * min((1.0, *p.limits)) for key, value in p.parameters.items()}
-    x, v, u = (
-        within(p, rng.uniform(1.1, 2, n)),
-        rng.uniform(1, 3, n),
-        rng.uniform(1, 6, n) * min((1.0, *p.limits)),
-    )
+    x = within(p, rng.uniform(1.1, 2, n))
+    v = rng.uniform(1, 3, n)
+    u = rng.uniform(1, 6, n) * min((1.0, *p.limits))
     before = plant(name, **size, **values).load()
     for key, value in values.items():
         after = plant(name, **size, **values | {key: 1.25 * value}).load()
@@ -203,7 +199,8 @@ def test_machines_attach_side_by_side_with_their_own_accent(name):
     mujoco.mj_forward(model, data)
     used = {model.mat(i).name for i in model.geom_matid if i >= 0}
     assert {"a/accent", "b/accent", "c/accent"} <= used
-    left, right = data.body("a/machine").xpos, data.body("b/machine").xpos
+    left = data.body("a/machine").xpos
+    right = data.body("b/machine").xpos
     np.testing.assert_allclose(right - left, p.lane)
 
 
@@ -215,7 +212,8 @@ def energy_drift(p, h, seconds=2.0):
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    start, drift = data.energy.sum(), 0.0
+    start = data.energy.sum()
+    drift = 0.0
     for _ in range(round(seconds / h)):
         mujoco.mj_step(model, data)
         mujoco.mj_forward(model, data)
@@ -226,7 +224,8 @@ def energy_drift(p, h, seconds=2.0):
 @pytest.mark.parametrize("name", [n for n in NAMES if "pendulum" in n or n == "duffing"])
 def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
     p = plant(name, **{key: 0.0 for key in ("delta", "b") if key in catalogue()[name].parameters})
-    coarse, fine = energy_drift(p, 0.02), energy_drift(p, 0.01)
+    coarse = energy_drift(p, 0.02)
+    fine = energy_drift(p, 0.01)
     assert coarse < 1e-2
     assert coarse / fine >= 16
 

@@ -16,7 +16,8 @@ from helpers.runs import assert_same
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.contact import Contact
 
-GRAV, STATES = 9.81, 1000
+GRAV = 9.81
+STATES = 1000
 # a, m, and alpha, rad, of the link before; d, m: Franka Emika, modified Denavit-Hartenberg
 # parameters
 FRAMES = (
@@ -82,7 +83,10 @@ HIGH = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
 
 def rotation(alpha, theta):
     """Of a frame against the one before: about the x of that one, then about its own z."""
-    ca, sa, c, s = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
+    ca = math.cos(alpha)
+    sa = math.sin(alpha)
+    c = math.cos(theta)
+    s = math.sin(theta)
     return np.array([[c, -s, 0], [ca * s, ca * c, -sa], [sa * s, sa * c, ca]])
 
 
@@ -98,7 +102,8 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
 
     J. Craig, Introduction to Robotics, 6.5.
     """
-    z, steel = np.array([0.0, 0.0, 1.0]), 7850.0
+    z = np.array([0.0, 0.0, 1.0])
+    steel = 7850.0
     bodies = []
     for m, c, (A, B, C, D, E, F) in links:
         bodies.append([(m, np.array(c), np.array([[A, D, E], [D, B, F], [E, F, C]]))])
@@ -106,19 +111,25 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
     bodies[6].append((payload, np.array([0, 0, 0.107 + lp]), 0.4 * payload * radius**2 * np.eye(3)))
     turns = [rotation(alpha, angle) for (_, alpha, _), angle in zip(FRAMES, q, strict=True)]
     offsets = [np.array([a_, -math.sin(al) * d, math.cos(al) * d]) for a_, al, d in FRAMES]
-    w, dw, acc, loads = np.zeros(3), np.zeros(3), np.array([0.0, 0.0, GRAV]), []
+    w = np.zeros(3)
+    dw = np.zeros(3)
+    acc = np.array([0.0, 0.0, GRAV])
+    loads = []
     for turn, offset, rate, rise, parts in zip(turns, offsets, v, a, bodies, strict=True):
         acc = turn.T @ (acc + cross(dw, offset) + cross(w, cross(w, offset)))
         spin = turn.T @ w
         dw = turn.T @ dw + cross(spin, rate * z) + rise * z
         w = spin + rate * z
-        force, moment = np.zeros(3), np.zeros(3)
+        force = np.zeros(3)
+        moment = np.zeros(3)
         for mass, centre, inertia in parts:
             f = mass * (acc + cross(dw, centre) + cross(w, cross(w, centre)))
             force = force + f
             moment = moment + cross(centre, f) + inertia @ dw + cross(w, inertia @ w)
         loads.append((force, moment))
-    found, force, moment = np.zeros(7), np.zeros(3), np.zeros(3)
+    found = np.zeros(7)
+    force = np.zeros(3)
+    moment = np.zeros(3)
     for i in range(6, -1, -1):
         if i < 6:
             moment = turns[i + 1] @ moment + cross(offsets[i + 1], turns[i + 1] @ force)
@@ -130,15 +141,15 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
 
 @pytest.mark.parametrize("payload", [0.0, 2.0])
 def test_a_thousand_states_obey_newton_and_euler(payload):
-    rng, plant = np.random.default_rng(7), smc.plant("panda", payload=payload)
+    rng = np.random.default_rng(7)
+    plant = smc.plant("panda", payload=payload)
     model = plant.load()
-    data, worst = mujoco.MjData(model), 0.0
+    data = mujoco.MjData(model)
+    worst = 0.0
     for _ in range(STATES if payload else 100):
-        q, v, u = (
-            rng.uniform(LOW, HIGH),
-            rng.uniform(-2.5, 2.5, 7),
-            rng.uniform(-1, 1, 7) * plant.limits,
-        )
+        q = rng.uniform(LOW, HIGH)
+        v = rng.uniform(-2.5, 2.5, 7)
+        u = rng.uniform(-1, 1, 7) * plant.limits
         data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
         mujoco.mj_forward(model, data)
         expected = torques(q, v, data.qacc, payload)
@@ -147,8 +158,10 @@ def test_a_thousand_states_obey_newton_and_euler(payload):
 
 
 def test_gravity_torques_of_a_thousand_states_are_the_published_ones():
-    rng, plant = np.random.default_rng(8), smc.plant("panda")
-    values, still = plant.values({}), np.zeros(7)
+    rng = np.random.default_rng(8)
+    plant = smc.plant("panda")
+    values = plant.values({})
+    still = np.zeros(7)
     for _ in range(STATES):
         q = rng.uniform(LOW, HIGH)
         found = plant.nominal.dynamics(q, still, values)
@@ -157,15 +170,14 @@ def test_gravity_torques_of_a_thousand_states_are_the_published_ones():
 
 
 def test_the_second_set_obeys_newton_and_euler():
-    rng, plant = np.random.default_rng(10), smc.plant("panda", delta=1.0)
+    rng = np.random.default_rng(10)
+    plant = smc.plant("panda", delta=1.0)
     model = plant.load()
     data = mujoco.MjData(model)
     for _ in range(100):
-        q, v, u = (
-            rng.uniform(LOW, HIGH),
-            rng.uniform(-2.5, 2.5, 7),
-            rng.uniform(-1, 1, 7) * plant.limits,
-        )
+        q = rng.uniform(LOW, HIGH)
+        v = rng.uniform(-2.5, 2.5, 7)
+        u = rng.uniform(-1, 1, 7) * plant.limits
         data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
         mujoco.mj_forward(model, data)
         expected = torques(q, v, data.qacc, links=DELTA)
@@ -296,10 +308,12 @@ def test_a_mismatch_makes_the_arm_that_of_the_second_set():
 
 def test_the_flange_is_where_the_makers_frames_put_it():
     model = smc.plant("panda").load()
-    data, rng = mujoco.MjData(model), np.random.default_rng(9)
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(9)
     for _ in range(20):
         q = rng.uniform(LOW, HIGH)
-        turn, place = np.eye(3), np.zeros(3)
+        turn = np.eye(3)
+        place = np.zeros(3)
         for (a, alpha, d), angle in zip(FRAMES, q, strict=True):
             place = place + turn @ [a, -math.sin(alpha) * d, math.cos(alpha) * d]
             turn = turn @ rotation(alpha, angle)
@@ -356,7 +370,8 @@ def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
     late = unknown.factors(unknown.jump_step)
     assert unknown.plant.values(late).payload == 2.0
     loaded, plain = (smc.plant("panda", payload=mass) for mass in (2.0, 0.0))
-    first, second = loaded.load(), plain.load({"payload": 2.0})
+    first = loaded.load()
+    second = plain.load({"payload": 2.0})
     for name in ("body_mass", "body_inertia", "body_pos", "geom_size"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     traces = smc.run([unknown, smc.Scenario(plant="panda", mismatch={"payload": 0.5}, **known)])
@@ -385,7 +400,8 @@ def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
     """The probe swings down onto the table, or forward against the wall; the arm's stops are met,
     too.
     """
-    plant, lowest = smc.plant("panda"), 0.0
+    plant = smc.plant("panda")
+    lowest = 0.0
     spec = plant.spec()
     Contact(kind).edit_on(plant, spec)
     spec.option.timestep, spec.option.integrator = 2.5e-4, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -397,7 +413,8 @@ def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
         kind
     ]  # of the shoulder, of the elbow
     mujoco.mj_forward(model, data)
-    start, touched = data.energy.sum(), False
+    start = data.energy.sum()
+    touched = False
     while data.time < 1.0:
         mujoco.mj_step(model, data)
         touched = touched or data.ncon > 0
@@ -441,7 +458,8 @@ def test_the_probe_presses_on_a_surface_and_does_not_pass_through(kind):
     depths = {}
     for trace in smc.run([smc.Scenario(**common, contact=each) for each in (kind, "none")]):
         assert trace.failure is None
-        model, depth = trace.scenario.plant.load(), []
+        model = trace.scenario.plant.load()
+        depth = []
         data = mujoco.MjData(model)
         for q in trace.x[::10]:
             data.qpos[:] = q

@@ -46,7 +46,8 @@ def newton_euler(duration, period, p, wind):
 
     The wind blows from the start.
     """
-    drag, J = np.diag([p["Dx"], p["Dy"], p["Dz"]]), np.diag([p["Jx"], p["Jy"], p["Jz"]])
+    drag = np.diag([p["Dx"], p["Dy"], p["Dz"]])
+    J = np.diag([p["Jx"], p["Jy"], p["Jz"]])
     places = p["a"] * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
     spins = np.array([1.0, -1.0, 1.0, -1.0])
     state = np.concatenate(
@@ -64,12 +65,16 @@ def newton_euler(duration, period, p, wind):
         told = np.array([speed(p, f) for f in asked])
 
         def rates(t, y, told=told):
-            q, v, w, W = y[3:7] / np.linalg.norm(y[3:7]), y[7:10], y[10:13], y[13:]
+            q = y[3:7] / np.linalg.norm(y[3:7])
+            v = y[7:10]
+            w = y[10:13]
+            W = y[13:]
             turn = Rotation.from_quat(q, scalar_first=True)
             f = np.clip(p["k1"] * W + p["k2"] * W * W, 0.0, p["fmax"])
             dW = np.array([rotor_rate(a, b, p) for a, b in zip(W, told, strict=True)])
             torque = np.array([f @ places[:, 1], -f @ places[:, 0], -p["c"] * f @ spins])
-            h, dh = p["Jr"] * spins @ W, p["Jr"] * spins @ dW
+            h = p["Jr"] * spins @ W
+            dh = p["Jr"] * spins @ dW
             spin = np.array([0.0, 0.0, 1.0])
             torque -= np.cross(w, J @ w + h * spin) + dh * spin
             force = turn.apply([0.0, 0.0, f.sum()]) - turn.apply(drag @ turn.inv().apply(v - wind))
@@ -139,7 +144,9 @@ def test_a_tumbling_body_with_spinning_rotors_keeps_its_angular_momentum(fall):
         fall=fall,
     )
     plant = dataclasses.replace(plant, fields=AllTurnAlike())
-    J, start, idle = np.diag([16.8e-6, 20e-6, 29.8e-6]), speed(P, P["m"] * G / 4), speed(P, 0.0)
+    J = np.diag([16.8e-6, 20e-6, 29.8e-6])
+    start = speed(P, P["m"] * G / 4)
+    idle = speed(P, 0.0)
     misses = []
     for step in (2e-3, 1e-3):
         trace = smc.run(
@@ -154,11 +161,13 @@ def test_a_tumbling_body_with_spinning_rotors_keeps_its_angular_momentum(fall):
                 physics_step=step,
             )
         )
-        w, h = trace.v[:, 3:], 4 * 1e-8 * (idle + (start - idle) * np.exp(-fall * trace.t))
+        w = trace.v[:, 3:]
+        h = 4 * 1e-8 * (idle + (start - idle) * np.exp(-fall * trace.t))
         momentum = Rotation.from_rotvec(trace.x[:, 3:].copy()).apply(
             w @ J + np.outer(h, [0.0, 0.0, 1.0])
         )
-        size, energy = np.linalg.norm(momentum, axis=1), np.einsum("ki,ij,kj->k", w, J, w)
+        size = np.linalg.norm(momentum, axis=1)
+        energy = np.einsum("ki,ij,kj->k", w, J, w)
         misses.append(np.abs(momentum[1] - momentum[0]).max() / size[0])
         if fall == 0.0 and step == 1e-3:
             assert np.ptp(size) < 1e-10 * size[0]
@@ -183,9 +192,11 @@ def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
 
     def rate(t, W):
         if told >= W[0]:
-            a, b = (rise, rise2)
+            a = rise
+            b = rise2
         else:
-            a, b = (fall, fall2)
+            a = fall
+            b = fall2
         return [a * (told - W[0]) + b * (told**2 - W[0] ** 2)]
 
     found, slope = spun.py_func(rotor, first, told, 0.3)
@@ -206,7 +217,8 @@ def falling(**fields):
 
 
 def test_a_body_thrown_without_thrust_loses_its_speed_to_drag_exponentially():
-    trace, d = falling(), np.array([0.02, 0.01, 0.03]) / P["m"]
+    trace = falling()
+    d = np.array([0.02, 0.01, 0.03]) / P["m"]
     last = np.array([0.0, 0.0, -G]) / d
     expected = last + (trace.v[0, :3] - last) * np.exp(-trace.t[:, None] * d)
     np.testing.assert_allclose(trace.v[:, :3], expected, atol=1e-10)
@@ -297,10 +309,8 @@ def test_the_rotor_that_fades_is_the_front_right_one():
     """Its side sinks, and the drag that it lacks leaves the body to turn counter-clockwise, as it
     turns itself.
     """
-    plant, u = (
-        smc.plant("quadrotor", fade=0.4, Jr=0.0),
-        np.array([0.0, 0.0, P["m"] * G, 0.0, 0.0, 0.0]),
-    )
+    plant = smc.plant("quadrotor", fade=0.4, Jr=0.0)
+    u = np.array([0.0, 0.0, P["m"] * G, 0.0, 0.0, 0.0])
     law = smc.law_function(**FREE_BODY)(lambda y, gains, memory: (u.copy(), np.zeros(6)))
     trace = smc.run(smc.Scenario(plant=plant, law=law, duration=0.01, x0=QUADROTOR.rest))
     lost = 0.4 * P["m"] * G / 4 * 0.01
@@ -368,8 +378,10 @@ def test_motion_is_the_same_turned_about_the_vertical_and_in_a_mirror():
     np.testing.assert_allclose(mirrored.e, trace.e * [1, -1, 1, -1, 1, -1], atol=1e-9)
     np.testing.assert_allclose(mirrored.applied[:, :4], trace.applied[:, [3, 2, 1, 0]], atol=1e-9)
     turn = Rotation.from_rotvec([0.0, 0.0, 0.9])
-    start, axis = Rotation.from_rotvec([0.2, -0.1, 0.3]), turn.as_rotvec()
-    place, v = turn.apply([0.3, 0.1, 1.2]), turn.apply([1.0, 2.0, 0.0])
+    start = Rotation.from_rotvec([0.2, -0.1, 0.3])
+    axis = turn.as_rotvec()
+    place = turn.apply([0.3, 0.1, 1.2])
+    v = turn.apply([1.0, 2.0, 0.0])
     goal = [*turn.apply(QUADROTOR.rest[:3]), *axis]
     turned = smc.run(
         smc.Scenario(

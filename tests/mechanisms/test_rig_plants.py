@@ -38,7 +38,8 @@ ORDER = {"acrobot": [1, 0]}
 def furuta(p, q, v, u):
     """(x'', q'') by Lagrange's equations of the arm and of the pendulum as a rod without thickness."""
     Jp = p.Jc + p.m * p.l**2
-    s, c = math.sin(q[1]), math.cos(q[1])
+    s = math.sin(q[1])
+    c = math.cos(q[1])
     mass = np.array(
         [[p.J + p.m * p.L**2 + Jp * s * s, p.m * p.L * p.l * c], [p.m * p.L * p.l * c, Jp]]
     )
@@ -46,10 +47,8 @@ def furuta(p, q, v, u):
         [2 * Jp * s * c * v[0] * v[1] - p.m * p.L * p.l * s * v[1] ** 2, -Jp * s * c * v[0] ** 2]
     )
     friction = np.array([p.b, p.bq]) * v + np.array([p.cf, p.cfq]) * np.sign(v)
-    arm, ahead = (
-        np.array([math.sin(q[0]), -math.cos(q[0]), 0.0]),
-        np.array([math.cos(q[0]), math.sin(q[0]), 0.0]),
-    )
+    arm = np.array([math.sin(q[0]), -math.cos(q[0]), 0.0])
+    ahead = np.array([math.cos(q[0]), math.sin(q[0]), 0.0])
     jacobian = np.array(
         [p.L * ahead - p.l * s * arm, p.l * (c * ahead - s * np.array([0.0, 0.0, 1.0]))]
     )
@@ -61,8 +60,10 @@ def furuta(p, q, v, u):
 
 def double_pendulum(p, q, v, u):
     """(q1'', q2''): each link's mass at its centre, by Jacobians, with its inertia and the rotors'."""
-    mass, force = np.zeros((2, 2)), np.array(u, float)
-    one, two = q[0], q[0] + q[1]
+    mass = np.zeros((2, 2))
+    force = np.array(u, float)
+    one = q[0]
+    two = q[0] + q[1]
     turns = (np.array([1.0, 0.0]), np.array([1.0, 1.0]))  # of each link, by the joints
     for m, I, r, arm, turn in (
         (p.m1, p.I1, p.r1, (), turns[0]),
@@ -123,8 +124,10 @@ def test_a_thousand_accelerations_are_those_of_the_equation(name, rough):
     rng = np.random.default_rng(5)
     plant = smc.plant(name, **ROUGH[name] if rough else dict.fromkeys(smc.plant(name).dry, 0.0))
     assert plant.smooth == (not rough)
-    model, p = plant.load(), SimpleNamespace(**plant.parameters)
-    data, joints = mujoco.MjData(model), joint_ids(model)
+    model = plant.load()
+    p = SimpleNamespace(**plant.parameters)
+    data = mujoco.MjData(model)
+    joints = joint_ids(model)
     worst = 0.0
     for x, v, u in states(name, plant, rng):
         data.qpos[joints], data.qvel[joints], data.ctrl[:] = x, v, u
@@ -166,7 +169,8 @@ def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(n
         smc.Scenario(plant=plant, law="none", x0=START.get(name, (1.0, 0.5)), v0=v0, **common)
     )
     assert trace.scenario.resolved.integrator == "RK4"
-    p, n = SimpleNamespace(**plant.parameters), plant.n
+    p = SimpleNamespace(**plant.parameters)
+    n = plant.n
 
     def slope(t, y):
         return np.concatenate([y[n:], acceleration(name, p, y[:n], y[n:], np.zeros(plant.driven))])
@@ -179,7 +183,8 @@ def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(n
 
 def runge_kutta(p, x, torque, period=2e-3, seconds=2.0):
     """q of an independent RK4 at 2 ms of the double pendulum, (K+1, 2), under torques (K, 2)."""
-    y, found = np.array([*x, 0.0, 0.0]), [x]
+    y = np.array([*x, 0.0, 0.0])
+    found = [x]
 
     def slope(y, u):
         return np.concatenate([y[2:], double_pendulum(p, y[:2], y[2:], u)])
@@ -220,9 +225,11 @@ def test_model_1_1_equals_an_independent_rk4(name, driven):
         )
     )
     if name == "pendubot":
-        column, order = (0, [0, 1])
+        column = 0
+        order = [0, 1]
     else:
-        column, order = (1, [1, 0])
+        column = 1
+        order = [1, 0]
     torque = np.zeros((500, 2))
     torque[:, column] = profile
     expected = runge_kutta(
@@ -237,8 +244,10 @@ def test_the_published_mass_matrix_has_rotors_as_here():
     between them.
     """
     plant = smc.plant("double_pendulum", **MODEL_1_0)
-    p, model = SimpleNamespace(**plant.parameters), plant.load()
-    data, full = mujoco.MjData(model), np.zeros((2, 2))
+    p = SimpleNamespace(**plant.parameters)
+    model = plant.load()
+    data = mujoco.MjData(model)
+    full = np.zeros((2, 2))
     data.qpos[1] = 0.7
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, full)

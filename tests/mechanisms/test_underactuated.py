@@ -35,9 +35,11 @@ def acceleration(name, p, x, v, u):
     about it.
     """
     if name == "cart_pole":
-        up, inertia = (1.0, p.m * p.l**2 / 3)
+        up = 1.0
+        inertia = p.m * p.l**2 / 3
     else:
-        up, inertia = (-1.0, 0.0)
+        up = -1.0
+        inertia = 0.0
     lever = up * p.m * p.l * math.cos(x[1])
     mass = np.array([[p.M + p.m, lever], [lever, p.m * p.l**2 + inertia]])
     swing = up * p.m * p.l * math.sin(x[1])
@@ -79,7 +81,8 @@ def surface(trace, law=LAW):
 def test_the_model_is_its_equation(name):
     rng = np.random.default_rng(0)
     for p in (smc.plant(name), *(changed(name, rng) for _ in range(5))):
-        model, values = p.load(), SimpleNamespace(**p.parameters)
+        model = p.load()
+        values = SimpleNamespace(**p.parameters)
         data = mujoco.MjData(model)
         for _ in range(20):
             data.qpos[:], data.qvel[:], data.ctrl[:] = (
@@ -99,7 +102,9 @@ def test_nominal_is_the_equation_of_both_joints_and_compiles_to_it(name):
     compiled = numba.njit(smc.plant(name).nominal)
     for _ in range(20):
         p = changed(name, rng)
-        x, v, u = rng.uniform(-2, 2, 2), rng.uniform(-3, 3, 2), rng.uniform(-6, 6)
+        x = rng.uniform(-2, 2, 2)
+        v = rng.uniform(-3, 3, 2)
+        u = rng.uniform(-6, 6)
         values = Parameters(**p.parameters)
         for i, expected in enumerate(acceleration(name, values, x, v, u)):
             f, g = p.nominal(x, v, i, values)
@@ -111,7 +116,8 @@ def test_nominal_is_the_equation_of_both_joints_and_compiles_to_it(name):
 def test_fields_alone_carry_a_parameter_change(name):
     rng = np.random.default_rng(2)
     p = changed(name, rng)
-    jumped, made = smc.plant(name).load(), p.load()
+    jumped = smc.plant(name).load()
+    made = p.load()
     for field, at, value, _ in p.fields(jumped, p.values({})):
         if field.startswith("opt."):
             owner = jumped.opt
@@ -165,7 +171,8 @@ def energies(p, trace):
     """Kinetic and potential energy of a run, J."""
     model = p.load()
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
-    data, found = mujoco.MjData(model), []
+    data = mujoco.MjData(model)
+    found = []
     for x, v in zip(trace.x, trace.v, strict=True):
         data.qpos[:], data.qvel[:] = x, v
         mujoco.mj_forward(model, data)
@@ -345,7 +352,8 @@ def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_r
     values = SimpleNamespace(**p.parameters)
     (_, g), (_, gq) = (p.nominal(np.zeros(2), np.zeros(2), i, values) for i in (0, 1))
     b = abs(LAW.a * g + gq)
-    small, large = 0.8 * LAW.k / b, 1.5 * LAW.k / b
+    small = 0.8 * LAW.k / b
+    large = 1.5 * LAW.k / b
     held, left = smc.run(
         [scenario(name, disturbance=smc.Constant(d), duration=15.0) for d in (small, large)]
     )

@@ -44,7 +44,8 @@ class Run:
     held: None = None
     diverged_at: float | None = None
     failure: str | None = None
-    plant_diverged, arrays = Trace.plant_diverged, Trace.arrays
+    plant_diverged = Trace.plant_diverged
+    arrays = Trace.arrays
 
 
 def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=False, **fields):
@@ -163,16 +164,15 @@ def test_a_few_samples_have_the_value_that_a_hand_finds(metric, value, signals, 
 def test_a_slowly_moving_reference_is_one_approach():
     t = clock(10, 1e-3)
     r = np.sin(t)
-    tracking, regulating = (
-        run(t, r + np.exp(-t) * np.cos(3 * t), r=r),
-        run(t, np.exp(-t) * np.cos(3 * t)),
-    )
+    tracking = run(t, r + np.exp(-t) * np.cos(3 * t), r=r)
+    regulating = run(t, np.exp(-t) * np.cos(3 * t))
     assert scale(tracking) == pytest.approx(2.0, rel=1e-6)  # the range of r exceeds |e(0)| = 1
     assert 2.0 * m.overshoot(tracking) == pytest.approx(m.overshoot(regulating), rel=1e-6)
 
 
 def test_rise_time_of_an_exponential_is_ln_9_time_constants():
-    tau, h = 0.3, 1e-4
+    tau = 0.3
+    h = 1e-4
     t = clock(5, h)
     assert m.rise_time(run(t, 2 * np.exp(-t / tau))) == pytest.approx(tau * math.log(9), abs=h)
     late = np.where(t < 1, 0, 1.0)
@@ -182,7 +182,9 @@ def test_rise_time_of_an_exponential_is_ln_9_time_constants():
 
 def test_rise_time_is_that_of_the_slowest_channel_and_inf_if_one_never_rises():
     t = clock(5, 1e-3)
-    fast, slow, still = np.exp(-t / 0.1), np.exp(-t / 0.4), np.zeros(t.size)
+    fast = np.exp(-t / 0.1)
+    slow = np.exp(-t / 0.4)
+    still = np.zeros(t.size)
     both = run(t, np.column_stack([fast, slow, still]))
     assert m.rise_time(both) == m.rise_time(run(t, slow))
     assert m.rise_time(run(t, np.column_stack([fast, np.full(t.size, 0.2)]))) == math.inf
@@ -196,7 +198,9 @@ def test_rise_time_is_that_of_the_slowest_channel_and_inf_if_one_never_rises():
 
 
 def test_square_wave_has_tv_rate_four_amplitudes_times_its_frequency():
-    amplitude, f, h = 3.0, 5.0, 1e-3
+    amplitude = 3.0
+    f = 5.0
+    h = 1e-3
     t = clock(10, h)
     u = amplitude * np.where((np.arange(t.size) // 100) % 2, -1, 1)
     trace = run(t, u=u)
@@ -210,7 +214,8 @@ def test_square_wave_has_tv_rate_four_amplitudes_times_its_frequency():
 def test_effort_is_the_worst_channel_and_does_not_grow_with_n():
     t = clock(1, 1e-2)
     u = np.sin(30 * t)
-    one, many = run(t, u=u), run(t, u=np.column_stack([u, -u, 0.5 * u, u]))
+    one = run(t, u=u)
+    many = run(t, u=np.column_stack([u, -u, 0.5 * u, u]))
     for name in ("tv", "tv_rate", "max_u", "max_step"):
         assert getattr(m, name)(many) == pytest.approx(getattr(m, name)(one), rel=1e-12)
     assert m.hf_share(run(t, u=np.column_stack([u] * 4))) == pytest.approx(m.hf_share(one))
@@ -224,7 +229,9 @@ def alternating(t):
     return (-1.0) ** np.arange(t.size)
 
 
-SECOND, ODD, SLOWLY = clock(1, 1e-3), np.arange(1002) / 1001, clock(10, 0.01)
+SECOND = clock(1, 1e-3)
+ODD = np.arange(1002) / 1001
+SLOWLY = clock(10, 0.01)
 HF_SHARES = [  # share of the power, u over t, and why
     (
         0.1,
@@ -286,7 +293,8 @@ def test_hf_share(share, t, u, words):
 
 def test_network_settles_in_mean_and_spread_separately():
     t = clock(10, 1e-3)
-    mean, half = np.exp(-t / 0.5), np.exp(-t / 0.1)
+    mean = np.exp(-t / 0.5)
+    half = np.exp(-t / 0.1)
     x = np.column_stack([mean + half, mean, mean - half])  # scale 2
     trace = run(t, x)
     assert m.mean_settling_time(trace) == pytest.approx(0.5 * math.log(25), abs=1e-3)
@@ -327,7 +335,8 @@ def test_a_limit_cycle_reverses_twice_a_period(frequency):
 
 def test_small_teeth_on_a_cycle_are_no_reversals_and_large_ones_are():
     t = clock(10, 1e-3)
-    slow, teeth = np.cos(2 * np.pi * t), np.where(np.arange(t.size) % 2, 1.0, -1.0)
+    slow = np.cos(2 * np.pi * t)
+    teeth = np.where(np.arange(t.size) % 2, 1.0, -1.0)
     assert m.reversal_rate(run(t, slow + 0.2 * teeth)) == m.reversal_rate(run(t, slow))
     assert m.reversal_rate(run(t, teeth)) == pytest.approx(1000.0, abs=1.0)
 
@@ -403,7 +412,8 @@ def cart_and_pole():
 
 
 def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
-    trace, alone = cart_and_pole(), []
+    trace = cart_and_pole()
+    alone = []
     for i in (0, 1):
         columns = {}
         for name in ("x", "v", "u", "s", "r", "reaction"):
@@ -434,7 +444,8 @@ def test_what_u_or_s_changes_is_of_the_command():
 
 def test_scores_are_the_worst_of_cart_and_pole_and_those_with_a_unit_the_carts():
     trace = cart_and_pole()
-    found, ours = m.scores(trace), m.score(trace)
+    found = m.scores(trace)
+    ours = m.score(trace)
     of_both = {"settling_time", "rise_time", "overshoot", "stick_time", "reversal_rate"}
     assert {name for name in ours if ours[name] != found["driven"][name]} - CYCLE == {
         "settling_time",
@@ -484,7 +495,8 @@ def test_driven_channels_in_two_units_have_the_worst_time_and_no_number_in_eithe
         np.array([[10, 1, 0, 0, 0], [0.1, 0.1, 0.1, 0, 0], [0.05, 0, 0, 0, 0]]).T,
         units=("m", "rad", "rad"),
     )
-    found, ours = m.score(arm), m.scores(arm)
+    found = m.score(arm)
+    ours = m.scores(arm)
     assert list(ours) == ["driven m", "driven rad"]
     assert (
         found["settling_time"]
@@ -600,7 +612,8 @@ def test_a_run_of_one_step_by_hand():
 
 def test_the_limit_cycle_of_the_worst_channel_is_scored_and_its_absence_is_nan():
     t = np.arange(2001) / 100
-    fast, large = 0.01 * np.sin(math.tau * 20.3 * t), 0.1 * np.sin(math.tau * 5.1 * t)
+    fast = 0.01 * np.sin(math.tau * 20.3 * t)
+    large = 0.1 * np.sin(math.tau * 5.1 * t)
     both = run(t, np.zeros((len(t), 3)), s=np.column_stack([fast, large, np.zeros(len(t))]))
     assert m.chattering_amplitude(both) == pytest.approx(0.1, rel=0.05)
     assert m.chattering_frequency(both) == pytest.approx(5.1, rel=1e-3)
@@ -609,7 +622,8 @@ def test_the_limit_cycle_of_the_worst_channel_is_scored_and_its_absence_is_nan()
 
 @pytest.mark.usefixtures("present_objects_frozen")
 def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
-    t, asked = np.arange(2001) / 100, []
+    t = np.arange(2001) / 100
+    asked = []
     both = run(t, np.zeros((len(t), 2)), s=np.sin(60 * t)[:, None] * np.ones(2), units=("m", "rad"))
     monkeypatch.setattr(
         limit_cycle,
@@ -633,11 +647,14 @@ WHOLE = st.integers(-1000, 1000)
 @st.composite
 def random_runs(draw):
     """Whole-number signals, so that scaling by a power of two and adding an offset are exact."""
-    n, samples = draw(st.integers(1, 4)), draw(st.integers(2, 30))
+    n = draw(st.integers(1, 4))
+    samples = draw(st.integers(2, 30))
     block = st.lists(
         st.lists(WHOLE, min_size=n, max_size=n), min_size=samples, max_size=samples
     ).map(np.array)
-    x, u, s = draw(block), draw(block), draw(block)
+    x = draw(block)
+    u = draw(block)
+    s = draw(block)
     r = np.where(np.arange(samples)[:, None] < draw(st.integers(0, samples)), 0, draw(WHOLE))
     if draw(st.booleans()):
         x[-max(1, samples // 2) :] = r[-1]  # settles
@@ -682,7 +699,8 @@ def test_permuting_channels_changes_nothing(trace, random):
 @given(random_runs(), WHOLE, WHOLE)
 def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
     moved = dataclasses.replace(trace, t=trace.t + start, x=trace.x + shift, r=trace.r + shift)
-    before, after = m.score(trace), m.score(moved)
+    before = m.score(trace)
+    after = m.score(moved)
     del before["peak"], after["peak"]
     assert after == pytest.approx(before, rel=1e-12, nan_ok=True)
 

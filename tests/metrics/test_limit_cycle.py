@@ -81,7 +81,8 @@ def test_a_slow_wave_is_no_first_harmonic_of_a_cycle_that_is_much_larger_in_the_
 
 
 def test_steps_of_an_encoder_at_random_times_are_no_limit_cycle():
-    rng, s = np.random.default_rng(2), np.zeros(len(T))
+    rng = np.random.default_rng(2)
+    s = np.zeros(len(T))
     for at in rng.choice(len(T), 40, replace=False):
         s[at:] += rng.choice([-1.0, 1.0]) * np.exp(-(T[at:] - T[at]) / 6e-3)
     assert math.isnan(limit_cycle(T, s)[0])
@@ -148,7 +149,8 @@ def test_a_group_without_a_limit_cycle_hides_no_other_and_units_do_not_mix(laws,
         input_delay=0.005,
     )
     trace = smc.run(scenario)
-    of_group, whole = smc.scores(trace), smc.score(trace)
+    of_group = smc.scores(trace)
+    whole = smc.score(trace)
     frequencies = [its["chattering_frequency"] for its in of_group.values()]
     assert sum(map(math.isnan, frequencies)) == 1  # pid has none
     assert whole["chattering_frequency"] == max(f for f in frequencies if not math.isnan(f))

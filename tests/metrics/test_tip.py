@@ -24,7 +24,8 @@ def trace():
 @pytest.fixture(scope="module")
 def pressed():
     """The panda presses on a slippery wall with 20 N, without friction in its joints."""
-    law, path = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2), tasks.wall_path()
+    law = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2)
+    path = tasks.wall_path()
     start = tuple(signal.values[0] for signal in path)
     wall = smc.Contact("wall", friction=0.0)
     return smc.run(
@@ -99,7 +100,8 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
     """Without friction the reactions of the joints are -A' f, with A the tip's Jacobian along the
     wall's normal.
     """
-    found, plant = tip.contacts(pressed), pressed.scenario.plant
+    found = tip.contacts(pressed)
+    plant = pressed.scenario.plant
     for k in (400, 600, 900):
         A = plant.nominal.jacobian(pressed.x[k], plant.values({}), plant.tip)[0]
         felt = -(A @ pressed.reaction[k]) / (A @ A)
@@ -140,7 +142,8 @@ def changed(trace, **fields):
 def test_contact_forces_know_a_jump_between_two_samples(pressed):
     """From the first sample at or after it."""
     heavy = {"payload": 2.0}
-    before, after = tip.contacts(pressed), tip.contacts(changed(pressed, mismatch=heavy))
+    before = tip.contacts(pressed)
+    after = tip.contacts(changed(pressed, mismatch=heavy))
     assert pressed.scenario.steps > 1
     for time in (0.5004, 0.501):
         found = tip.contacts(changed(pressed, jump=smc.Jump(time, heavy)))
@@ -152,7 +155,8 @@ def test_contact_forces_know_a_jump_between_two_samples(pressed):
 def test_contact_forces_end_with_a_failure(pressed, tmp_path, monkeypatch):
     """MuJoCo gets no NaN, so it writes no warning to its log."""
     monkeypatch.chdir(tmp_path)
-    x, applied = pressed.x.copy(), pressed.applied.copy()
+    x = pressed.x.copy()
+    applied = pressed.applied.copy()
     x[800:] = applied[800:] = np.nan
     force = tip.contacts(dataclasses.replace(pressed, x=x, applied=applied)).force
     assert not list(tmp_path.iterdir())
@@ -213,10 +217,8 @@ def test_rubbing_on_the_wall_does_not_change_the_force():
     more for it.
     """
     path = tasks.wall_path()
-    law, start = (
-        smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2),
-        tuple(one.values[0] for one in path),
-    )
+    law = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2)
+    start = tuple(one.values[0] for one in path)
     rough = smc.Scenario(
         plant="panda", law=law, reference=path, x0=start, contact="wall", duration=1.4
     )

@@ -88,7 +88,8 @@ def sliding(r, noise):
     ms)^r, or 0.
     """
     fields = dict(SECOND if r == 2 else THIRD)
-    laws, settled = fields.pop("law"), fields.pop("settled")
+    laws = fields.pop("law")
+    settled = fields.pop("settled")
     scenarios = []
     for law in laws:
         for h in PERIODS:

@@ -99,7 +99,9 @@ def test_rows_of_siconos_are_reproduced(which, rows):
 @files
 @pytest.mark.parametrize(("which", "name"), [(0, "smc-implicit"), (1, "smc-explicit")])
 def test_trajectories_of_siconos_are_reproduced(which, name):
-    data, trace, x1 = published(name), first_example()[which], first_example()[2]
+    data = published(name)
+    trace = first_example()[which]
+    x1 = first_example()[2]
     at = np.arange(101) * round(PERIOD / STEP)
     np.testing.assert_allclose(trace.v[:, 0], data["x2"][at], rtol=0, atol=EXACT)
     np.testing.assert_allclose(x1.v[:, 0], data["x1"][at], rtol=0, atol=EXACT)
@@ -129,8 +131,10 @@ def implicit_twisting(y, gains, memory):
     and jumps at two places. Its zero is at one of them, or at one of the three values that u has
     between them.
     """
-    a, b = gains.G * (1.0 + gains.beta * y.dt / 2.0), gains.G * gains.beta
-    first, second = -(y.e + 1.5 * y.dt * y.de) / y.dt**2, -y.de / y.dt
+    a = gains.G * (1.0 + gains.beta * y.dt / 2.0)
+    b = gains.G * gains.beta
+    first = -(y.e + 1.5 * y.dt * y.de) / y.dt**2
+    second = -y.de / y.dt
     if first > second:
         first, second, a, b = second, first, b, a
     return min(a + b, max(first, min(b - a, max(second, -a - b)))), y.e
@@ -163,7 +167,8 @@ def test_trajectory_of_siconos_implicit_twisting_is_reproduced():
     """u is compared as the force G (u1 + beta u2): at rest the two multipliers are not unique,
     their sum is.
     """
-    data, trace = published("twisting-implicit"), twisting_runs()[0]
+    data = published("twisting-implicit")
+    trace = twisting_runs()[0]
     np.testing.assert_allclose(trace.x[:, 0], data["x1"], rtol=0, atol=EXACT)
     np.testing.assert_allclose(trace.v[:, 0], data["x2"], rtol=0, atol=EXACT)
     force = 10.0 * (data["u1"] + 0.3 * data["u2"])

@@ -122,11 +122,9 @@ def test_fixed_time_reaching_is_bounded_by_the_least_bound_and_not_by_polyakov_s
     time" and gives "the smallest constant that uniformly upper bounds the settling time". With s =
     z^2 the integral is elementary.
     """
-    law, least, classical = (
-        smc.law("fixed_time", k1=2.0, k2=2.0, a=0.5, b=1.5, k=0.0, c=0.0),
-        math.pi / 2,
-        2.0,
-    )
+    law = smc.law("fixed_time", k1=2.0, k2=2.0, a=0.5, b=1.5, k=0.0, c=0.0)
+    least = math.pi / 2
+    classical = 2.0
     times = []
     for start in (1.0, 100.0, 1e4):
         (trace,) = run([law], v0=start, control_period=2.5e-4, duration=2.0, integrator="Euler")

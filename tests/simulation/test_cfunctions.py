@@ -42,12 +42,10 @@ def hits(function, **options) -> int:
 
 def force(function) -> float:
     """The u of a compiled law at 0, with a gain of 3."""
-    inputs, gains, memory, out = (
-        np.zeros(len(Measurement._fields)),
-        np.array([3.0]),
-        np.zeros(1),
-        np.zeros(2),
-    )
+    inputs = np.zeros(len(Measurement._fields))
+    gains = np.array([3.0])
+    memory = np.zeros(1)
+    out = np.zeros(2)
     done = compiled(function)
     assert done._cfunc.ctypes(*(a.ctypes.data for a in (inputs, gains, memory, out))) == 0
     return out[0]

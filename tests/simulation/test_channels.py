@@ -14,7 +14,8 @@ import smc_mujoco as smc
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.studies import run_key
 
-SINE, MOVE = smc.Sine(0.3, 4.0), smc.signals.MinimumJerk(0.4, 0.01, 0.03)
+SINE = smc.Sine(0.3, 4.0)
+MOVE = smc.signals.MinimumJerk(0.4, 0.01, 0.03)
 REST = smc.Constant(0.0)
 PENDULUM = """
 <mujoco><worldbody><body><joint name="shoulder" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/>
@@ -87,7 +88,8 @@ def test_each_channel_runs_as_it_would_under_its_law_alone():
     """
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
     laws = [smc.law("classical", k=2.0), smc.law("twisting"), smc.law("super_twisting", k2=3.0)]
-    signals, bounds = [SINE, MOVE, smc.Constant(0.1)], [1.0, 2.0, 3.0]
+    signals = [SINE, MOVE, smc.Constant(0.1)]
+    bounds = [1.0, 2.0, 3.0]
     together = smc.run(
         smc.Scenario(plant=plant, law=laws, reference=signals, u_max=bounds, duration=0.2)
     )
@@ -96,7 +98,8 @@ def test_each_channel_runs_as_it_would_under_its_law_alone():
             smc.Scenario(plant=plant, law=law, reference=signal, u_max=bound, duration=0.2)
         )
         for name in set(ARRAYS) - {"t"}:
-            one, other = getattr(together, name)[:, i], getattr(alone, name)[:, i]
+            one = getattr(together, name)[:, i]
+            other = getattr(alone, name)[:, i]
             np.testing.assert_allclose(
                 one, other, rtol=1e-12, atol=1e-13, err_msg=name
             )  # MuJoCo solves for all at once

@@ -101,7 +101,8 @@ def test_a_command_acts_from_its_own_time_on(delay):
     trace = smc.run(
         scenario(smc.Clock(jitter=0.9 * PERIOD, missed=0.2), input_delay=delay * PERIOD / STEPS)
     )
-    u, acting = trace.u[:, 0], np.zeros((len(trace.t) - 1) * STEPS)
+    u = trace.u[:, 0]
+    acting = np.zeros((len(trace.t) - 1) * STEPS)
     for sample, start in zip(
         u, np.round((trace.t + late(trace) * PERIOD / STEPS) / PERIOD * STEPS), strict=True
     ):

@@ -269,7 +269,8 @@ def pid(y, gains, memory):
     return -gains.k * y.e, y.e
 
 
-SLOW, QUICK = smc.law("classical", k=2.0), smc.law("classical", k=6.0)
+SLOW = smc.law("classical", k=2.0)
+QUICK = smc.law("classical", k=6.0)
 
 
 def test_grid_refuses_two_things_of_one_name(refused):
@@ -509,10 +510,8 @@ def test_commands_refuse_in_one_sentence(arguments, words, tmp_path, monkeypatch
 
 def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    runner, common = (
-        CliRunner(),
-        ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"],
-    )
+    runner = CliRunner()
+    common = ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"]
     tuned = ["tune", "arm.xml:shoulder", "pid", "--budget", "2", "--out", "arm_pid.json"]
     assert runner.invoke(app, [*tuned, *common]).exit_code == 0
     laws = "arm_pid.json,classical(k=5, c=2e0),quick: classical(k=9)"

@@ -31,7 +31,8 @@ BRIEF, SLOW, LONG = (
     4.0,
     5.0,
 )  # s: of most runs here, of Van der Pol's, of what hunts or creeps. The study's: 10 s
-HUNTING, CREEPING = ("backlash", "encoder"), ("lugre",)
+HUNTING = ("backlash", "encoder")
+CREEPING = ("lugre",)
 
 PARTS = {
     "viscous": {"friction": smc.Viscous(0.1)},

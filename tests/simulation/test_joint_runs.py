@@ -127,7 +127,8 @@ def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
     rng = np.random.default_rng(1)
     model = arm.load()
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
-    data, dofs = mujoco.MjData(model), [2, 0, 1]
+    data = mujoco.MjData(model)
+    dofs = [2, 0, 1]
     for _ in range(10):
         x, v, a = rng.normal(size=(3, 3))
         data.qpos[dofs], data.qvel[dofs], data.qacc[dofs] = x, v, a
@@ -145,7 +146,9 @@ def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
 def test_the_jacobian_is_the_tips_velocity(arm):
     """Its columns are those of the channels, in their order, not the model's."""
     model = arm.load()
-    data, x, h = mujoco.MjData(model), np.array([0.1, 0.4, -0.3]), 1e-6
+    data = mujoco.MjData(model)
+    x = np.array([0.1, 0.4, -0.3])
+    h = 1e-6
 
     def place(at):
         data.qpos[[2, 0, 1]] = at
@@ -164,7 +167,8 @@ def test_coriolis_is_christoffels(arm):
     w.
     """
     rng = np.random.default_rng(2)
-    values, h = Values(**arm.parameters), 1e-5
+    values = Values(**arm.parameters)
+    h = 1e-5
     nominal = arm.nominal
     assert isinstance(nominal, NominalModel)
     damping = np.array([0.3, 0.1, 0.0])

@@ -211,7 +211,8 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
 
 def test_a_jump_at_the_last_step_is_in_the_last_sample():
     """The jump makes the lever of the gust longer."""
-    gust, jump = smc.signals.Gust(2.0, 0.0, 0.02), smc.Jump(0.00999, {"l": 1.5})
+    gust = smc.signals.Gust(2.0, 0.0, 0.02)
+    jump = smc.Jump(0.00999, {"l": 1.5})
     longer = smc.Scenario(
         plant="inverted_pendulum", law="none", duration=0.01, disturbance=gust, jump=jump
     )
@@ -287,7 +288,8 @@ def test_a_voltage_and_a_feedforward_are_the_same_in_both_loops():
         input_delay=1e-3,
         duration=0.3,
     )
-    trace, other = smc.run(scenario), reference.run(scenario)
+    trace = smc.run(scenario)
+    other = reference.run(scenario)
     for name in ARRAYS:
         np.testing.assert_allclose(
             getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name
@@ -552,7 +554,8 @@ def predict():
 @pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 def test_a_python_law_may_run_scenarios_of_its_own():
     inner = smc.Scenario(plant="duffing", law="classical", duration=0.005)
-    alone, inside = smc.run(inner), []
+    alone = smc.run(inner)
+    inside = []
     trace = smc.run(uncompiled(lambda: inside.append(smc.run(inner)), duration=0.005))
     assert trace.failure is None
     np.testing.assert_array_equal(trace.x, smc.run(uncompiled(duration=0.005)).x)
@@ -562,9 +565,11 @@ def test_a_python_law_may_run_scenarios_of_its_own():
 
 @pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 def test_a_plain_loop_does_not_disturb_runs_on_another_thread():
-    started, stop = threading.Event(), threading.Event()
+    started = threading.Event()
+    stop = threading.Event()
     quick = smc.Scenario(plant="duffing", law="classical", duration=0.05)
-    alone, slow = smc.run(quick), []
+    alone = smc.run(quick)
+    slow = []
 
     def think():
         started.set()

@@ -65,7 +65,8 @@ def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, mon
     scenario = smc.Scenario(
         plant="cart_pole", law="classical", contact=contact, x0=(1.2, 0.0), duration=0.5
     )
-    whole, bare = compile_model(scenario), compile_model(scenario, scenery=False)
+    whole = compile_model(scenario)
+    bare = compile_model(scenario, scenery=False)
     assert (bare.ngeom, bare.nlight, bare.ncam) == (geoms, 0, 0)
     assert (bare.npair, bare.nsensor) == (whole.npair, whole.nsensor)
     short = smc.run(scenario)
@@ -94,7 +95,8 @@ def test_the_scenery_of_a_users_model_stays():
 
 
 def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypatch):
-    made, compiled = [], model.compile_model
+    made = []
+    compiled = model.compile_model
     monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
     monkeypatch.setattr(
         model, "compile_model", lambda *args, **named: made.append(args) or compiled(*args, **named)

@@ -123,7 +123,8 @@ def test_pandas_has_every_column_bit_for_bit_with_units(trace, cart):
 
 
 def test_arrow_has_every_column_bit_for_bit(cart):
-    columns, table = cart.columns(), pyarrow.table(cart)
+    columns = cart.columns()
+    table = pyarrow.table(cart)
     assert table.column_names == list(columns)
     assert all(np.array_equal(table[name].to_numpy(), columns[name]) for name in columns)
 

@@ -80,7 +80,8 @@ def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
     other = {"mjModel": "dof_damping", "mjData": "qacc_warmstart"}[STRUCTS[name]]
 
     def swap(fields):
-        here, there = position(fields, name), position(fields, other)
+        here = position(fields, name)
+        there = position(fields, other)
         fields[here], fields[there] = fields[there], fields[here]
         return fields
 

@@ -59,7 +59,8 @@ def test_philox_takes_the_float_arguments_that_a_row_holds():
 def test_normals_are_box_muller_of_the_top_53_bits():
     for k in range(200):
         a, b, _, _ = (int(w) >> 11 for w in numpys(5, 2, philox.MEASUREMENT, k))
-        radius, angle = math.sqrt(-2 * math.log((a + 1) / 2**53)), 2 * math.pi * b / 2**53
+        radius = math.sqrt(-2 * math.log((a + 1) / 2**53))
+        angle = 2 * math.pi * b / 2**53
         expected = radius * math.cos(angle), radius * math.sin(angle)
         np.testing.assert_allclose(
             philox.normals(5, 2, philox.MEASUREMENT, k), expected, rtol=1e-14, atol=1e-15
@@ -79,9 +80,9 @@ def test_normals_are_standard_normal():
 
 @pytest.mark.slow
 def test_pairs_channels_streams_seeds_and_samples_are_independent():
-    n, keys = (
-        20_000,
-        itertools.product((0, 1, 2, LARGEST_SEED), (0, 1, 2), (philox.MEASUREMENT, philox.PROCESS)),
+    n = 20_000
+    keys = itertools.product(
+        (0, 1, 2, LARGEST_SEED), (0, 1, 2), (philox.MEASUREMENT, philox.PROCESS)
     )
     series = np.concatenate([draws(*key, n).T for key in keys])
     later = np.roll(series, 1, axis=1)
@@ -141,7 +142,8 @@ def test_position_and_velocity_noise_are_switched_separately():
     assert not at_rest(show_velocity, noise=smc.Noise(position=0.5)).any()
 
 
-TAU, SIGMA = 0.05, 0.7
+TAU = 0.05
+SIGMA = 0.7
 
 
 def path(signal, times, seed=0, channel=0):
@@ -153,7 +155,8 @@ def path(signal, times, seed=0, channel=0):
 
 
 def test_process_noise_has_its_standard_deviation_and_correlation_time():
-    knots, dt = 400_000, 5e-3
+    knots = 400_000
+    dt = 5e-3
     d = path(smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt), np.arange(knots) * dt, seed=3)
     independent = knots * dt / (2 * TAU)
     assert abs(d.mean()) < 4 * SIGMA / math.sqrt(independent)

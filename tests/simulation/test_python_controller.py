@@ -51,12 +51,12 @@ def test_it_gives_the_u_and_s_of_the_run_from_the_positions_and_velocities_of_th
 
 def test_new_gains_leave_the_memory_and_a_new_controller_has_none():
     law = smc.law("super_twisting")
-    scenario, more = (
-        smc.Scenario(plant="duffing", law=law),
-        dataclasses.replace(law, gains=dict(law.gains) | {"k1": 9.0}),
-    )
-    x, v = np.array([0.3]), np.array([-0.1])
-    first, other = Controller(scenario), Controller(scenario)
+    scenario = smc.Scenario(plant="duffing", law=law)
+    more = dataclasses.replace(law, gains=dict(law.gains) | {"k1": 9.0})
+    x = np.array([0.3])
+    v = np.array([-0.1])
+    first = Controller(scenario)
+    other = Controller(scenario)
     for controller in (first, other):
         controller(0, 0.0, x, v)
     other.set_gains(more)
@@ -68,7 +68,8 @@ def test_new_gains_leave_the_memory_and_a_new_controller_has_none():
 
 
 def test_what_the_sensors_read_is_not_written_to():
-    x, v = np.array([0.3]), np.array([-0.1])
+    x = np.array([0.3])
+    v = np.array([-0.1])
     Controller(smc.Scenario(plant="duffing", law="classical", noise=NOISE))(1, 1e-3, x, v)
     assert (x[0], v[0]) == (0.3, -0.1)
 

@@ -119,7 +119,8 @@ def test_callback_equals_plain_loop_with_every_part():
 @PLANTS
 def test_callback_equals_plain_loop_in_every_contact_and_mechanism(name):
     """Each of them plain or with a motor, a play and friction in turn."""
-    plant, full = small(name), {"friction": LUGRE, "actuator": (MOTOR, smc.Backlash(0.01))}
+    plant = small(name)
+    full = {"friction": LUGRE, "actuator": (MOTOR, smc.Backlash(0.01))}
     kinds = []
     for c in ("none", *plant.contacts):
         for m in ("equation", *plant.mechanisms):
@@ -146,7 +147,8 @@ def scattered(number):
     """A random valid realistic scenario."""
     rng = np.random.default_rng(number)
     plant = small(str(rng.choice(list(smc.paper.GAINS))))
-    u, h = rng.uniform, 2.5e-4
+    u = rng.uniform
+    h = 2.5e-4
     frictions = {
         "viscous": smc.Viscous(u(0, 1)),
         "coulomb": smc.Coulomb(pick(rng, 0.0, u(0, 2))),
@@ -330,7 +332,8 @@ def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
 )
 def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
     common = {"physics_step": 2.5e-4, "integrator": "implicitfast"}
-    ideal, realistic = scenario(**common), scenario(**common, **fields)
+    ideal = scenario(**common)
+    realistic = scenario(**common, **fields)
     assert prepare(ideal).key != prepare(realistic).key
     for s, trace in zip(
         (realistic, ideal, realistic), smc.run([realistic, ideal, realistic]), strict=True
@@ -470,8 +473,10 @@ def balance(trace, end=-1):
     (n,).
     """
     s = trace.scenario
-    values, x = s.plant.values({}), trace.x[end]
-    law, gains = s.law.name, s.law.gains
+    values = s.plant.values({})
+    x = trace.x[end]
+    law = s.law.name
+    gains = s.law.gains
     if law == "observer_free":
         u = -gains["lam"] * np.tanh(gains["k1"] * x)
     else:
@@ -539,7 +544,8 @@ def energies(s):
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = models.initial_state(model, s)
-    energy, found = data.energy, []
+    energy = data.energy
+    found = []
     for _ in range(s.samples * s.steps):
         mujoco.mj_step(model, data)
         found.append(energy[0] + energy[1])
@@ -584,12 +590,14 @@ def test_a_passive_mechanism_never_gains_energy(name, part):
 
 @PLANTS
 def test_a_jump_of_the_mass_leaves_the_parts_as_they_are(name):
-    rotor, extra = smc.DCMotor(rotor_inertia=1e-4), smc.Viscous(0.3)
+    rotor = smc.DCMotor(rotor_inertia=1e-4)
+    extra = smc.Viscous(0.3)
     s = scenario(
         name, actuator=rotor, friction=(extra, smc.Coulomb(0.2)), jump=smc.Jump(0.05, {"mass": 3.0})
     )
     compiled = models.compile_model(s)
-    before, after = models.with_values(compiled, s), models.with_values(compiled, s, s.jump_step)
+    before = models.with_values(compiled, s)
+    after = models.with_values(compiled, s, s.jump_step)
     dofs = dof_ids(compiled)
     own = models.with_values(models.compile_model(scenario(name)), scenario(name))
     for model in (before, after):
@@ -721,7 +729,8 @@ def test_the_impulse_of_all_forces_is_the_change_of_momentum(name, part):
     """
     fields = dict(PUSHED[part])
     n = {"n": 3} if smc.plant(name).n > 1 else {}
-    plant, h = smc.plant(name, **LOSSLESS[name], **n), 2.5e-4
+    plant = smc.plant(name, **LOSSLESS[name], **n)
+    h = 2.5e-4
     common = {
         "control_period": h,
         "physics_step": h,
@@ -907,7 +916,8 @@ EVERYTHING = {
 
 
 def test_defaults_follow_the_fields_that_are_given():
-    ideal, realistic = scenario(), scenario(friction=smc.Viscous(0.1))
+    ideal = scenario()
+    realistic = scenario(friction=smc.Viscous(0.1))
     assert (ideal.resolved.integrator, ideal.resolved.physics_step) == ("RK4", 1e-3)
     assert (realistic.resolved.integrator, realistic.resolved.physics_step) == (
         "implicitfast",

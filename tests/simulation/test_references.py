@@ -70,7 +70,8 @@ def test_no_other_move_between_the_same_rests_has_less_jerk():
     """The integral of the squared third derivative: 720 A^2/T^5, and more for the quintic plus any
     a^3 (1 - a)^3.
     """
-    move, h = MinimumJerk(1.0, 0.0, 1.0), 1e-3
+    move = MinimumJerk(1.0, 0.0, 1.0)
+    h = 1e-3
     t = np.arange(0.0, 1.0 + h / 2, h)
     ddr = np.array([at(move, ti)[2] for ti in t])
     bump = 6 * t - 36 * t**2 + 60 * t**3 - 30 * t**4  # second derivative of a^3 (1 - a)^3
@@ -97,7 +98,8 @@ def test_a_reference_is_followed_alike_in_both_loops(signal):
         reference=signal,
         duration=0.5,
     )
-    fast, slow = smc.run(scenario), reference.run(scenario)
+    fast = smc.run(scenario)
+    slow = reference.run(scenario)
     for name in ("x", "v", "u", "r"):
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
     np.testing.assert_array_equal(fast.r[:, 0], [at(signal, t)[0] for t in fast.t])
@@ -145,7 +147,8 @@ def followed():
 
     It starts at a wrong speed of the sine.
     """
-    sine, move = Sine(0.5, 2.0), MinimumJerk(0.5, 0.5, 1.5)
+    sine = Sine(0.5, 2.0)
+    move = MinimumJerk(0.5, 0.5, 1.5)
     common = {
         "model": "nominal",
         "x0": 0.0,

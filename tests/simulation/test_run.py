@@ -48,7 +48,8 @@ def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(
     scenarios = []
     for seed in (0, 1):
         scenarios.append(smc.Scenario(**{"law": "classical", "duration": 0.2} | fields, seed=seed))
-    flags, its = [], runs.ScenarioBatch.may_have_constraints
+    flags = []
+    its = runs.ScenarioBatch.may_have_constraints
     monkeypatch.setattr(
         runs.ScenarioBatch,
         "may_have_constraints",
@@ -545,7 +546,8 @@ def test_a_callback_that_was_installed_is_put_back():
     smc.run(scenario())  # has imported all there is to import: mujoco.batch compiles a model
     mujoco.set_mjcb_control(mine)
     try:
-        trace, plain = smc.run(scenario()), plainly(scenario(made(with_json, {"k": 2.0})))
+        trace = smc.run(scenario())
+        plain = plainly(scenario(made(with_json, {"k": 2.0})))
         assert mujoco.get_mjcb_control() is mine
     finally:
         mujoco.set_mjcb_control(None)

@@ -321,7 +321,8 @@ def test_the_sign_of_zero_is_zero_whatever_came_before(name):
 
 @pytest.mark.parametrize(("leak_dt", "k0"), [(0.5, 0.0), (1.5, 2.0), (100.0, 2.0)])
 def test_the_gain_of_adaptive_leak_never_falls_below_0(leak_dt, k0):
-    template, memory = catalogue()["adaptive_leak"], np.zeros(8)
+    template = catalogue()["adaptive_leak"]
+    memory = np.zeros(8)
     gains = record(
         dict(template.defaults) | {"leak": leak_dt / 1e-2, "k0": k0, "gamma": 40.0, "c": 1.0}
     )
@@ -394,7 +395,8 @@ LARGE = [
 
 @pytest.mark.parametrize("large", LARGE, ids=["law", "noise", "delay", "estimator", "log"])
 def test_the_estimated_memory_of_a_simulation_is_what_it_takes(large):
-    model, prepared = large.plant.load(nuserdata=2), prepare(large)
+    model = large.plant.load(nuserdata=2)
+    prepared = prepare(large)
     log = np.empty((large.samples + 1, large.plant.n), state.LOG)
     _, packed = pack(prepared, log)
     struct = callback.offsets().userdata  # its arrays of statistics come first, and are most of it
@@ -802,7 +804,8 @@ def test_a_scenario_hashes_and_comes_back_equal_and_unchangeable(copied):
 
 
 def test_equal_scenarios_hash_alike_in_any_order_of_their_factors():
-    a, b = scenario(mismatch={"M": 1.1, "alpha": 0.9}), scenario(mismatch={"alpha": 0.9, "M": 1.1})
+    a = scenario(mismatch={"M": 1.1, "alpha": 0.9})
+    b = scenario(mismatch={"alpha": 0.9, "M": 1.1})
     assert a == b
     assert hash(a) == hash(b)
 

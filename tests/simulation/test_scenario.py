@@ -17,7 +17,8 @@ from smc_mujoco.simulation.signals import PerChannel, Relay
 
 pytestmark = pytest.mark.quick
 
-NAN, INF = math.nan, math.inf
+NAN = math.nan
+INF = math.inf
 COME = smc.Step(1.0)
 TINY, HUGE = 1e-320, 1e308  # subnormal; its quotient with anything small overflows
 

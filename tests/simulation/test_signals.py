@@ -77,7 +77,8 @@ def scenario(**fields):
 
 def written(signal, times, seed=3, channel=1, stream=2):
     """Its values and derivatives at some times, (K, 3), by the Python function that it is."""
-    memory, value = np.zeros(max(signal.memory, 1)), type(signal).value
+    memory = np.zeros(max(signal.memory, 1))
+    value = type(signal).value
     if signal.random:
         state = (memory, seed, channel, stream)
     else:
@@ -90,11 +91,11 @@ def compiled(signal, times, seed=3, channel=1, stream=2):
     """The same, by the C function that the callback calls."""
     function = cfunctions.compile_signal(signal)
     call = FUNCTION(function.address)
-    inputs, values = (
-        np.array([0.0, seed, channel, stream, *SEEN]),
-        np.array([*cfunctions.signal_values(signal), 0.0]),
-    )
-    memory, outputs, found = np.zeros(max(signal.memory, 1)), np.empty(3), []
+    inputs = np.array([0.0, seed, channel, stream, *SEEN])
+    values = np.array([*cfunctions.signal_values(signal), 0.0])
+    memory = np.zeros(max(signal.memory, 1))
+    outputs = np.empty(3)
+    found = []
     for t in times:
         inputs[0] = t
         assert call(*(array.ctypes.data for array in (inputs, values, memory, outputs))) == 0
@@ -148,7 +149,8 @@ def test_a_signal_disturbs_alike_in_both_loops(signal):
     made = scenario(
         plant=smc.plant("pendulum_network", n=2), disturbance=[signal, Sine(0.1, 3.0)], duration=0.4
     )
-    fast, slow = smc.run(made), reference.run(made)
+    fast = smc.run(made)
+    slow = reference.run(made)
     assert fast.failure is None
     for name in ("x", "v", "u", "d"):
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
@@ -164,7 +166,8 @@ def test_a_time_series_is_followed_alike_in_both_loops():
 
 
 def test_a_gust_is_a_smooth_bump():
-    gust, w = Gust(2.0, 0.3, 0.7), 2 * math.pi / 0.7
+    gust = Gust(2.0, 0.3, 0.7)
+    w = 2 * math.pi / 0.7
     inside = np.linspace(0.3, 1.0, 101)
     np.testing.assert_allclose(path(gust, inside), 1.0 - np.cos(w * (inside - 0.3)), atol=1e-14)
     assert path(gust, [0.65]) == 2.0
@@ -231,7 +234,8 @@ def test_a_gust_turns_a_hinge_by_its_arm():
             data.qpos[0] = 0.4
             mujoco.mj_forward(model, data)
             (channel,) = channels(model)
-            torque, push = np.zeros(model.nv), np.array([float(name == force) for name in "xyz"])
+            torque = np.zeros(model.nv)
+            push = np.array([float(name == force) for name in "xyz"])
             mujoco.mj_applyFT(model, data, push, np.zeros(3), data.xipos[1], 1, torque)
             at = np.rec.array(channel)
             found = lever.py_func(at, data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel())
@@ -286,7 +290,8 @@ def test_band_limited_noise_has_its_variance_over_seeds_and_channels():
 
 
 def test_band_limited_noise_has_no_power_outside_its_band():
-    h, n = 5e-3, 40_000
+    h = 5e-3
+    n = 40_000
     window = np.blackman(n)
     power = np.abs(np.fft.rfft(window * path(NOISE, h * np.arange(n)))) ** 2
     f = np.fft.rfftfreq(n, h)
@@ -352,7 +357,8 @@ def test_a_band_may_begin_at_zero_and_have_no_power():
 def test_a_time_series_is_straight_between_its_points_and_zero_outside():
     rng = np.random.default_rng(1)
     for n in (2, 3, 4, 7, 100):
-        times, values = np.cumsum(rng.exponential(size=n)), rng.normal(size=n)
+        times = np.cumsum(rng.exponential(size=n))
+        values = rng.normal(size=n)
         at = np.concatenate([rng.uniform(0.0, times[-1] + 1.0, 200), times])
         expected = np.interp(at, times, values, left=0.0, right=0.0)
         np.testing.assert_allclose(

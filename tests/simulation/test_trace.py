@@ -562,7 +562,8 @@ def test_a_name_too_long_is_refused(trace, tmp_path, refused):
 def test_a_disk_that_is_full_leaves_the_old_file_and_no_other(ending, samples, room, tmp_path):
     import resource
 
-    path, limits = tmp_path / f"a.{ending}", resource.getrlimit(resource.RLIMIT_FSIZE)
+    path = tmp_path / f"a.{ending}"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=samples * 1e-3))
     WRITERS[ending](trace, path)
     old = path.read_bytes()

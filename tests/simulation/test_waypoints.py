@@ -11,7 +11,8 @@ import smc_mujoco as smc
 
 pytestmark = pytest.mark.quick
 
-TIMES, VALUES = (0.2, 0.5, 1.3, 1.5, 2.0), (0.1, 0.6, -0.4, 0.0, 0.3)
+TIMES = (0.2, 0.5, 1.3, 1.5, 2.0)
+VALUES = (0.1, 0.6, -0.4, 0.0, 0.3)
 
 
 def of(signal, t):
@@ -46,7 +47,8 @@ def test_waypoints_passes_its_points_and_rests_at_both_ends():
 
 
 def test_waypoints_rates_are_derivatives_and_its_fourth_is_continuous():
-    signal, h = smc.signals.Waypoints(TIMES, VALUES), 1e-4
+    signal = smc.signals.Waypoints(TIMES, VALUES)
+    h = 1e-4
     t = np.linspace(0.25, 1.95, 200)
     (before, rate, _), (after, later, _) = of(signal, t - h), of(signal, t + h)
     _, dr, ddr = of(signal, t)
@@ -60,7 +62,8 @@ def test_waypoints_rates_are_derivatives_and_its_fourth_is_continuous():
 
 
 def test_waypoints_has_the_least_jerk_of_all_through_its_points():
-    data, rng = smc.signals.Waypoints(TIMES, VALUES).data, np.random.default_rng(0)
+    data = smc.signals.Waypoints(TIMES, VALUES).data
+    rng = np.random.default_rng(0)
     states = data[1:].T
     least = jerk_squared(TIMES, states)
     for _ in range(20):
@@ -70,10 +73,8 @@ def test_waypoints_has_the_least_jerk_of_all_through_its_points():
 
 
 def test_waypoints_of_two_points_are_minimum_jerk():
-    signal, move = (
-        smc.signals.Waypoints((0.5, 1.7), (0.0, 0.8)),
-        smc.signals.MinimumJerk(0.8, 0.5, 1.2),
-    )
+    signal = smc.signals.Waypoints((0.5, 1.7), (0.0, 0.8))
+    move = smc.signals.MinimumJerk(0.8, 0.5, 1.2)
     t = np.linspace(0.0, 2.0, 101)
     expected = np.array([move.value(one, move) for one in t]).T
     np.testing.assert_allclose(of(signal, t), expected, atol=1e-12)

@@ -30,10 +30,8 @@ from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.studies import adviser, fair_gains
 from smc_mujoco.studies.advice import NEEDS
 
-FAST, SLOW = (
-    smc.law("observer_free", lam=6.0, k1=2.0),
-    smc.law("observer_free", lam=6.0, k1=5.0).named("slow"),
-)
+FAST = smc.law("observer_free", lam=6.0, k1=2.0)
+SLOW = smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
 COMMON = {"duration": 2.5, "seeds": 16, "conditions": ["nominal", "noise"]}
 
 
@@ -198,7 +196,8 @@ def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
     """Slow has the lower median in three blocks, but is ahead in half of the seeds only; in the
     fourth it is worse.
     """
-    mixed, even = np.tile([0.5, 1.6], 12), np.ones(24)
+    mixed = np.tile([0.5, 1.6], 12)
+    even = np.ones(24)
     cells = {"observer_free": [mixed, mixed, mixed, 5 * even], "slow": [even, even, even, 9 * even]}
     found = with_cells(advice, **cells)
     first, second = found.choices
@@ -215,7 +214,8 @@ def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
 
 def test_laws_that_tie_stand_in_the_order_of_overshoot_and_energy_and_the_answer_says_so(advice):
     cells = {"observer_free": [1.0, 1, 9, 9], "slow": [1.01, 1, 9, 9], "classical": [2, 2, 9, 9]}
-    less, more = {"slow": (1.0, 1.0)}, {"slow": (1.5, 1.0)}
+    less = {"slow": (1.0, 1.0)}
+    more = {"slow": (1.5, 1.0)}
     others = {"observer_free": (1.0, 2.0), "classical": (1.0, 3.0)}
     for restraint, first in ((less, "slow"), (more, "observer_free")):
         found = with_cells(advice, restraint | others, **cells)
@@ -405,7 +405,9 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
     def my_pd(y, gains, memory):
         return -gains.kp * y.e - gains.kd * y.de, y.e
 
-    heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
+    heavy = smc.plant("duffing", M=2.0)
+    tuned = []
+    tune = search.tune
     monkeypatch.setattr(
         search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1]
     )
@@ -446,7 +448,8 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
     def build(n):
         return mujoco.MjSpec.from_string("<mujoco/>")
 
-    asked, tuned = [], types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
+    asked = []
+    tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(
         fair_gains, "cached", lambda path, depends, *rest: asked.append(depends) or tuned
     )
@@ -474,7 +477,8 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeyp
         "its defaults, better than those tried",
     )
     assert own.law.source.kind == FAST.source.kind
-    tuned.before, tuned.bounds = 3.0, FAST.gains
+    tuned.before = 3.0
+    tuned.bounds = FAST.gains
     tuned.sets = [
         types.SimpleNamespace(gains=tuple(FAST.gains.values())),
         types.SimpleNamespace(gains=(5.0, 2.5)),
@@ -676,7 +680,8 @@ def test_every_answer_begins_with_a_law_or_with_why_there_is_none_and_its_table_
     assert set(starts) == set(made)
     for name, one in made.items():
         (table,) = one.tables
-        text, laws = " ".join(table.notes), [choice.law.name for choice in one.choices]
+        text = " ".join(table.notes)
+        laws = [choice.law.name for choice in one.choices]
         assert starts[name] in text, name
         others = []
         for start in begins:

@@ -27,10 +27,8 @@ def stopped(monkeypatch):
     """What gains, combinations of runs and a study were given; none is searched or run."""
 
     def gains(trial, plant, laws, budget, **options):
-        names, given = (
-            [law.name for law in laws],
-            [budget, trial.starts, trial.threads, trial.progress],
-        )
+        names = [law.name for law in laws]
+        given = [budget, trial.starts, trial.threads, trial.progress]
         calls.append(
             f"gains {plant.name} {names} {trial.folder.name} {told(given)} {told(options)}"
         )

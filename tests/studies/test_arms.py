@@ -40,15 +40,18 @@ def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     trace = smc.run(
         smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05)
     )
-    rms, rate = smc.metrics.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
+    rms = smc.metrics.tip_scores(trace)["rms_error"]
+    rate = smc.score(trace)["tv_rate"]
     assert arm_study.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
     assert np.isfinite(arm_study.cost(trace))
 
 
 def test_a_run_that_fails_does_not_come_back_to_its_path():
-    n, t = 7, np.array([0.0, 1.0, 2.0, 3.0])
+    n = 7
+    t = np.array([0.0, 1.0, 2.0, 3.0])
     scenario = smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), duration=3.0)
-    rest, zero = np.tile(arms.arm().rest, (4, 1)), np.zeros((4, n))
+    rest = np.tile(arms.arm().rest, (4, 1))
+    zero = np.zeros((4, n))
     moved = rest + np.array([[0.0], [0.0], [1.0], [0.0]])
     failed = moved + np.array([[0.0], [0.0], [0.0], [np.nan]])
     for x, back in ((rest, 0.0), (moved, 2.0), (failed, np.inf), (rest + np.nan, np.inf)):

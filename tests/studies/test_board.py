@@ -38,7 +38,8 @@ class Stand:
     """
 
     def __init__(self, seeds: int = SEEDS, conditions: tuple[str, ...] = ("nominal",)):
-        laws, count = len(LAWS), seeds * len(conditions)
+        laws = len(LAWS)
+        count = seeds * len(conditions)
         noise = np.random.default_rng(0).uniform(0.9, 1.1, (laws, count))
         sizes = np.array([[1.0], [2.0], [4e-7]])
         self.columns = {
@@ -136,7 +137,8 @@ def test_printed_median_lies_in_its_printed_interval(values):
 
 
 def test_only_what_no_law_beats_is_bold(boards):
-    first, second = boards[0], boards[1]
+    first = boards[0]
+    second = boards[1]
     assert first.winner == "third"
     assert bold(first._repr_html_())[1:] == [
         cells(Boards([first]))[0]["third"][0].split()[0]
@@ -282,7 +284,8 @@ def test_every_column_has_its_unit_every_cell_its_interval_and_each_metric_one_v
             data.column("condition") == "noise", "inverted_pendulum", "duffing"
         )
     made = leaderboard(data, **options)
-    said, tables = " ".join(plain(made, 100).split()), made.tables
+    said = " ".join(plain(made, 100).split())
+    tables = made.tables
     names = {"itae": "ITAE", "settles": "share that settles", "ultimate_bound": "ultimate bound"}
     for one in made:
         length = "rad" if "pendulum" in one.about else "m"

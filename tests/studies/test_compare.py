@@ -325,10 +325,8 @@ def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
 
 def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(worst_case, "default_budget", lambda scenario, within: 8)
-    within, laws = (
-        smc.Uncertainty(disturbance=0.5),
-        [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)],
-    )
+    within = smc.Uncertainty(disturbance=0.5)
+    laws = [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
     made = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     for found in made.worst["duffing"].values():
         assert smc.score(smc.run(found.scenario))["rms_error"] == found.value >= found.median

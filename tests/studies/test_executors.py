@@ -141,7 +141,8 @@ class Elsewhere(ThreadPoolExecutor):
     end.
     """
 
-    tasks, last = 0, 10**9
+    tasks = 0
+    last = 10**9
 
     def submit(self, fn, /, *args, **kwargs):
         self.tasks += 1
@@ -204,7 +205,8 @@ def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(
     monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 200)
     monkeypatch.setattr(executors, "MAX_BATCHES_SENT", 1)
     with Elsewhere(1) as pool:
-        pool.last, pool.end = 4, end
+        pool.last = 4
+        pool.end = end
         with pytest.raises(
             smc.ScenarioError,
             match=r"^the executor has stopped \(.+\): start it and the study again to continue$",
@@ -214,12 +216,14 @@ def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(
 
 
 def test_finished_parts_are_kept_before_an_error_is_raised(monkeypatch):
-    batches, kept = [[prepare(scenario)] for scenario in mixed()[:6]], []
+    batches = [[prepare(scenario)] for scenario in mixed()[:6]]
+    kept = []
     ends = [died(), *(Future() for _ in batches[1:])]
     for future in ends[1:]:
         future.set_result([])
     pool = Elsewhere(1)
-    pool.last, pool.end = 1, iter(ends).__next__
+    pool.last = 1
+    pool.end = iter(ends).__next__
     with pool, pytest.raises(smc.ScenarioError, match="a worker was killed"):
         executors.compute_elsewhere(batches, pool, lambda batch, outcomes: kept.append(batch))
     assert len(kept) == 5

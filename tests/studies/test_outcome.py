@@ -292,7 +292,9 @@ def test_a_scene_has_an_answer_of_its_own_in_one_sentence_that_singles_out_none_
 @EVERY
 def test_a_scene_s_sentence_changes_when_any_number_behind_it_does(path, monkeypatch):
     found, traces = declared(path)
-    sentence, function, true = found.sentence(traces), words._function, words._true
+    sentence = found.sentence(traces)
+    function = words._function
+    true = words._true
     seen: set[object] = set()
 
     def noted(measure):

@@ -147,7 +147,8 @@ def test_a_comment_or_a_line_more_is_no_edit():
 
 
 def test_another_order_of_a_class_s_definitions_is_no_edit():
-    one, other = {"a": 1.0, "b": 2.0}, {"b": 2.0, "a": 1.0}
+    one = {"a": 1.0, "b": 2.0}
+    other = {"b": 2.0, "a": 1.0}
     assert fingerprint.of(type("Mine", (), one)) == fingerprint.of(type("Mine", (), other))
     assert fingerprint.of(type("Mine", (), one)) != fingerprint.of(
         type("Mine", (), {"a": 2.0, "b": 1.0})
@@ -227,7 +228,8 @@ def reaching(value: object, text: str = "THING(y.e)", before: str = "") -> Calla
 
 def package(factor: float) -> ModuleType:
     """A package with a module in it."""
-    inner, outer = ModuleType("mine.inner"), ModuleType("mine")
+    inner = ModuleType("mine.inner")
+    outer = ModuleType("mine")
     exec(f"def helper(x): return {factor} * x", vars(inner))
     vars(outer)["inner"] = inner
     return outer
@@ -306,7 +308,8 @@ def test_replaced_functions_of_a_plant_change_the_key():
         "def generated(x, v, i, q): return 0.0, 2.0", made := {}
     )  # without a module, as SymPy's lambdify
     own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
-    contacts, mechanisms = own.plant.contacts, own.plant.mechanisms
+    contacts = own.plant.contacts
+    mechanisms = own.plant.mechanisms
     changes = (
         {"nominal": nominal},
         {"nominal": made["generated"]},

@@ -340,7 +340,8 @@ def test_gains_of_laws_of_the_arm_are_those_that_a_search_found_within_its_torqu
 
 def test_the_figures_of_worst_cases_are_of_their_runs_with_their_names(monkeypatch):
     monkeypatch.setattr(worst_case, "run", lambda scenarios: [made(one) for one in scenarios])
-    one, other = attacked("classical", 0.2, 0.05), attacked("adaptive", 0.3, 0.06)
+    one = attacked("classical", 0.2, 0.05)
+    other = attacked("adaptive", 0.3, 0.06)
     for page, labels in (
         (one.figure(), ["as given", "worst found, rms error 0.200 m"]),
         (WorstCases([one]).figure(), ["as given", "worst found, rms error 0.200 m"]),

@@ -117,7 +117,8 @@ def test_a_scene_runs_and_its_traces_are_saved(path, tmp_path):
 @pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize("name", ["vdp_noise", "arm_wall", "chattering", "control_signals"])
 def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
-    pages, write = [], page.write
+    pages = []
+    write = page.write
 
     def render_the_first(whole, paths):  # every figure is made; rendering is nine tenths of drawing
         pages.extend([paths] * bool(paths))  # a part of a page has no files

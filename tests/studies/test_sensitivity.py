@@ -30,7 +30,8 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
     Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone, and a
     fourth never.
     """
-    n, three = 4096, 2.0 * math.pi
+    n = 4096
+    three = 2.0 * math.pi
     designs = module.designs(n, 4, 0)
     x = three * designs - math.pi
     scores = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
@@ -46,7 +47,9 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
 
 
 def test_an_interval_is_a_point_at_the_level_0_and_grows_to_both_sides_with_the_level(monkeypatch):
-    n, designs, ends = 64, module.designs(64, 2, 0), []
+    n = 64
+    designs = module.designs(64, 2, 0)
+    ends = []
     scores = designs @ np.array([1.0, 2.0]) - 4.0
     monkeypatch.setattr(module, "RESAMPLES", 99)
     for level in (0.0, 0.9):
@@ -68,7 +71,8 @@ def test_no_axis_explains_more_alone_than_with_others(seed):
     """Few points, and an axis that tells all but 1 %: the estimates of the others' first indices
     are up to 0.1.
     """
-    n, k = 64, 4
+    n = 64
+    k = 4
     designs = module.designs(n, k, seed)
     scores = designs[:, 0] + 0.1 * designs[:, 1:].sum(axis=1) - 1.0
     axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], seed)
@@ -85,7 +89,8 @@ def test_sums_of_first_indices_are_at_most_1_and_of_total_ones_at_least(seed):
     """With few points an estimate of either sum may lie half of it beyond: eight axes that add up,
     and a cliff.
     """
-    n, k = 16, 8
+    n = 16
+    k = 8
     designs = module.designs(n, k, seed)
     for scores in (
         designs.sum(axis=1) - 5.0,
@@ -116,7 +121,9 @@ def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
     """
     from scipy.stats import sobol_indices
 
-    n, k, errors = 32, 8, []
+    n = 32
+    k = 8
+    errors = []
     for seed in range(20):
         designs = module.designs(n, k, seed)
         scores = 10.0 * designs[:, 0] + 0.3 * designs[:, 1:].sum(axis=1)
@@ -135,7 +142,8 @@ def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
 
 
 def test_indices_of_scores_that_one_sample_alone_tells_apart_are_numbers():
-    a, b = np.zeros((1, 8)), np.arange(8.0)[None]
+    a = np.zeros((1, 8))
+    b = np.arange(8.0)[None]
     for pair in ((a, b), (b, a), (b, b), (b, -b)):
         first, total = module.estimates(*pair, np.array([pair[1], pair[0]]))
         assert np.isfinite([first, total]).all()

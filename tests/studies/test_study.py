@@ -38,7 +38,8 @@ def bytes_of(out: Path) -> bytes:
 @pytest.fixture
 def ran(monkeypatch):
     """The scenarios of all runs so far."""
-    found, honest = [], executors.run_batch
+    found = []
+    honest = executors.run_batch
 
     def counted(batch, *rest):
         found.extend(one.scenario for one in batch)
@@ -241,7 +242,8 @@ def other_scores(path: Path) -> None:
 def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, ran, harm):
     monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 50)
     study(small(), tmp_path)
-    before, parts = bytes_of(tmp_path), sorted((tmp_path / "parts").iterdir())
+    before = bytes_of(tmp_path)
+    parts = sorted((tmp_path / "parts").iterdir())
     assert len(parts) > 3
     harm(parts[1])
     ran.clear()
@@ -263,7 +265,8 @@ def test_runs_of_other_versions_are_run_again(tmp_path, monkeypatch):
 def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
     parts = tmp_path / "parts"
     parts.mkdir()
-    old, new = parts / ".a.parquet", parts / ".b.parquet"
+    old = parts / ".a.parquet"
+    new = parts / ".b.parquet"
     for path in (old, new):
         path.write_text("half")
     os.utime(old, (0.0, 0.0))

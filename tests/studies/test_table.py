@@ -102,7 +102,8 @@ def flipped(data: bytes, bits: int) -> Iterator[bytes]:
 @pytest.mark.slow
 def test_no_bit_that_flips_makes_a_table_of_other_rows(tmp_path):
     right = repr(study(small(), tmp_path).rows())
-    path, refused = tmp_path / "results.parquet", 0
+    path = tmp_path / "results.parquet"
+    refused = 0
     for damaged in flipped(path.read_bytes(), 120):
         path.write_bytes(damaged)
         try:
@@ -202,7 +203,8 @@ def test_a_notebook_shows_the_first_rows_and_says_how_many_more(tmp_path):
 def test_packages_that_speak_arrow_read_the_table_as_it_is(tmp_path):
     table = study(small(), tmp_path)
     assert pa.table(table).equals(table.data)
-    old, new = pa.string(), pa.large_string()
+    old = pa.string()
+    new = pa.large_string()
     wanted = pa.schema(
         [field.with_type(new) if field.type == old else field for field in table.data.schema]
     )

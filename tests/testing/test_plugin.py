@@ -337,7 +337,8 @@ def test_as_ever(step_response, smc_golden):
 
 
 def test_golden_metrics_are_asked_for_recorded_and_compared(session, pytester):
-    good, other = GOLDEN.replace("PHI", "0.3"), GOLDEN.replace("PHI", "0.35")
+    good = GOLDEN.replace("PHI", "0.3")
+    other = GOLDEN.replace("PHI", "0.35")
     said = session(good, failed=1)
     assert (
         "test_my_laws.golden.json has no golden settling_time, overshoot of test_as_ever: run pytest --smc-update"
@@ -397,7 +398,8 @@ def test_tolerances_of_a_test_replace_those_of_the_file(step_response, tmp_path,
 
 @pytest.mark.parametrize(("recorded", "off"), [(1e-12, False), (1e-6, True)])
 def test_a_golden_metric_of_0_allows_rounding_and_no_more(step_response, tmp_path, recorded, off):
-    response, file = step_response("duffing", "none", step=0.1, duration=0.01), tmp_path / "a.json"
+    response = step_response("duffing", "none", step=0.1, duration=0.01)
+    file = tmp_path / "a.json"
     assert response.overshoot == 0
     golden.record(file, "test", response, {})
     stored = json.loads(file.read_text())

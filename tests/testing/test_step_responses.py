@@ -75,7 +75,8 @@ def test_in_friction_the_boundary_layer_answers_as_it_always_has(step_response, 
 def test_an_arm_steps_from_its_rest_on_every_joint(step_response):
     law = smc.law("computed_torque_sliding", k=60.0, c=10.0, width=0.5)
     r = step_response("panda", law, step=0.1, duration=1.0, friction=None)
-    trace, rest = r.trace, np.array(smc.plant("panda").rest)
+    trace = r.trace
+    rest = np.array(smc.plant("panda").rest)
     np.testing.assert_array_equal(trace.x[0], rest)
     np.testing.assert_allclose(trace.r - rest, 0.1)
     assert r.settling_time < 0.8

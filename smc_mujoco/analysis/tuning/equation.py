@@ -35,7 +35,8 @@ from smc_mujoco.simulation.state import channel_at, simulation_at
 # of mjData, of what the nominal model reads, and of SCRATCH numbers a channel. `memoryless`: 1 if
 # the disturbances depend on time alone.
 FIELDS = ("qpos", "qvel", "ctrl", "xfrc_applied", "sensordata", "userdata")
-OWNERS, CHANGES = ("model", "data", "record"), ("before", "after", "jump_step")
+OWNERS = ("model", "data", "record")
+CHANGES = ("before", "after", "jump_step")
 ADDRESSES = (*OWNERS, "callback", "nominal", *CHANGES, "memoryless", *FIELDS, "seen", "scratch")
 RUN = np.dtype([(name, "i8") for name in ADDRESSES])
 run_at = record_at(RUN)
@@ -66,7 +67,8 @@ class EquationRun:
     def __init__(self, prepared: Prepared):
         self.prepared = prepared  # the record has addresses of its arrays
         s = self.scenario = prepared.scenario.resolved
-        n, plant = s.plant.n, s.plant
+        n = s.plant.n
+        plant = s.plant
         self.log = np.full((s.samples + 1, n), np.nan, state.LOG)
         self.record = np.zeros(1, state.SIMULATION)
         self.record[0], self.packed = pack(prepared, self.log)
@@ -132,9 +134,14 @@ def _simulate(run, sim):
     """Take all steps of a run, with a callback where it does something, and one at the end, for the
     last sample.
     """
-    n, h, qpos, qvel = sim.n, sim.step, pointer(run.qpos), pointer(run.qvel)
-    x, v = pointer(run.scratch), pointer(run.scratch + 8 * n)
-    speed, a = pointer(run.scratch + 32 * n), pointer(run.scratch + 64 * n)
+    n = sim.n
+    h = sim.step
+    qpos = pointer(run.qpos)
+    qvel = pointer(run.qvel)
+    x = pointer(run.scratch)
+    v = pointer(run.scratch + 8 * n)
+    speed = pointer(run.scratch + 32 * n)
+    a = pointer(run.scratch + 64 * n)
     for step in range((sim.samples - 1) * sim.steps):
         if run.jump_step < 0 or step < run.jump_step:
             parameters = run.before
@@ -149,7 +156,8 @@ def _simulate(run, sim):
             else:
                 past = h if stage == 3 else 0.5 * h
             for i in range(n):
-                channel, before = channel_at(sim.channels, i), (stage - 1) * n + i
+                channel = channel_at(sim.channels, i)
+                before = (stage - 1) * n + i
                 if stage > 0:
                     qpos[channel.qpos], qvel[channel.qvel] = (
                         x[i] + past * speed[before],
@@ -165,7 +173,9 @@ def _simulate(run, sim):
             if not _accelerate(run, sim, parameters, run.scratch + 64 * n + 8 * stage * n):
                 return
         for i in range(n):
-            channel, first, last = channel_at(sim.channels, i), n + i, 3 * n + i
+            channel = channel_at(sim.channels, i)
+            first = n + i
+            last = 3 * n + i
             qpos[channel.qpos] = x[i] + h / 6.0 * (
                 speed[i] + 2.0 * (speed[first] + speed[n + first]) + speed[last]
             )
@@ -179,7 +189,9 @@ def _call_back(run, sim):
 
     Return whether the run has not failed.
     """
-    qpos, qvel, sensors = pointer(run.qpos), pointer(run.qvel), pointer(run.sensordata)
+    qpos = pointer(run.qpos)
+    qvel = pointer(run.qvel)
+    sensors = pointer(run.sensordata)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         sensors[channel.x_sensor], sensors[channel.v_sensor] = (
@@ -196,21 +208,24 @@ def _accelerate(run, sim, parameters, a):
 
     Return False if the nominal model raises.
     """
-    n, seen, out = sim.n, seen_at(run.seen, 0), sim.model
-    qpos, qvel, ctrl, xfrc = (
-        pointer(run.qpos),
-        pointer(run.qvel),
-        pointer(run.ctrl),
-        pointer(run.xfrc_applied),
-    )
-    x, v = pointer(run.scratch + 16 * n), pointer(run.scratch + 24 * n)
+    n = sim.n
+    seen = seen_at(run.seen, 0)
+    out = sim.model
+    qpos = pointer(run.qpos)
+    qvel = pointer(run.qvel)
+    ctrl = pointer(run.ctrl)
+    xfrc = pointer(run.xfrc_applied)
+    x = pointer(run.scratch + 16 * n)
+    v = pointer(run.scratch + 24 * n)
     for i in range(n):
         channel = channel_at(sim.channels, i)
         x[i], v[i] = qpos[channel.qpos], qvel[channel.qvel]
     for i in range(n):
-        channel, seen.i = channel_at(sim.channels, i), i
+        channel = channel_at(sim.channels, i)
+        seen.i = i
         if call(run.nominal, run.seen, parameters, 0, run.record + state.AT.model) != 0:
-            sim.failure, sim.failed_step = state.DIVERGED, (sim.calls - 1) // sim.stages
+            sim.failure = state.DIVERGED
+            sim.failed_step = (sim.calls - 1) // sim.stages
             return False
         pointer(a)[i] = out.f + out.g * (ctrl[channel.ctrl] + channel.sign * xfrc[channel.xfrc])
     return True

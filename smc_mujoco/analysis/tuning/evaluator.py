@@ -67,16 +67,15 @@ class Evaluator:
         constraints: bool = True,
         slots: int = 1,
     ):
-        self.goal, self.cases, self.names, self.threads = (
-            goal,
-            list(cases),
-            tuple(names),
-            cores(threads),
-        )
+        self.goal = goal
+        self.cases = list(cases)
+        self.names = tuple(names)
+        self.threads = cores(threads)
         prepared = [prepare(case) for case in self.cases]
         with memory_for(prepared):
             if any(item.why_not for item in prepared):
-                self.engine, self._run = PYTHON, None
+                self.engine = PYTHON
+                self._run = None
             elif by_equation and all(map(equation.fits, prepared)):
                 self.engine, self._run = EQUATION, _Equations(prepared, self.names, self.threads)
             else:
@@ -91,7 +90,8 @@ class Evaluator:
             terms = self._terms_of_traces(candidates)
         else:
             terms = self._run(candidates, self._terms)
-        size, made = len(self.cases), []
+        size = len(self.cases)
+        made = []
         for k, gains in enumerate(candidates):
             tracking, variation = (
                 float(sum(term)) for term in zip(*terms[k * size : (k + 1) * size], strict=True)
@@ -153,7 +153,8 @@ def _putter(
     prepared: Prepared, names: Sequence[str], record: Any, packed: Packed
 ) -> Callable[[Gains], None]:
     """Return the function that puts a candidate's gains among the numbers of a run."""
-    law, at = prepared.scenario.law, int(record["law"]["parameters"])
+    law = prepared.scenario.law
+    at = int(record["law"]["parameters"])
     values = state.view(
         packed.numbers, at, (len(law.gains), prepared.scenario.plant.n if law.joint else 1)
     )
@@ -169,7 +170,8 @@ class _Equations:
     """The runs by the equation: as many candidates at once as there are threads, if memory allows."""
 
     def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int):
-        self.cases, self.slots = len(prepared), _that_fit(prepared, threads)
+        self.cases = len(prepared)
+        self.slots = _that_fit(prepared, threads)
         self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
         self.put = [_putter(one.prepared, names, one.record[0], one.packed) for one in self.runs]
         if threads > 1:
@@ -217,7 +219,8 @@ class _Batches:
         groups: dict[Hashable, list[int]] = {}
         for index, item in enumerate(prepared):
             groups.setdefault(item.key, []).append(index)
-        self.cases, self.slots = len(prepared), _that_fit(prepared, slots)
+        self.cases = len(prepared)
+        self.slots = _that_fit(prepared, slots)
         self.groups = list(groups.values())
         with callback.installed():
             self.batches = [

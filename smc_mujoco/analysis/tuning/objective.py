@@ -194,7 +194,8 @@ class Objective:
         """Return the terms of a run of a free body, from its log, (K + 1, 6) each; NaN where the
         log has one.
         """
-        e, t = np.abs(pose_errors(x, r)), case.control_period * np.arange(len(x))
+        e = np.abs(pose_errors(x, r))
+        t = case.control_period * np.arange(len(x))
         turns = [i for i in case.plant.judged if i >= 3]
         parts = e[:, :3].sum(axis=1), e[:, turns].sum(axis=1)
         tracking = sum(float(np.trapezoid(t * part, t)) / (float(part[0]) or 1.0) for part in parts)

@@ -89,7 +89,8 @@ GAIN_DIGITS = 4
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
 # Shares of a search's budget that are used, as a rule: by a descent, which ends early, and by all
 # stages of a search by the equation with MuJoCo's evaluation in the end.
-LAST_SHARE, USUAL_SHARE = 0.1, 1.0
+LAST_SHARE = 0.1
+USUAL_SHARE = 1.0
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
     "CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, noise and initial states,"
@@ -152,7 +153,8 @@ def tune(
     task = _task(plant, coerce.law(law), goal, budget, seed, threads)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
-    failure, codes = _failure_of_law(task), None if folder is None else task.codes()
+    failure = _failure_of_law(task)
+    codes = None if folder is None else task.codes()
     with bar(
         f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True
     ) as shown:
@@ -252,14 +254,16 @@ def _evolved(
 
     if len(logs) < 2:  # CMA-ES adapts a covariance
         return logs
-    bounds, seed = np.log10(list(box.values())), int(random.integers(2**31))
+    bounds = np.log10(list(box.values()))
+    seed = int(random.integers(2**31))
     evolution = CMA(mean=logs, sigma=FIRST_DEVIATION, bounds=bounds, seed=seed)
     for _ in range(size // evolution.population_size):
         candidates = np.array([evolution.ask() for _ in range(evolution.population_size)])
         costs = trials.screen(candidates)
         evolution.tell(list(zip(candidates, costs, strict=True)))
         if costs.min() < cost:
-            logs, cost = candidates[np.argmin(costs)], costs.min()
+            logs = candidates[np.argmin(costs)]
+            cost = costs.min()
     return logs
 
 
@@ -355,7 +359,8 @@ class Task(NamedTuple):
         own gains fail in every run is refused, with this failure, only after a whole search in
         which every run fails.
         """
-        cases, names = self.cases(i), tuple(self.box)
+        cases = self.cases(i)
+        names = tuple(self.box)
         by_equation = Evaluator(self.goal, cases, names, self.threads, by_equation=True)
         if by_equation.engine == EQUATION:
             trials = self._trials(by_equation, by_equation, i, report)
@@ -392,7 +397,8 @@ class Task(NamedTuple):
             and best.objective >= FAILURE_COST * len(self.goal.conditions)
         ):
             raise _broken(self.law, failure)
-        history, engine = tuple(trials.decided.values()), trials.accurate.engine
+        history = tuple(trials.decided.values())
+        engine = trials.accurate.engine
         return Found(best=best, history=history, evaluations=trials.count, engine=engine)
 
 
@@ -448,7 +454,8 @@ def expected_seconds(
     all of them; a law of the user's, which may not compile, is evaluated itself.
     """
     tasks = [_task(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
-    seconds, of_library = 0.0, None
+    seconds = 0.0
+    of_library = None
     for task in tasks:
         if catalogue().get(task.law.name) is not task.law.template:
             seconds += task.size * _seconds(task)
@@ -490,7 +497,9 @@ def _cheap(accurate: Evaluator) -> Evaluator:
         warnings.simplefilter("ignore", ScenarioWarning)
         cases = [_coarse(case) for case in accurate.cases]
     constraints = not all(map(_only_limits, accurate.cases))
-    goal, names, threads = accurate.goal, accurate.names, accurate.threads
+    goal = accurate.goal
+    names = accurate.names
+    threads = accurate.threads
     return Evaluator(goal, cases, names, threads, constraints=constraints, slots=SLOTS)
 
 
@@ -581,9 +590,11 @@ def _warn(words: str) -> None:
 def _without_unit_warning(law: Component) -> str:
     names = list(search_space.without_unit(law))
     if len(names) > 1:
-        have, whose = ("have", "their defaults")
+        have = "have"
+        whose = "their defaults"
     else:
-        have, whose = ("has", "its default")
+        have = "has"
+        whose = "its default"
     search = f"no unit, and so a search about {whose} in place of the rule of all laws"
     return (
         f"{law.name}'s {joined(names)} {have} {search}: {unit_cure(names[0], law.gains[names[0]])}"

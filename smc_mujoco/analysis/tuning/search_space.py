@@ -88,7 +88,8 @@ def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
     """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is not
     searched.
     """
-    gain_unit, gain = unit(law, name), _gain(law, name)
+    gain_unit = unit(law, name)
+    gain = _gain(law, name)
     if gain_unit is None or gain.held:
         return 1.0
     return gain_unit.of(_scales_of(gain, scales))
@@ -119,10 +120,8 @@ def scales(
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
     if plant.pose and isinstance(plant.nominal, NominalModel):
-        M, limits = (
-            plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M,
-            plant.limits,
-        )
+        M = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M
+        limits = plant.limits
         force, torque = (min([u_max, *limits[i : i + 3]]) for i in (0, 3))
         of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, 1.0)
         own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
@@ -198,7 +197,8 @@ def force_limits(law: Component, gains: Mapping[str, float], u_max: float) -> di
     force, times b.
     """
     declared = law.template.gains if law.template else {}
-    values, largest = {**law.gains, **gains}, u_max * 10 ** (HALF_WIDTH + WIDENING)
+    values = {**law.gains, **gains}
+    largest = u_max * 10 ** (HALF_WIDTH + WIDENING)
     return {
         name: largest * values[gain.over]
         for name, gain in declared.items()

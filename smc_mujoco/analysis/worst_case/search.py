@@ -95,13 +95,11 @@ class Search:
         threads: int | None,
         report: Callable[[int], None],
     ):
-        self.members, self.metric, self.budget, self.threads, self.report = (
-            members,
-            metric,
-            budget,
-            threads,
-            report,
-        )
+        self.members = members
+        self.metric = metric
+        self.budget = budget
+        self.threads = threads
+        self.report = report
         self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
         self.broken = ""  # how the law or a signal failed first, in a sentence
@@ -137,7 +135,8 @@ class Search:
     def run(self, cases: Sequence[Case]) -> list[Tried]:
         """Run cases, as many as the budget allows, and return them as tried."""
         cases = list(cases[: self.budget - self.runs])
-        first, replays = self.runs, []
+        first = self.runs
+        replays = []
         self.runs += len(cases)
         tried: list[Tried | None] = [None] * len(cases)
         scenarios = [self.members.scenario_of(case.member, case.relay) for case in cases]
@@ -164,7 +163,8 @@ class Search:
             self.broken = self.broken or trace.broken
             return FAILED_KEY
         groups = by_group(trace)
-        value, error = self.metric.worst(groups), CATALOGUE["rms_error"].worst(groups)
+        value = self.metric.worst(groups)
+        error = CATALOGUE["rms_error"].worst(groups)
         return (self.metric.absent if math.isnan(value) else value), error
 
     def _simple(self) -> Iterator[list[Case]]:
@@ -207,8 +207,10 @@ class Search:
     def _driven(self) -> Iterator[list[Case]]:
         """Yield the worst member so far, with a force along the motion from some time on."""
         if self.members.forced and not self.members.slope:
-            worst, end = self.worst, self.members.samples * self.members.h
-            kind, then = worst.member.kind, "sign of e'"
+            worst = self.worst
+            end = self.members.samples * self.members.h
+            kind = worst.member.kind
+            then = "sign of e'"
             member = worst.member.named(kind if kind == then else f"{kind}, then {then}")
             relays = []
             for share in SWITCH_TIMES:

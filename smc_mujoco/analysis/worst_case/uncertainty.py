@@ -131,7 +131,8 @@ class Uncertainty:
 
     def words(self, plant: Plant) -> str:
         """Return the class as a line of text, such as "|d| <= 2 N, mass x 0.7 to 1.3"."""
-        x, u = plant.units[0], EFFORT[plant.units[0]]
+        x = plant.units[0]
+        u = EFFORT[plant.units[0]]
         if self.disturbance:
             parts = [f"|d| <= {self.disturbance:g} {u}"]
         else:
@@ -205,7 +206,8 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
     """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if
     nothing is known.
     """
-    reasons, u = [], EFFORT[scenario.plant.units[0]]
+    reasons = []
+    u = EFFORT[scenario.plant.units[0]]
     known = [its for signal in scenario.disturbance if (its := bounds_of(signal))]
     of_class = within.disturbance, (within.slope or math.inf) if within.disturbance else 0.0
     d, slope = map(sum, zip(of_class, *known, strict=True))
@@ -265,8 +267,11 @@ class Members:
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
-        scenario, count = scenarios[0], len(scenarios)
-        self.scenario, self.within, self.h = scenario, within, scenario.control_period
+        scenario = scenarios[0]
+        count = len(scenarios)
+        self.scenario = scenario
+        self.within = within
+        self.h = scenario.control_period
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         # N or N m a sample; 0: d may jump
@@ -315,7 +320,8 @@ class Members:
 
         From its start on, a relay takes the place of the member's force.
         """
-        scenario, force = self.with_constants(member.shares), self.within.disturbance * member.force
+        scenario = self.with_constants(member.shares)
+        force = self.within.disturbance * member.force
         if relay:
             force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
         signals = ([self.signal(force)] if force.any() else []) + ([relay] if relay else [])
@@ -399,14 +405,10 @@ class Members:
         """Return a member moved by z, (size,): its constants, then knots of lines that are added to
         its signals.
         """
-        m, rows = (
-            len(self.constants),
-            np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots)),
-        )
-        shares, at = (
-            np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0),
-            np.linspace(0.0, 1.0, knots),
-        )
+        m = len(self.constants)
+        rows = np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots))
+        shares = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0)
+        at = np.linspace(0.0, 1.0, knots)
 
         def added(row: np.ndarray, more: np.ndarray) -> np.ndarray:
             return np.clip(
@@ -428,7 +430,8 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return values, (K,), of which a random piece is reversed in sign, or a switch comes earlier
     or later.
     """
-    mutated, last = values.copy(), len(values) - 1
+    mutated = values.copy()
+    last = len(values) - 1
     length = round(math.exp(rng.uniform(0.0, math.log(max(2.0, MAX_PIECE_SHARE * last)))))
     switches = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1])) + 1
     if len(switches) and rng.random() < SHIFT_PROBABILITY:
@@ -495,7 +498,8 @@ def _check_class(scenario: Scenario, within: Uncertainty) -> None:
 
 def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
     """Yield each constant that may differ."""
-    effort, plant = EFFORT[scenario.plant.units[0]], scenario.plant
+    effort = EFFORT[scenario.plant.units[0]]
+    plant = scenario.plant
     if within.delay != (0.0, 0.0):
         yield Constant(
             name="delay",
@@ -584,7 +588,8 @@ def _with_factor(scenario: Scenario, value: float, name: str) -> Scenario:
     """Return the scenario with a factor on a parameter of the plant, or a term for a parameter of
     `plant.added`.
     """
-    plant, mismatch = scenario.plant, dict(scenario.mismatch)
+    plant = scenario.plant
+    mismatch = dict(scenario.mismatch)
     if name == "mass" and plant.mass in mismatch:
         name = plant.mass
     if name in plant.added:

@@ -80,10 +80,13 @@ def board(
         from smc_mujoco.simulation.run import run
 
     terminal = Terminal()
-    rows, mine, first = boards.experiments(robot), boards.global_experiments(robot), boards.NAME
+    rows = boards.experiments(robot)
+    mine = boards.global_experiments(robot)
+    first = boards.NAME
     if entry:
         one = entries.read(entry)
-        rows, first = {one.name: boards.on_board(robot, one.law(robot))}, one.name
+        rows = {one.name: boards.on_board(robot, one.law(robot))}
+        first = one.name
         mine = rows
     writable(figure, film and with_ending(film, ".mp4"))
     traces = dict(zip(rows, run(list(rows.values())), strict=True))

@@ -118,7 +118,8 @@ def _along(robot: str) -> Template:
     free one's.
     """
     table = read_json(TRAJECTORY_FOLDER / f"{robot}.json")
-    STEP, LAST = float(table["step"]), len(table["u"]) - 1
+    STEP = float(table["step"])
+    LAST = len(table["u"]) - 1
     names = ("x", "v", "a", "q", "dq", "ddq", "u", "s_x", "s_v", "s_q", "s_dq")
     arrays = X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = [np.array(table[name]) for name in names]
     for array in arrays:
@@ -128,7 +129,8 @@ def _along(robot: str) -> Template:
         place = y.t / STEP
         i = min(int(place), LAST - 1)
         j = i + 1
-        part, middle = min(place - i, 1.0), min((y.t + 0.5 * y.dt) / STEP - i, 1.0)
+        part = min(place - i, 1.0)
+        middle = min((y.t + 0.5 * y.dt) / STEP - i, 1.0)
         x = nearest(y.x - hermite(X[i], X[j], V[i], V[j], STEP, part))
         v = y.v - hermite(V[i], V[j], A[i], A[j], STEP, part)
         q = nearest(y.q - hermite(Q[i], Q[j], DQ[i], DQ[j], STEP, part))

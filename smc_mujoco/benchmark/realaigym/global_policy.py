@@ -44,7 +44,9 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_1, TORQUE_LIMIT
 from smc_mujoco.simulation.scenario import Scenario
 
-DURATION, STEPS, SEEDS = 60.0, 30_000, (0, 1, 2, 3)
+DURATION = 60.0
+STEPS = 30_000
+SEEDS = (0, 1, 2, 3)
 RESETS, RESET_TIME, APART = 15, 0.2, 1.0  # of a minute; s; s, between two swing-ups that count
 KP, KI, KD, PID_PERIOD = (
     10.0,
@@ -79,7 +81,8 @@ class Run(NamedTuple):
     @property
     def swing_ups(self) -> int:
         """How often the tip rose above the line."""
-        count, last = 0, -math.inf
+        count = 0
+        last = -math.inf
         for rise in STEP * (np.flatnonzero(np.diff(self.up)) + 1)[::2]:
             if rise - last > APART:
                 count, last = count + 1, rise
@@ -174,10 +177,20 @@ def _minute(
         known[12],
         known[13],
     )
-    x, seen, y, room = (0.0, 0.0, 0.0, 0.0), np.zeros(4), np.zeros(MEASUREMENT_SIZE), np.zeros(ROOM)
+    x = (0.0, 0.0, 0.0, 0.0)
+    seen = np.zeros(4)
+    y = np.zeros(MEASUREMENT_SIZE)
+    room = np.zeros(ROOM)
     y[DT], y[LIMIT], y[USES_MODEL] = STEP, limit, uses_model
-    total, before, count, resets_done = np.zeros(2), np.zeros(2), 0, 0
-    u, t, last, since, pushed = np.zeros(2), 0.0, 0.0, 0.0, False
+    total = np.zeros(2)
+    before = np.zeros(2)
+    count = 0
+    resets_done = 0
+    u = np.zeros(2)
+    t = 0.0
+    last = 0.0
+    since = 0.0
+    pushed = False
     for k in range(len(torques)):
         if not pushed and resets_done < len(times) and t >= times[resets_done]:
             pushed, since, resets_done = True, 0.0, resets_done + 1

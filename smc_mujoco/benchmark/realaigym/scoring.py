@@ -89,19 +89,18 @@ def criteria(trace: Trace) -> Criteria:
     joints = shoulder_first(plant.name)
     if trace.failure is not None:
         return Criteria(*[math.inf] * len(Criteria._fields))
-    q, v, u, t, l1 = (
-        trace.x[:, joints],
-        trace.v[:, joints],
-        trace.u[:, 0],
-        trace.t,
-        plant.parameters["l1"],
-    )
+    q = trace.x[:, joints]
+    v = trace.v[:, joints]
+    u = trace.u[:, 0]
+    t = trace.t
+    l1 = plant.parameters["l1"]
     tip = -l1 * np.cos(q[:, 0]) - L2 * np.cos(q[:, 0] + q[:, 1])
     low = (
         np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1
     )  # as published: first and last left out
     first = low[-1] + 1 if len(low) else 1
-    step, torque = np.diff(t), np.abs(u[:-1])
+    step = np.diff(t)
+    torque = np.abs(u[:-1])
     return Criteria(
         swing_up_time=float(t[first]) if first < len(t) - 1 else math.inf,
         energy=float(np.sum(np.abs(np.diff(trace.x[:, 0])) * torque)),

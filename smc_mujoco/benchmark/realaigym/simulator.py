@@ -44,7 +44,10 @@ from smc_mujoco.simulation.scenario import Scenario
 SEED = 20240  # of all random numbers; chosen before any run
 STEP, STEPS = 2e-3, 5000  # s; number of steps
 UPRIGHT_TOLERANCES = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
-LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
+LEVELS = 21
+REPEATS = 10
+PROFILES = 50
+PULSES = 3
 MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s; s; N m
 SCALED_PARAMETERS = {
     "m1r1": "r1",
@@ -57,7 +60,8 @@ MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(
     SCALED_PARAMETERS, (0.75, 1.25)
 )  # parameter -> ends of its values
 MODEL_LEVELS |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
-MEASUREMENT_SIZE, ROOM = len(Measurement._fields), 11
+MEASUREMENT_SIZE = len(Measurement._fields)
+ROOM = 11
 T, DT, LIMIT, USES_MODEL, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
     Measurement._fields.index(name)
     for name in ("t", "dt", "limit", "model", "x", "v", "e", "de", "q", "dq", "f", "g", "fq", "gq")
@@ -158,7 +162,8 @@ def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
         MIN_PULSE_GAP
         + rng.uniform(0.0, (STEP * STEPS - (count + 1) * MIN_PULSE_GAP) / count, count)
     )
-    widths, reach = rng.uniform(*PULSE_WIDTH, PULSES), PULSE_AMPLITUDE[1] - PULSE_AMPLITUDE[0]
+    widths = rng.uniform(*PULSE_WIDTH, PULSES)
+    reach = PULSE_AMPLITUDE[1] - PULSE_AMPLITUDE[0]
     amplitudes = rng.uniform(-reach, reach, PULSES)
     amplitudes += np.copysign(PULSE_AMPLITUDE[0], amplitudes)
     rows = zip(rng.permutation(centres)[:PULSES], widths, amplitudes, strict=True)
@@ -182,7 +187,8 @@ def robustness(
       ScenarioError: another plant, a surface, a reference that moves, or a law that does not
         compile.
     """
-    machine, todo = Machine(scenario), cases(0)
+    machine = Machine(scenario)
+    todo = cases(0)
     levels: dict[tuple[str, str, float], list[bool]] = {}
     for done, case in enumerate(todo, 1):
         ended = upright(machine.simulate(case)[0][-1])
@@ -226,23 +232,21 @@ class Machine:
                 f"the robustness test of {scenario.plant.name} is only of the law and its estimator: leave out "
                 "surface, reference and feedforward"
             )
-        law, velocity = scenario.law.of_channel(0), resolved.velocity
+        law = scenario.law.of_channel(0)
+        velocity = resolved.velocity
         try:
-            self.law, self.estimator = (
-                cfunctions.compile_component(law),
-                cfunctions.compile_component(velocity),
-            )
+            self.law = cfunctions.compile_component(law)
+            self.estimator = cfunctions.compile_component(velocity)
         except NotCompilable as error:
             raise ScenarioError(
                 f"the robustness test runs compiled laws only, and {error}"
             ) from None
-        self.gains, self.filter = (
-            np.array([*law.gains.values(), 0.0]),
-            np.array([*velocity.gains.values(), 0.0]),
-        )
+        self.gains = np.array([*law.gains.values(), 0.0])
+        self.filter = np.array([*velocity.gains.values(), 0.0])
         self.sizes = law.memory, velocity.memory
         self.known = np.array([scenario.plant.parameters[name] for name in MODEL_1_1])
-        self.key, self.limit = 0, scenario.limits[0]
+        self.key = 0
+        self.limit = scenario.limits[0]
         self.uses_model = float(resolved.model == "nominal")
 
     def simulate(self, case: Case) -> tuple[np.ndarray, np.ndarray]:
@@ -250,7 +254,8 @@ class Machine:
         a case.
         """
         true = dict(zip(MODEL_1_1, self.known, strict=True)) | dict(case.parameters)
-        t, rng = STEP * np.arange(STEPS), np.random.default_rng([SEED, case.seed, self.key])
+        t = STEP * np.arange(STEPS)
+        rng = np.random.default_rng([SEED, case.seed, self.key])
         noise = rng.normal(size=(STEPS, 3)) * [
             case.velocity_noise,
             case.velocity_noise,
@@ -259,7 +264,8 @@ class Machine:
         pulse = np.zeros(STEPS)
         for centre, width, amplitude in case.pulses:
             pulse += amplitude * np.exp(-0.5 * ((t - centre) / width) ** 2)
-        states, torque = np.zeros((STEPS + 1, 4)), np.zeros(STEPS)
+        states = np.zeros((STEPS + 1, 4))
+        torque = np.zeros(STEPS)
         memories = np.zeros(self.sizes[0]), np.zeros((2, self.sizes[1]))
         functions = np.array([self.law.address, self.estimator.address])
         with delay_ctrl_c():  # numba may compile it now
@@ -323,13 +329,11 @@ def answered(functions, gains, tuning, memory, memories, known, driven, seen, y,
     `y` has t, dt, limit and model, and gets the rest of the measurement; `room` is ROOM numbers to
     work in.
     """
-    control, reading, estimate, position, velocity = (
-        room[:2],
-        room[2:5],
-        room[5:7],
-        room[7:9],
-        room[9:],
-    )
+    control = room[:2]
+    reading = room[2:5]
+    estimate = room[5:7]
+    position = room[7:9]
+    velocity = room[9:]
     for joint in range(2):
         reading[0], reading[1], reading[2] = STEP, seen[joint], seen[2 + joint]
         if (
@@ -363,9 +367,15 @@ def answered(functions, gains, tuning, memory, memories, known, driven, seen, y,
         known[13],
     )
     if driven == 0:
-        f, fq, g, free = (f1, f2, W11, 1)
+        f = f1
+        fq = f2
+        g = W11
+        free = 1
     else:
-        f, fq, g, free = (f2, f1, W22, 0)
+        f = f2
+        fq = f1
+        g = W22
+        free = 0
     y[X], y[V], y[E], y[DE] = position[driven], velocity[driven], position[driven], velocity[driven]
     y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
     raised = (
@@ -416,8 +426,11 @@ def _simulate(
         true[12],
         true[13],
     )
-    x, motor, seen = (0.0, 0.0, 0.0, 0.0), 0.0, np.zeros(4)
-    y, room = np.zeros(MEASUREMENT_SIZE), np.zeros(ROOM)
+    x = (0.0, 0.0, 0.0, 0.0)
+    motor = 0.0
+    seen = np.zeros(4)
+    y = np.zeros(MEASUREMENT_SIZE)
+    room = np.zeros(ROOM)
     y[DT], y[LIMIT], y[USES_MODEL] = STEP, limit, uses_model
     for k in range(len(torque)):
         seen[:] = states[max(0, k - delay)]

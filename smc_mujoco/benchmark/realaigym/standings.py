@@ -104,7 +104,8 @@ def _ranked(published: tuple[Any, ...], rows: list[Any]) -> tuple[Any, ...]:
 
 def _row(name: str, trace: Trace, robot: str) -> Row:
     """Return the row of a trace; raise ScenarioError for a run by other rules than the boards'."""
-    values, ran = criteria(trace), _ruled(trace.scenario)
+    values = criteria(trace)
+    ran = _ruled(trace.scenario)
     for rule, right in _ruled(on_board(robot, "none")).items():
         if (value := ran.get(rule)) != right:
             raise errors.ScenarioError(

@@ -70,7 +70,10 @@ def upright_law(robot: str) -> tuple[np.ndarray, np.ndarray]:
     """
     from scipy.linalg import solve_continuous_are
 
-    driven, step, A, b = shoulder_first(robot).index(0), 1e-6, np.zeros((4, 4)), np.zeros((4, 1))
+    driven = shoulder_first(robot).index(0)
+    step = 1e-6
+    A = np.zeros((4, 4))
+    b = np.zeros((4, 1))
     A[:2, 2:] = np.eye(2)
     for joint in range(2):
         d = step * np.eye(2)[joint]
@@ -93,9 +96,15 @@ def _swing_up(robot: str) -> Template:
 
     def law(y, gains, memory):
         if shoulder:
-            q1, q2, v1, v2 = (y.x, y.q, y.v, y.dq)
+            q1 = y.x
+            q2 = y.q
+            v1 = y.v
+            v2 = y.dq
         else:
-            q1, q2, v1, v2 = (y.q, y.x, y.dq, y.v)
+            q1 = y.q
+            q2 = y.x
+            v1 = y.dq
+            v2 = y.v
         z = (nearest(q1 - math.pi), nearest(q2), v1, v2)
         cost = u = 0.0
         for i in range(4):
@@ -108,7 +117,8 @@ def _swing_up(robot: str) -> Template:
             swing = (v1 + v2) * math.cos(q1 + q2)
             missing = LOWER * (1.0 + math.cos(q1 + q2)) - 0.5 * I2 * (v1 + v2) ** 2
         else:
-            swing, cosine = v1, COUPLING * math.cos(q2)
+            swing = v1
+            cosine = COUPLING * math.cos(q2)
             missing = UPPER * (1.0 + math.cos(q1)) + LOWER * (1.0 + math.cos(q1 + q2))
             missing -= (
                 (0.5 * INERTIA + cosine) * v1 * v1 + (I2 + cosine) * v1 * v2 + 0.5 * I2 * v2 * v2
@@ -155,7 +165,8 @@ def global_entry(robot: str, **gains: float) -> Scenario:
 
 def global_experiments(robot: str) -> dict[str, Scenario]:
     """Return name of row -> run of the entry on the board of 2025, and of its control experiments."""
-    made, gains = global_entry(robot), GAINS[robot]
+    made = global_entry(robot)
+    gains = GAINS[robot]
     straight = {name: NEVER_BENDS * gains[name] for name in ("K", "phi")}
     return {
         GLOBAL_NAME: made,

@@ -80,11 +80,10 @@ def tune(
         from smc_mujoco.analysis.tuning import search
 
     options.check_files(out)
-    terminal, start = Terminal(), options.starts(x0)
-    tested, folder = (
-        options.conditions(condition) or None,
-        out and out.with_name(f"{out.stem}-searches"),
-    )
+    terminal = Terminal()
+    start = options.starts(x0)
+    tested = options.conditions(condition) or None
+    folder = out and out.with_name(f"{out.stem}-searches")
     tuned = search.tune(
         plant,
         law,
@@ -218,7 +217,8 @@ def worst(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
-    terminal, within = Terminal(), _within(disturbance, bound)
+    terminal = Terminal()
+    within = _within(disturbance, bound)
     options.check_files(json, *files(out))
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
     with options.as_options(BOUNDS):
@@ -279,7 +279,8 @@ def sensitivity(
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.studies.sensitivity import sensitivity
 
-    terminal, over = Terminal(), _within(disturbance, bound)
+    terminal = Terminal()
+    over = _within(disturbance, bound)
     options.check_files(json, *files(out))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
@@ -357,15 +358,14 @@ def _attacked_cases(
     else:
         rigs = None
     if rigs and plant in rigs.rigs():
-        rig, ensemble = (
-            rigs.rig(plant),
-            annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig"),
-        )
+        rig = rigs.rig(plant)
+        ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
         cases = [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
         return [runs[0].law for runs in cases], cases
-    chosen, machine = options.laws(law, gain_sets.LAWS), as_plant(plant)
+    chosen = options.laws(law, gain_sets.LAWS)
+    machine = as_plant(plant)
     return chosen, [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
 
 
@@ -399,7 +399,9 @@ def basin(
         from smc_mujoco.draw.page import files
         from smc_mujoco.draw.region import draw
 
-    terminal, pictures, chosen = Terminal(), files(out), options.law(law)
+    terminal = Terminal()
+    pictures = files(out)
+    chosen = options.law(law)
     options.check_files(json, *pictures)
     with bar(f"{law} on {plant}") as progress:
         region = search(
@@ -474,7 +476,9 @@ def chatter(
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
-    terminal, pictures, chosen = Terminal(), files(out), options.laws(law, gain_sets.LAWS)
+    terminal = Terminal()
+    pictures = files(out)
+    chosen = options.laws(law, gain_sets.LAWS)
     options.check_files(json, *pictures)
     if actuator is None:
         fields = {}
@@ -488,10 +492,8 @@ def chatter(
             progress.reached(done, len(cases) + 1)
             cycles.append(chattering(scenario, channel))
         traces = run(cases, threads=threads)
-        measured, changes = (
-            [channel_cycle(trace, channel) for trace in traces],
-            step_halving(traces, channel, threads),
-        )
+        measured = [channel_cycle(trace, channel) for trace in traces]
+        changes = step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     terminal.note("assumed: " + "; ".join(shared_assumptions(cycles)), wrap=True)
     terminal.note(

@@ -130,7 +130,8 @@ def _print_all(terminal: Terminal) -> None:
     ]
     for title, rows in lists.items():
         terminal.print(tables.catalogue(title, rows), "")
-    page, some = ("smc-mujoco list NAME", "cyan"), ("--needs one-gain,continuous", "cyan")
+    page = ("smc-mujoco list NAME", "cyan")
+    some = ("--needs one-gain,continuous", "cyan")
     terminal.print(
         Text.assemble(page, " shows a law or a plant in full, ", some, " the laws that have both")
     )

@@ -45,11 +45,10 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
     return complete
 
 
-PLANTS, LAWS = _completing("mechanisms.plant", "plants"), _completing("control.law", "known_laws")
-CONDITIONS, SCENES = (
-    _completing("simulation.conditions", "NAMED"),
-    _completing("studies.scene", "scenes"),
-)
+PLANTS = _completing("mechanisms.plant", "plants")
+LAWS = _completing("control.law", "known_laws")
+CONDITIONS = _completing("simulation.conditions", "NAMED")
+SCENES = _completing("studies.scene", "scenes")
 
 Columns = Annotated[
     str | None,
@@ -275,7 +274,8 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
     """
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
-    chosen, parts = [], [[text] if ":" in text else names(text) for text in texts or ()]
+    chosen = []
+    parts = [[text] if ":" in text else names(text) for text in texts or ()]
     for text in itertools.chain(*parts):
         if (
             ":" not in text

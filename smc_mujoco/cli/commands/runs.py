@@ -62,7 +62,8 @@ def run(
     scene = scenes.read(path)
     if seed is not None:
         scene = scene.seeded(seed)
-    terminal, folder = Terminal(), out / path.stem
+    terminal = Terminal()
+    folder = out / path.stem
     perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path), repeat)
     if timing:
         terminal.note(str(clock), "dim")
@@ -92,7 +93,8 @@ def show(
         from smc_mujoco.simulation.trace import formats, load
 
     endings = () if export is None else formats(export)
-    loaded, terminal = load(trace), Terminal()
+    loaded = load(trace)
+    terminal = Terminal()
     written = [loaded.export(trace.with_suffix(f".{ending}")) for ending in endings]
     if figure:
         from smc_mujoco.draw.figure import figure as draw
@@ -101,11 +103,9 @@ def show(
         draw([loaded], figure)
         written += drawn(figure)
     s = loaded.scenario
-    plant, law, times = (
-        (s.plant.name, "bold"),
-        (str(s.law), "bold"),
-        f", {s.duration:g} s at {s.control_period:g} s",
-    )
+    plant = (s.plant.name, "bold")
+    law = (str(s.law), "bold")
+    times = f", {s.duration:g} s at {s.control_period:g} s"
     terminal.print(Text.assemble(plant, " under ", law, times, f", gains: {s.law.source}"))
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)

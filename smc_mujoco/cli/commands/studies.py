@@ -61,7 +61,9 @@ def which(
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.studies.adviser import which as advise
 
-    terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0)
+    terminal = Terminal()
+    tested = options.conditions(condition) or None
+    start = options.starts(x0)
     advice = advise(
         plant,
         tested,
@@ -147,7 +149,8 @@ def compare(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
 
-    terminal, start = Terminal(), options.starts(x0)
+    terminal = Terminal()
+    start = options.starts(x0)
     if rig is not None:
         if plants or condition or gains != "tuned" or worst or figure or latex or traces != "none":
             others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
@@ -222,10 +225,8 @@ def _compare_on_rig(
 
     ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
-    chosen, length = (
-        options.laws(law, of_rig=machine.laws) or None,
-        FULL.duration if duration is None else duration,
-    )
+    chosen = options.laws(law, of_rig=machine.laws) or None
+    length = FULL.duration if duration is None else duration
     tuning = {"starts": starts, "folder": out / "searches", "threads": threads, "progress": True}
     if searches is None:
         found = []

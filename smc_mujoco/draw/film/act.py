@@ -51,7 +51,9 @@ class Act:
         scales: Mapping[Group, arrows.Scale],
         arms: bool,
     ):
-        self.trace, self.colour, times = trace, colour, edges[1:]
+        self.trace = trace
+        self.colour = colour
+        times = edges[1:]
         n = scene.first_channels(trace.scenario).plant.n
         if arms:
             sizes = []

@@ -69,16 +69,12 @@ class Trail:
         size = np.ceil(points.max(axis=0) + width).astype(int) - self.corner
         self.fine = Image.new("L", tuple((arrows.SUPERSAMPLING * size).tolist()))  # opacities
         self.mask = self.fine.reduce(arrows.SUPERSAMPLING)
-        self.points, self.times, self.reached = (
-            arrows.SUPERSAMPLING * (points - self.corner),
-            times,
-            0,
-        )
-        self.colour, self.width, self.opacity = (
-            style.rgb(colour),
-            arrows.SUPERSAMPLING * width,
-            round(255 * opacity),
-        )
+        self.points = arrows.SUPERSAMPLING * (points - self.corner)
+        self.times = times
+        self.reached = 0
+        self.colour = style.rgb(colour)
+        self.width = arrows.SUPERSAMPLING * width
+        self.opacity = round(255 * opacity)
 
     def draw(self, image: Image.Image, time: float) -> None:
         """Draw the path until a time, s, which is not before that of the last picture."""
@@ -103,7 +99,9 @@ class Paths:
     """
 
     def __init__(self, traces: Sequence[Trace], colours: Sequence[str], stage: Stage):
-        self.trails, self.wanted, s = [], [], stage.scale
+        self.trails = []
+        self.wanted = []
+        s = stage.scale
         for trace, colour, place in zip(traces, colours, stage.where, strict=True):
             free = trace.scenario.plant.pose
             if free:
@@ -147,14 +145,13 @@ class Overlay:
         edges: np.ndarray,
         room: np.ndarray,
     ):
-        self.traces, self.colours, self.stage, self.edges, self.room = (
-            traces,
-            colours,
-            stage,
-            edges,
-            room,
-        )
-        self.paths, self.scale = Paths(traces, colours, stage), stage.scale
+        self.traces = traces
+        self.colours = colours
+        self.stage = stage
+        self.edges = edges
+        self.room = room
+        self.paths = Paths(traces, colours, stage)
+        self.scale = stage.scale
         self.shares = (
             None  # torques as shares of their limits, (frames, joints), -1 .. 1: means over a frame
         )
@@ -212,9 +209,11 @@ class Overlay:
         """
         s, (start, end) = self.scale, self.stage.project(ends)
         if np.linalg.norm(end - start) > 1.0:
-            line, rgb = np.linspace(start, end, 40), np.array(style.rgb(style.REACTION)) / 255
+            line = np.linspace(start, end, 40)
+            rgb = np.array(style.rgb(style.REACTION)) / 255
             arrows.paint(image, arrows.outline(line, SHAFT_WIDTH * s), (*rgb, 1.0))
-        draw, font = ImageDraw.Draw(image), style.font(NUMBER_SIZE * s, bold=True)
+        draw = ImageDraw.Draw(image)
+        font = style.font(NUMBER_SIZE * s, bold=True)
         place = end if after else start
         gap = 6 * s * np.sign((end - start)[0] or 1.0) * (1 if after else -1)
         anchor = "lm" if gap > 0 else "rm"
@@ -236,7 +235,8 @@ class Overlay:
                 ((left + right) / 2, (top + bottom) / 2), words, style.INK, letters, anchor="mm"
             )
             return
-        zero, half = top + (LABEL_GAP + BAR_HEIGHT / 2) * s, BAR_HEIGHT * s / 2
+        zero = top + (LABEL_GAP + BAR_HEIGHT / 2) * s
+        half = BAR_HEIGHT * s / 2
         share = self.shares[k][frame]
         for i, value in enumerate(share):
             x = left + (BAR_GAP + i * (BAR_WIDTH + BAR_GAP)) * s

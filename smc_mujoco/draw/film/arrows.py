@@ -113,16 +113,19 @@ def mounts(
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points
     to the camera.
     """
-    plant, is_users = scenario.plant, not scenario.plant.on_stage
+    plant = scenario.plant
+    is_users = not scenario.plant.on_stage
     if plant.pose:
         return flying_mounts(scenario, joints)
     if is_users:
         extent = float(models.compile_model(scenario).stat.extent)
     else:
         extent = 0.0
-    length, thick = SLIDE_LENGTH * rail, min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
+    length = SLIDE_LENGTH * rail
+    thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
     if is_users:
-        length, thick = USER_LENGTH * extent, USER_THICKNESS * extent
+        length = USER_LENGTH * extent
+        thick = USER_THICKNESS * extent
     beyond = plant.network and not is_users
     if plant.n > 1 and not is_users:
         turning = NETWORK_FACTOR
@@ -137,7 +140,8 @@ def mounts(
         turning = max(
             1.0, usual.parameters["l"] / plant.parameters["l"]
         )  # no smaller on a short rod
-    before, radius = front if is_users or plant.free else None, USER_RADIUS * extent
+    before = front if is_users or plant.free else None
+    radius = USER_RADIUS * extent
     return [
         Mount(j, length if slide else turning, thick, before, beyond, 0.0 if slide else radius)
         for j, slide in zip(joints, slides, strict=True)
@@ -147,10 +151,13 @@ def mounts(
 def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
     """Return a Mount for each channel of a free body; the first ones are those of its actuators."""
     model = models.with_values(models.compile_model(scenario), scenario)
-    data, joint, drives = mujoco.MjData(model), free_joint(model), drive_ids(model)
+    data = mujoco.MjData(model)
+    joint = free_joint(model)
+    drives = drive_ids(model)
     mujoco.mj_kinematics(model, data)
     body = model.jnt_bodyid[joint]
-    places, ways = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
+    places = np.zeros((len(joints), 3))
+    ways = np.zeros((len(joints), 3))
     sites = data.site_xpos[model.actuator_trnid[drives, 0]]
     places[: len(drives)] = (sites - data.xpos[body]) @ data.xmat[body].reshape(3, 3)
     ways[: len(drives)] = exerted(model, joint, drives.tolist())[:, :3]
@@ -240,7 +247,8 @@ def flying(
     disturbance.
     """
     law, grey = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE))
-    forces, push = loads["control"].mean[frame], loads["disturbance"].mean[frame, :3]
+    forces = loads["control"].mean[frame]
+    push = loads["disturbance"].mean[frame, :3]
     size = float(np.linalg.norm(push))
     if scale.control:
         parts = forces / scale.control
@@ -310,17 +318,18 @@ def path(
     """Return the line of an arrow, (m, 3) m, and the width of its shaft, m; None where it has no
     place.
     """
-    axis, anchor = data.xaxis[mount.joint], data.xanchor[mount.joint]
+    axis = data.xaxis[mount.joint]
+    anchor = data.xanchor[mount.joint]
     low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.place is not None and mount.way is not None:
-        body, way = model.jnt_bodyid[mount.joint], arrow.way
-        turn, start = (
-            data.xmat[body].reshape(3, 3),
-            mount.unit * FLIGHT_DISTANCE * (way if way is not None else 0.0),
-        )
+        body = model.jnt_bodyid[mount.joint]
+        way = arrow.way
+        turn = data.xmat[body].reshape(3, 3)
+        start = mount.unit * FLIGHT_DISTANCE * (way if way is not None else 0.0)
         if way is None:
-            way, start = turn @ mount.way, turn @ mount.place
+            way = turn @ mount.way
+            start = turn @ mount.place
         return data.xpos[body] + start + mount.unit * along * way, mount.thick
     if mount.radius:
         right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
@@ -334,25 +343,33 @@ def path(
     body = arrow_geom(model, model.jnt_bodyid[mount.joint])
     if body < 0:
         return None
-    place, radius = data.geom_xpos[body], model.geom_rbound[body]
+    place = data.geom_xpos[body]
+    radius = model.geom_rbound[body]
     if model.jnt_type[mount.joint] == mujoco.mjtJoint.mjJNT_HINGE:
         arm = place - anchor
         length = np.linalg.norm(arm)
         if length < MIN_LEVER:
             return None
-        reach, out = mount.unit * HINGE_LENGTH * length, arm / length
+        reach = mount.unit * HINGE_LENGTH * length
+        out = arm / length
         width = RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM)
-        way, start = np.cross(axis, out), radius + ARC_DISTANCE * width
+        way = np.cross(axis, out)
+        start = radius + ARC_DISTANCE * width
         if mount.beyond:
             out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])
-            place, way = anchor, np.cross(out, axis)
+            place = anchor
+            way = np.cross(out, axis)
     else:
-        reach, width, way, out = mount.unit, mount.thick, axis, np.array([0.0, 0.0, 1.0])
+        reach = mount.unit
+        width = mount.thick
+        way = axis
+        out = np.array([0.0, 0.0, 1.0])
         if mount.front is not None:
             across = np.cross(mount.front, way)
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
-        turned, aabb = out @ data.geom_xmat[body].reshape(3, 3), model.geom_aabb[body]
+        turned = out @ data.geom_xmat[body].reshape(3, 3)
+        aabb = model.geom_aabb[body]
         start = (
             aabb[:3] @ turned + aabb[3:] @ np.abs(turned) + RAIL_DISTANCE * width
         )  # beyond the geom's box
@@ -371,7 +388,8 @@ def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
     shaft = np.column_stack(
         [np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T]
     )
-    ahead, behind = np.concatenate([shaft[1:], shaft[-1:]]), np.concatenate([shaft[:1], shaft[:-1]])
+    ahead = np.concatenate([shaft[1:], shaft[-1:]])
+    behind = np.concatenate([shaft[:1], shaft[:-1]])
     along = ahead - behind
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
@@ -382,10 +400,8 @@ def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
 
 def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int = 0) -> None:
     """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
-    corner, far = (
-        np.floor(edge.min(axis=0)).astype(int) - rim,
-        np.ceil(edge.max(axis=0)).astype(int) + 1 + rim,
-    )
+    corner = np.floor(edge.min(axis=0)).astype(int) - rim
+    far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
     size = tuple((far - corner).tolist())
     mask = Image.new("L", tuple(SUPERSAMPLING * side for side in size))
     ImageDraw.Draw(mask).polygon(

@@ -59,8 +59,11 @@ def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room)
     from both sides, for the picture's width and for its height; D is the least at which both leave
     room.
     """
-    across, up, z = points @ turn[:, 0], points @ turn[:, 1], -points @ turn[:, 2]
-    x, y = size[0] / 2, size[1] / 2
+    across = points @ turn[:, 0]
+    up = points @ turn[:, 1]
+    z = -points @ turn[:, 2]
+    x = size[0] / 2
+    y = size[1] / 2
     left, right, low, high = np.array(
         [room.left - x, room.right - x, y - room.bottom, y - room.top]
     ) * pixel(size)

@@ -47,7 +47,9 @@ CHORD_GAP, MIN_CHORDS = (
     6,
 )  # px between an arc and its chords, and the smallest number of chords; chosen
 RING_CHORDS = 24  # chords of a ring around an arm's link: with fewer, a link would show through it
-GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
+GEOM = mujoco.mjtObj.mjOBJ_GEOM
+SKIN = mujoco.mjtObj.mjOBJ_SKIN
+TENDON = mujoco.mjtObj.mjOBJ_TENDON
 ROUND = [
     mujoco.mjtGeom.mjGEOM_SPHERE,
     mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -68,11 +70,11 @@ class Canvas:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int], arms: bool = False
     ):
-        self.model, self.data, self.size = model, data, size
-        self.turn, self.place = (
-            data.cam("film").xmat.reshape(3, 3).copy(),
-            data.cam("film").xpos.copy(),
-        )
+        self.model = model
+        self.data = data
+        self.size = size
+        self.turn = data.cam("film").xmat.reshape(3, 3).copy()
+        self.place = data.cam("film").xpos.copy()
         light = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_LIGHT, scene.SUN)
         # (3,), of what casts shadows on the floor
         if light < 0:
@@ -126,10 +128,12 @@ class Canvas:
         add(shown)
         geoms = list(shown.geoms[: shown.ngeom])
         others = [geom for geom in geoms if geom.objtype not in (GEOM, SKIN)]
-        shapes, loose = self.seen_shapes(), self.seen_others(others)
+        shapes = self.seen_shapes()
+        loose = self.seen_others(others)
         if whole or not self.picture.size or not self.steady:
             areas = [(0, 0, *self.size)]
-            self.shapes, self.others = shapes, loose
+            self.shapes = shapes
+            self.others = loose
         else:
             areas = self.changed(shapes, loose)
         if not areas:
@@ -171,7 +175,10 @@ class Canvas:
         `casting` has the index of the geom that casts each shadow; `shapes` and `others` are the
         rectangles, (n, 4) px, of what `seen_shapes` and `seen_others` return.
         """
-        model, remaining, boxes, shadow_boxes = self.model, iter(others), [], {}
+        model = self.model
+        remaining = iter(others)
+        boxes = []
+        shadow_boxes = {}
         for i, geom in enumerate(geoms):
             if geom.objtype == GEOM and model.geom_type[geom.objid] == scene.PLANE:
                 boxes.append(np.array([-np.inf, -np.inf, np.inf, np.inf]))
@@ -190,7 +197,8 @@ class Canvas:
         """Return where each geom, each skin and the shadow of each geom is in the picture: (shapes,
         8, 2) px.
         """
-        shown, boxes = self.renderer.scene, [scene.boxes(self.model, self.data)]
+        shown = self.renderer.scene
+        boxes = [scene.boxes(self.model, self.data)]
         vertices = np.asarray(shown.skinvert, float).reshape(-1, 3)
         for start, count in zip(
             shown.skinvertadr[: shown.nskin], shown.skinvertnum[: shown.nskin], strict=True
@@ -233,10 +241,8 @@ class Canvas:
         gap = np.full((len(others), len(self.others)), np.inf)
         if gap.size:
             gap = np.abs(others[:, None] - self.others[None]).max(axis=(2, 3))
-        new, gone = (
-            gap.min(axis=1, initial=np.inf) > MIN_MOTION,
-            gap.min(axis=0, initial=np.inf) > MIN_MOTION,
-        )
+        new = gap.min(axis=1, initial=np.inf) > MIN_MOTION
+        gone = gap.min(axis=0, initial=np.inf) > MIN_MOTION
         parts += [around(others[new]), around(self.others[gone])]
         if gap.size:
             self.others = np.concatenate([self.others[~gone], others[new]])
@@ -258,13 +264,13 @@ class Canvas:
         (width, height), renderer = self.size, self.renderer
         for eye, high in zip(renderer.scene.camera, views, strict=True):
             px = 2 * high / height
-            eye.frustum_top, eye.frustum_bottom = high - px * top, high - px * bottom
-            eye.frustum_center, eye.frustum_width = (
-                px * ((left + right) - width) / 2,
-                px * (right - left) / 2,
-            )
+            eye.frustum_top = high - px * top
+            eye.frustum_bottom = high - px * bottom
+            eye.frustum_center = px * ((left + right) - width) / 2
+            eye.frustum_width = px * (right - left) / 2
         out = np.empty((bottom - top, right - left, 3), np.uint8)
-        rect, context = mujoco.MjrRect(0, 0, right - left, bottom - top), renderer._mjr_context
+        rect = mujoco.MjrRect(0, 0, right - left, bottom - top)
+        context = renderer._mjr_context
         if renderer._gl_context:  # Renderer.render draws whole pictures only
             renderer._gl_context.make_current()
         mujoco.mjr_render(rect, renderer.scene, context)
@@ -287,7 +293,8 @@ def joined(areas: Sequence[Area], load: Callable[[Area], int]) -> list[Area]:
     """
     covering: list[Area] = []
     for area in areas:
-        new, k = area, 0
+        new = area
+        k = 0
         while k < len(covering):
             a, b, c, d = covering[k]
             both = min(a, new[0]), min(b, new[1]), max(c, new[2]), max(d, new[3])
@@ -380,7 +387,8 @@ def add_shadows(
     """Add the shadows of a scene's geoms, (geoms,) as `casting` returns, and of its tendons; return
     what casts each.
     """
-    cast, rise = flattening(way), np.array([0.0, 0.0, FLOOR_DISTANCE * extent])
+    cast = flattening(way)
+    rise = np.array([0.0, 0.0, FLOOR_DISTANCE * extent])
     rgba = np.array([*np.array(SHADE) / SHADOW_EMISSION, 1.0], np.float32)
     casting: list[int] = []
     for i, shape in enumerate(list(shown.geoms[: shown.ngeom])):
@@ -399,11 +407,9 @@ def add_shadows(
             (cast @ shape.mat).ravel(),
             rgba,
         )
-        shadow.dataid, shadow.objtype, shadow.emission = (
-            shape.dataid,
-            mujoco.mjtObj.mjOBJ_UNKNOWN,
-            SHADOW_EMISSION,
-        )
+        shadow.dataid = shape.dataid
+        shadow.objtype = mujoco.mjtObj.mjOBJ_UNKNOWN
+        shadow.emission = SHADOW_EMISSION
         shadow.specular = 0.0
         shown.ngeom += 1
         casting.append(i)

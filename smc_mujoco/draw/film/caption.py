@@ -65,13 +65,11 @@ class Caption:
         below: tuple[float, float] | None = None,
         parts: Sequence[str] | None = None,
     ):
-        self.traces, self.names, self.colours, self.size, self.scale = (
-            traces,
-            names,
-            colours,
-            size,
-            scale,
-        )
+        self.traces = traces
+        self.names = names
+        self.colours = colours
+        self.size = size
+        self.scale = scale
         self.jumps = style.marks(traces, names, blows=False)
         inside = size[0] - 2 * EDGE * scale
         clock = style.width("00.000 s", TITLE_SIZE * scale, bold=True) + EDGE * scale
@@ -119,14 +117,17 @@ class Caption:
         self.below = below is not None
         if below is not None:
             self.badge[:] = np.array(below) * scale
-        side, below_row, pill = 40 * scale, 12 * scale, 1.75 * LABEL_SIZE * scale
+        side = 40 * scale
+        below_row = 12 * scale
+        pill = 1.75 * LABEL_SIZE * scale
         self.max_label = (size[0] - side) / len(
             traces
         ) - 0.8 * LABEL_SIZE * scale  # width of a label
         if self.beside:
             self.max_label = MAX_LABEL_SHARE * size[0]
             widths = [self.width(text) for text in self.texts()] + self.badge[:, 0]
-            side, below_row = max(widths) + 30 * scale, 20 * scale
+            side = max(widths) + 30 * scale
+            below_row = 20 * scale
         else:
             if max(self.width(name) for name in names) > self.max_label:
                 self.names = style.distinct(names)
@@ -185,10 +186,8 @@ class Caption:
 
         A badge is below its label, or at its right.
         """
-        widths, height = (
-            np.array([self.width(text) for text in self.texts()]),
-            1.75 * LABEL_SIZE * self.scale,
-        )
+        widths = np.array([self.width(text) for text in self.texts()])
+        height = 1.75 * LABEL_SIZE * self.scale
         gap, middle, (wide, high) = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2, self.badge.T
         if self.in_line:
             whole = widths + np.where(wide > 0, wide + 0.3 * height, 0.0)
@@ -200,18 +199,21 @@ class Caption:
                     boxes[:, 3].max() + 0.35 * height + tall / 2, self.size[1] - tall / 2 - gap / 2
                 ),
             )
-            across, down = x + widths / 2 + 0.3 * height + wide / 2, y
+            across = x + widths / 2 + 0.3 * height + wide / 2
+            down = y
         elif not self.beside:
             x = spread(middle[:, 0], np.maximum(widths, wide) + gap, self.size[0])
             y = np.full(
                 len(x),
                 min(boxes[:, 3].max() + 0.85 * height, self.size[1] - 0.6 * height - high.max()),
             )
-            across, down = x, y + (height + high) / 2 + 0.1 * height * (high > 0)
+            across = x
+            down = y + (height + high) / 2 + 0.1 * height * (high > 0)
         else:
             x = np.maximum(boxes[:, 0] - gap, widths + wide + gap) - wide - widths / 2
             y = spread(middle[:, 1], np.full(len(x), 1.15 * height), self.size[1])
-            across, down = x + (widths + wide) / 2 + 0.1 * height, y
+            across = x + (widths + wide) / 2 + 0.1 * height
+            down = y
         self.pills = np.stack(
             [x - widths / 2, y - height / 2, x + widths / 2, y + height / 2], axis=1
         )
@@ -257,22 +259,27 @@ class Caption:
 
     def _clock(self, draw: ImageDraw.ImageDraw, time: str, speed: str) -> None:
         """Draw the time, and at its left the playback speed."""
-        s, font = self.scale, style.font(TITLE_SIZE * self.scale, bold=True)
+        s = self.scale
+        font = style.font(TITLE_SIZE * self.scale, bold=True)
         right = self.size[0] - EDGE * s
         draw.text((right, 16 * s), time, style.INK, font, anchor="ra")
         if not speed:
             return
         right -= style.width("00.000 s", TITLE_SIZE * s, bold=True) + KEY_SIZE * s
-        left, middle = right - style.width(speed, KEY_SIZE * s, bold=True) - KEY_SIZE * s, 28 * s
+        left = right - style.width(speed, KEY_SIZE * s, bold=True) - KEY_SIZE * s
+        middle = 28 * s
         box = left, middle - 0.85 * KEY_SIZE * s, right, middle + 0.85 * KEY_SIZE * s
         if speed.endswith("slower"):
-            fill, rim = (style.INK, style.INK)
+            fill = style.INK
+            rim = style.INK
         else:
-            fill, rim = (style.PAPER, style.MUTED)
+            fill = style.PAPER
+            rim = style.MUTED
         draw.rounded_rectangle(
             box, radius=0.85 * KEY_SIZE * s, fill=fill, outline=rim, width=max(1, round(s))
         )
-        at, letters = ((left + right) / 2, middle), style.font(KEY_SIZE * s, bold=True)
+        at = ((left + right) / 2, middle)
+        letters = style.font(KEY_SIZE * s, bold=True)
         draw.text(at, speed, style.letters_on(fill), letters, anchor="mm")
 
     def _sheet(
@@ -282,7 +289,8 @@ class Caption:
         dark box.
         """
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
-        draw, s = ImageDraw.Draw(sheet), self.scale
+        draw = ImageDraw.Draw(sheet)
+        s = self.scale
         draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE_SIZE * s, bold=True))
         left = EDGE * s + style.width(self.title, TITLE_SIZE * s, bold=True) + EDGE * s
         room = self.size[0] - self.clock - EDGE * s - left
@@ -290,7 +298,9 @@ class Caption:
             words = style.cropped(self.source, room, KEY_SIZE * s)
             draw.text((left, 21 * s), words, style.DISTURBANCE, style.font(KEY_SIZE * s))
         if change is not None:
-            font, right, y = style.font(KEY_SIZE * s, bold=True), self.size[0] - EDGE * s, 56 * s
+            font = style.font(KEY_SIZE * s, bold=True)
+            right = self.size[0] - EDGE * s
+            y = 56 * s
             words = f"{self.jumps[change]} since {change:g} s"
             words = style.cropped(words, self.note_room - 8 * s, KEY_SIZE * s, bold=True)
             box = (
@@ -304,9 +314,11 @@ class Caption:
         for text, colour, box, gone in zip(
             self.texts(failed), self.colours, self.pills, failed, strict=True
         ):
-            fill, half = style.FAILED if gone else colour, (box[3] - box[1]) / 2
+            fill = style.FAILED if gone else colour
+            half = (box[3] - box[1]) / 2
             draw.rounded_rectangle(tuple(box), half, style.PAPER, style.RULE, max(1, round(s)))
-            x, y = box[0] + 1.3 * half, box[1] + half
+            x = box[0] + 1.3 * half
+            y = box[1] + half
             draw.ellipse(
                 (x - 0.6 * half, y - 0.6 * half, x + 0.6 * half, y + 0.6 * half), fill=fill
             )
@@ -333,7 +345,8 @@ class Caption:
     def _keys(self) -> Image.Image:
         """Draw the key, on paper where it lies over the machines."""
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
-        draw, s = ImageDraw.Draw(sheet), self.scale
+        draw = ImageDraw.Draw(sheet)
+        s = self.scale
         for i, text in enumerate(self.key):
             y = (KEY_TOP + KEY_PITCH * i) * s
             if y + KEY_PITCH * s > self.room.top:
@@ -354,7 +367,8 @@ class Caption:
         assert sensor is not None
         count = sensor.quantum(trace.scenario.plant.unit == "rad")
         now, then = np.interp([time, time - sensor.delay], trace.t, trace.x[:, 0]) / count
-        middle, step = (left + right) / 2, (right - left) / STRIP_COUNTS
+        middle = (left + right) / 2
+        step = (right - left) / STRIP_COUNTS
         draw.rounded_rectangle(
             (left, top, right, bottom), 5 * s, style.PAPER, style.MUTED, max(1, round(s))
         )
@@ -372,7 +386,8 @@ class Caption:
             middle + (round(then + sensor.bias / count) - now) * step, left + 5 * s, right - 5 * s
         )
         draw.line((middle, top + 2 * s, middle, bottom - 2 * s), style.MUTED, max(1, round(s)))
-        place, r = top + 0.35 * (bottom - top), 3.5 * s
+        place = top + 0.35 * (bottom - top)
+        r = 3.5 * s
         draw.ellipse((read - r, place - r, read + r, place + r), fill=self.colours[k])
 
 
@@ -389,7 +404,8 @@ def strips(sheet: Image.Image) -> list[tuple[Image.Image, tuple[int, int]]]:
     found = []
     for top, bottom in rows:
         columns = np.flatnonzero(ink[top:bottom].any(axis=0))
-        left, right = int(columns[0]), int(columns[-1]) + 1
+        left = int(columns[0])
+        right = int(columns[-1]) + 1
         found.append((sheet.crop((left, top, right, bottom)), (left, top)))
     return found
 
@@ -470,7 +486,8 @@ def spread(centres: np.ndarray, widths: np.ndarray, room: float) -> np.ndarray:
     within 0 .. room.
     """
     order = np.argsort(centres)
-    half, placed = widths[order] / 2, centres[order].astype(float)
+    half = widths[order] / 2
+    placed = centres[order].astype(float)
     edge = 0.0
     for i, h in enumerate(half):
         placed[i] = max(placed[i], edge + h)

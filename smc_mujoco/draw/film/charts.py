@@ -61,12 +61,11 @@ class Charts:
         size: tuple[int, int],
         scale: float,
     ):
-        self.end, self.window = end(traces), panels.horizon(traces)
+        self.end = end(traces)
+        self.window = panels.horizon(traces)
         rests = bool(self.window < self.end)
-        self.times, self.shares = (
-            [0.0, *[self.window] * rests, self.end],
-            [0.0, *[WINDOW_WIDTH] * rests, 1.0],
-        )
+        self.times = [0.0, *[self.window] * rests, self.end]
+        self.shares = [0.0, *[WINDOW_WIDTH] * rests, 1.0]
         self.dot = max(2, round(4.5 * scale))
         self.colours = [np.array(style.rgb(colour)) for colour in colours]
         strip = panels.strip(traces)
@@ -80,7 +79,8 @@ class Charts:
             figure.subplots_adjust(
                 left=LEFT, right=RIGHT, bottom=0.13, top=0.85, wspace=CHART_GAP / wide
             )
-            artists, rows = [], []
+            artists = []
+            rows = []
             for ax, panel in zip(axes, strip, strict=True):
                 set_titles(ax, panel, DPI * scale / 72)
                 rows.append(
@@ -142,7 +142,8 @@ class Charts:
         image = self.faint.copy()
         for (left, top, right, bottom), paths in zip(self.frames, self.paths, strict=True):
             now = round(left + (right - left) * float(self.share(time)))
-            rows, past = slice(top - 3 * self.dot, bottom + 1), slice(left - self.dot, now + 1)
+            rows = slice(top - 3 * self.dot, bottom + 1)
+            past = slice(left - self.dot, now + 1)
             image[rows, past] = self.full[rows, past]
             image[top : bottom + 1, now] = CURSOR
             lasting = [  # a run that failed has no place on the cursor
@@ -158,7 +159,8 @@ class Charts:
     def disc(self, image: np.ndarray, x: float, y: float, colour: np.ndarray) -> None:
         """Draw a dot with a soft edge at x, y px."""
         r, (height, width) = self.dot + 2, image.shape[:2]
-        i, j = round(y), round(x)
+        i = round(y)
+        j = round(x)
         rows, cols = np.ogrid[
             max(i - r, 0) : min(i + r + 1, height), max(j - r, 0) : min(j + r + 1, width)
         ]
@@ -203,7 +205,8 @@ def lanes(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Row]:
     title.
     """
     ax.set_axis_off()
-    pitch, rows = 1.0 / len(panel.traces), list[Row]()
+    pitch = 1.0 / len(panel.traces)
+    rows = list[Row]()
     for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True)):
         lane = ax.inset_axes((0.0, 1.0 - (i + 1) * pitch, LANE_WIDTH, LANE_HEIGHT * pitch))
         lane.tick_params(labelbottom=i + 1 == len(panel.traces), labelleft=False)
@@ -221,7 +224,8 @@ def swings(rows: Sequence[Row]) -> None:
             band.set_alpha(LANE_BAND)
         u = trace.u[-max(2, round(END_SHARE * len(trace.t))) :]
         u = u[np.isfinite(u)]
-        least, most = float(u.min(initial=np.inf)), float(u.max(initial=-np.inf))
+        least = float(u.min(initial=np.inf))
+        most = float(u.max(initial=-np.inf))
         swing = 0.5 * (most - least)
         if swing > SMOOTH_SHARE * (high - low):
             words = f"±{swing:.2g}"

@@ -71,7 +71,8 @@ def in_thread(write: Write) -> Iterator[Write]:
     It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by a
     later call, or at the end. After an error, here or there, pictures that still wait are dropped.
     """
-    thread, waiting = futures.ThreadPoolExecutor(1, "encoder"), collections.deque[futures.Future]()
+    thread = futures.ThreadPoolExecutor(1, "encoder")
+    waiting = collections.deque[futures.Future]()
 
     def put(picture: np.ndarray) -> None:
         while waiting and (waiting[0].done() or len(waiting) > MAX_WAITING):

@@ -273,11 +273,11 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
 
 def pictures(frames: Frames) -> Generator[np.ndarray]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
-    traces, shown, chosen = style.same_plant(frames.traces), frames.clock, frames.camera
-    names, colours = (
-        style.labels(traces, frames.labels),
-        style.law_colours([trace.scenario.law for trace in traces]),
-    )
+    traces = style.same_plant(frames.traces)
+    shown = frames.clock
+    chosen = frames.camera
+    names = style.labels(traces, frames.labels)
+    colours = style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
     size = _checked_size(frames.size)
@@ -289,7 +289,8 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     times = shown.times
     edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
     traces = [finite(trace) for trace in traces]
-    scales, arms = arrows.scales(traces), scene.are_arms([trace.scenario for trace in traces])
+    scales = arrows.scales(traces)
+    arms = scene.are_arms([trace.scenario for trace in traces])
     grid = np.linspace(
         0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1
     )  # also for a still
@@ -298,9 +299,11 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
         acts.append(Act(trace, colour, edges, grid, scales, arms))
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
     if arms:
-        below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces))
+        below = arm.room(traces, size[0] / len(traces) / scale)
+        words = arm.key(traces)
     else:
-        below, words = (None, None)
+        below = None
+        words = None
     told = [act.told for act in acts]
     caption = Caption(
         traces, names, colours, frames.title, above, scale, scales, told, row, below, words

@@ -97,7 +97,8 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     moving = np.asarray(
         maximum_filter1d(moved, 2 * round(REST_MARGIN * fps) + 1, mode="nearest"), bool
     )
-    longest, playback = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
+    longest = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1])
+    playback = np.ones(len(grid))
     steps = [(slowest, MAX_HALVINGS) for slowest in range(MAX_HALVINGS, 0, -1)]
     for slowest, around_pushes in [*steps, *((0, k) for k in range(MAX_HALVINGS, -1, -1))]:
         playback = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, slowest), REST_SPEED)

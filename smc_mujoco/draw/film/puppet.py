@@ -16,7 +16,8 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-SLIDE, FREE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_FREE
+SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
+FREE = mujoco.mjtJoint.mjJNT_FREE
 POSES = 96  # poses of a trace that must be in the picture
 MAX_FIXED_SIZE = (
     4.0  # of what moves: larger fixed things of a user's model may leave the picture; chosen
@@ -59,7 +60,8 @@ class Puppet:
             and not self.scenario.plant.pose
         ):
             self.rail = float(2 * np.abs(scene.fixed_boxes(model)[..., 0]).max())
-        self._ids, self._joints = ids, model.jnt_qposadr[ids]
+        self._ids = ids
+        self._joints = model.jnt_qposadr[ids]
         self._rotors = [
             (k, model.jnt_qposadr[rotor]) for k, rotor in enumerate(rotors) if rotor >= 0
         ]
@@ -67,7 +69,9 @@ class Puppet:
         off_stage = not self.scenario.plant.on_stage
         self.free = model.jnt_qposadr[model.jnt_type == FREE]
         self.place = np.zeros(3)  # m, of the machine in the film, to which `qpos` moves free bodies
-        self.ids, self.mounts, self.lowered = ids.tolist(), list[arrows.Mount](), 0.0
+        self.ids = ids.tolist()
+        self.mounts = list[arrows.Mount]()
+        self.lowered = 0.0
         if off_stage:
             self._start = models.initial_state(model, self.scenario)[0]
         else:
@@ -117,8 +121,12 @@ class Puppet:
         there. Joints without a channel move as in `motion`, or stay where they start.
         """
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
-        model, moved, others, world = self.shapes[0].model, [], [], np.empty((0, 8, 3))
-        plane, fixed = model.geom_type == scene.PLANE, model.body_weldid[model.geom_bodyid] == 0
+        model = self.shapes[0].model
+        moved = []
+        others = []
+        world = np.empty((0, 8, 3))
+        plane = model.geom_type == scene.PLANE
+        fixed = model.body_weldid[model.geom_bodyid] == 0
         links = np.isin(model.geom_bodyid, self.links) & ~plane
         if not links.any():
             cure = "give its bodies geoms, or its links <visual>"
@@ -152,7 +160,8 @@ class Puppet:
         still = np.repeat([False, True], [len(near) - fixed.sum(), fixed.sum()])
         if not len(points):
             return near.reshape(-1, 3)
-        low, high = points.min(axis=0), points.max(axis=0)
+        low = points.min(axis=0)
+        high = points.max(axis=0)
         size = (high - low).max()
         if not self.scenario.plant.on_stage:
             close = np.ptp(near, axis=1).max(axis=1) < MAX_FIXED_SIZE * size
@@ -174,14 +183,13 @@ class Puppet:
         """Return the lines of arrows on a machine, (m, 3) m each; bent ones suit the `sides` of
         what moves, m.
         """
-        radius, lines = arrows.BENT_SIZE * float(sides.max(initial=0.0)), []
+        radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
+        lines = []
         self.mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
         for time, some in drawn:
-            now, sample = (
-                self.shape(time),
-                min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 1),
-            )
+            now = self.shape(time)
+            sample = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 1)
             rest = None if motion is None else motion.at(time)
             data[now].qpos[:] = self.qpos(trace.x[sample, : self.shown], rest=rest)
             scene.forward(self.shapes[now].model, data[now])

@@ -71,11 +71,10 @@ ROUND_GEOMS = [int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CA
 BOB, BOB_GROWTH = "bob", 1.3  # a pendulum's mass is the larger in films
 DIAL, DIAL_OPACITY = ("face", "bezel"), 0.4  # a dial is the paler
 CUT_FIELDS = ("geom_pos", "geom_size", "geom_aabb", "geom_group", "geom_sameframe")
-FIXED, DIRECTIONAL = (
-    mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value,
-    mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-)
-PLANE, CAPSULE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE
+FIXED = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value
+DIRECTIONAL = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+PLANE = mujoco.mjtGeom.mjGEOM_PLANE
+CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 
 
 def compose(
@@ -104,14 +103,16 @@ def compose(
             *machine.textures,
         )
         if k == 0:
-            spec.option, spec.compiler = machine.option, machine.compiler
+            spec.option = machine.option
+            spec.compiler = machine.compiler
         spec.worldbody.add_frame(pos=place).attach_body(machine.body("machine"), f"m{k}/", "")
     spec.material("floor").emission = EMISSION
     sun = next(
         (light for light in spec.lights if light.castshadow and light.type == DIRECTIONAL), None
     )
     if sun:
-        sun.name, sun.castshadow = SUN, False
+        sun.name = SUN
+        sun.castshadow = False
     spec.worldbody.add_camera(name="film", fovy=camera.FOVY)
     spec.stat.meansize = 0.1
     return mjcb.compiled(spec)
@@ -328,7 +329,8 @@ def first_channels(scenario: Scenario) -> Scenario:
 def restyle(model: mujoco.MjModel) -> None:
     """Enlarge the bobs of pendulums, to which the eye should go, and make dials translucent."""
     names = [model.geom(i).name.rpartition("/")[2] for i in range(model.ngeom)]
-    bobs, dial = np.flatnonzero(np.isin(names, BOB)), np.flatnonzero(np.isin(names, DIAL))
+    bobs = np.flatnonzero(np.isin(names, BOB))
+    dial = np.flatnonzero(np.isin(names, DIAL))
     model.geom_rgba[dial] = model.mat_rgba[model.geom_matid[dial]] * (1.0, 1.0, 1.0, DIAL_OPACITY)
     model.geom_matid[dial] = -1
     for field in (model.geom_size, model.geom_aabb, model.geom_rbound):
@@ -344,23 +346,25 @@ def cut(
     The foot of a column and the posts at the ends of a rail come closer, and marks beyond are
     hidden. Columns are cut of the library's `own` machines. Returns how far the foot came up, m.
     """
-    model, data = machines[0], mujoco.MjData(machines[0])
+    model = machines[0]
+    data = mujoco.MjData(machines[0])
     forward(model, data)
     fixed = np.flatnonzero((model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE))
-    corners, raised = boxes(model, data)[fixed], 0.0
+    corners = boxes(model, data)[fixed]
+    raised = 0.0
     margin = CUT_MARGIN * np.ptp(points, axis=0).max()
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    low = points.min(axis=0) - margin
+    high = points.max(axis=0) + margin
     for axis in range(3) if len(fixed) else ():
         turned = np.abs(data.geom_xmat[fixed].reshape(-1, 3, 3)[:, axis])
-        least, most, sides = (
-            corners[..., axis].min(axis=1),
-            corners[..., axis].max(axis=1),
-            np.ptp(corners, axis=1),
-        )
+        least = corners[..., axis].min(axis=1)
+        most = corners[..., axis].max(axis=1)
+        sides = np.ptp(corners, axis=1)
         long = (sides[:, axis] > SLENDER * np.delete(sides, axis, axis=1).max(axis=1)) & (
             turned.max(axis=1) > 0.999
         )
-        first, last = low[axis], high[axis]
+        first = low[axis]
+        last = high[axis]
         if axis == 2:
             first, last = (
                 min(least[~long & (most > first)].min(initial=first) - margin, first),
@@ -368,13 +372,17 @@ def cut(
             )
         if not long.any() or not (own if axis == 2 else (np.abs(slides[:, axis]) > 0.9).any()):
             continue
-        start, stop = least[long].min(), most[long].max()
+        start = least[long].min()
+        stop = most[long].max()
         first, last, near = max(first, start), min(last, stop), RAIL_END * (stop - start)
         home = model.geom_bodyid[fixed] == model.geom_bodyid[fixed[0]]
         for k, geom in enumerate(fixed.tolist()):
-            way, middle = np.zeros(3), 0.5 * (least[k] + most[k])
+            way = np.zeros(3)
+            middle = 0.5 * (least[k] + most[k])
             if long[k]:
-                a, b, side = max(least[k], first), min(most[k], last), int(turned[k].argmax())
+                a = max(least[k], first)
+                b = min(most[k], last)
+                side = int(turned[k].argmax())
                 way[axis], longer = 0.5 * (a + b) - middle, 0.5 * (b - a - sides[k, axis])
                 model.geom_size[geom, 1 if int(model.geom_type[geom]) in ROUND_GEOMS else side] += (
                     longer

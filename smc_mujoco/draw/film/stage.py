@@ -58,10 +58,8 @@ class Stage:
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
-        self.shown, self.is_users = (
-            [puppet.shown for puppet in self.puppets],
-            not scenarios[0].plant.on_stage,
-        )
+        self.shown = [puppet.shown for puppet in self.puppets]
+        self.is_users = not scenarios[0].plant.on_stage
         turn = scene.turn(scenarios[0], chosen)
         self.motions = [act.motion for act in acts] or [None] * len(traces)
         drawn = [act.framing for act in acts] or [()] * len(traces)
@@ -99,7 +97,9 @@ class Stage:
         self.links = [
             np.flatnonzero(np.isin(self.model.geom_bodyid, its) & visible) for its in moved
         ]
-        self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
+        self.shape = [-1] * len(scenarios)
+        self.colours = [""] * len(scenarios)
+        self.changed = True
         for k, colour in enumerate(colours):
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
@@ -130,7 +130,9 @@ class Stage:
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in flat])
         scene.forward(self.model, self.data)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
-        self.turn, self.place, self.size = turn, place, size
+        self.turn = turn
+        self.place = place
+        self.size = size
         self.canvas = Canvas(self.model, self.data, size, arms=scene.are_arms(scenarios))
 
     def __enter__(self) -> "Stage":
@@ -141,7 +143,8 @@ class Stage:
 
     def shows(self) -> bool:
         """Return whether a picture shows some of what the channels move."""
-        links, casts = np.concatenate(self.links), self.canvas.casts
+        links = np.concatenate(self.links)
+        casts = self.canvas.casts
         groups = self.model.geom_group[links].copy()
         self.canvas.casts = np.zeros_like(casts)  # a shadow shows nothing
         picture, self.changed = self.canvas.draw(whole=True).astype(int), True
@@ -176,7 +179,8 @@ class Stage:
         """
         if self.colours[k] == colour:
             return
-        rgb, links = np.array(style.rgb(colour)) / 255, self.links[k]
+        rgb = np.array(style.rgb(colour)) / 255
+        links = self.links[k]
         if self.is_users:
             if len(self.colours) == 1 and colour != style.FAILED:
                 links = links[(self.paint[links] == DEFAULT_RGBA).all(axis=1)]
@@ -266,13 +270,17 @@ class Stage:
 
     def ghost(self, shown: mujoco.MjvScene, links: np.ndarray) -> None:
         """Add translucent copies of geoms, posed as the reference wants them."""
-        model, goal = self.model, self.goal
+        model = self.model
+        goal = self.goal
         for i in links[: shown.maxgeom - shown.ngeom].tolist():
-            shape, size = shown.geoms[shown.ngeom], GHOST_SIZE * model.geom_size[i]
+            shape = shown.geoms[shown.ngeom]
+            size = GHOST_SIZE * model.geom_size[i]
             mujoco.mjv_initGeom(
                 shape, model.geom_type[i], size, goal.geom_xpos[i], goal.geom_xmat[i], GHOST_RGBA
             )
-            shape.dataid, shape.objtype, shape.transparent = 2 * model.geom_dataid[i], OTHER, 1
+            shape.dataid = 2 * model.geom_dataid[i]
+            shape.objtype = OTHER
+            shape.transparent = 1
             shape.specular = 0.0
             shown.ngeom += 1
 
@@ -342,7 +350,8 @@ def framed(
     The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`.
     A warning tells if the chosen view, or every view, shows nothing.
     """
-    traces, colours = [act.trace for act in acts], [act.colour for act in acts]
+    traces = [act.trace for act in acts]
+    colours = [act.colour for act in acts]
     name = traces[0].scenario.plant.name
     for view in (chosen, *scene.OTHER_VIEWS):
         stage = Stage(traces, colours, size, room, view, acts, apart, scale)

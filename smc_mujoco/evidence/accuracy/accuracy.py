@@ -337,7 +337,9 @@ def _setup(
 
 def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
-    base, counted, halved = setup.scenarios[0], runs[:-1], runs[-1]
+    base = setup.scenarios[0]
+    counted = runs[:-1]
+    halved = runs[-1]
     failures = [run.failure for run in counted if run.failure]
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)

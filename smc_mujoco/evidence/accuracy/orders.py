@@ -120,8 +120,10 @@ def _write_orders(ax: Axes, last: float, ends: Sequence[tuple[float, float, str,
     """
     ends, size = sorted(ends), style.points(9.5)
     room = max((style.width(words, size) for *_, words in ends), default=0.0) + 2.0 * size
-    box, dots = ax.get_window_extent(), 72 / ax.figure.dpi
-    left, share = ax.get_xlim()[0], min(room / (dots * box.width), 0.6)
+    box = ax.get_window_extent()
+    dots = 72 / ax.figure.dpi
+    left = ax.get_xlim()[0]
+    share = min(room / (dots * box.width), 0.6)
     ax.set_xlim(left, left * (last / left) ** (1.0 / (1.0 - share)))
     low, high = np.log(ax.get_ylim())
     ends_at = (np.log([error for error, *_ in ends]) - low) / (high - low)
@@ -155,7 +157,9 @@ def _draw(
 
     Return where they end, error and period in ms.
     """
-    h, errors, end = 1e3 * np.array(periods), np.array(scaling.errors), None
+    h = 1e3 * np.array(periods)
+    errors = np.array(scaling.errors)
+    end = None
     with np.errstate(divide="ignore"):
         means = np.exp(np.log(errors).mean(axis=0))
     for k in np.flatnonzero(np.isfinite(means) & (means > 0.0)).tolist():
@@ -179,7 +183,8 @@ def _draw(
     if not _tells(scaling):
         return end
     counted = np.isin(periods, scaling.used)
-    middle, ends = np.exp(np.log(means[counted]).mean()), h[counted][[0, -1]]
+    middle = np.exp(np.log(means[counted]).mean())
+    ends = h[counted][[0, -1]]
     at = np.exp(np.log(h[counted]).mean())
     for slope, line in ((scaling.theory, "--"), (scaling.order, "-")):
         if slope is not None:

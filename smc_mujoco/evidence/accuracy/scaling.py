@@ -154,7 +154,8 @@ def scaling(
         if mask.any():
             said.append(f"{_periods(periods, mask)} {words}")
     said += _difference(errors[:, used], h, order, (low, high), theory, reasons)
-    every, counted = tuple(map(tuple, errors.tolist())), tuple(h.tolist())
+    every = tuple(map(tuple, errors.tolist()))
+    counted = tuple(h.tolist())
     return Scaling(
         errors=every,
         used=counted,
@@ -172,7 +173,8 @@ def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
     """
     if len(periods) < 2:
         return math.nan, math.nan, math.nan
-    x, y = np.log(periods), np.log(errors)
+    x = np.log(periods)
+    y = np.log(errors)
     x = x - x.mean()
     spread = float(x @ x)
     slopes = y @ x / spread  # of each start

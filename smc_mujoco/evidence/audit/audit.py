@@ -123,7 +123,8 @@ def audit(
         audited = find_paper(paper)
     rows = {} if table is None else of_table(table)
     shared: dict[str, Result] = {}
-    entries, names = wanted(audited, only), sets(audited, gains, quick)
+    entries = wanted(audited, only)
+    names = sets(audited, gains, quick)
     evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
     used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
     late_last = sorted(entries, key=lambda entry: entry.late)

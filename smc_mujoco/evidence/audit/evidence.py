@@ -137,7 +137,8 @@ def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
 
 def _run(scenario: Scenario) -> dict[str, Any]:
     """Return a short description of a run. Its name is a hash of the whole scenario."""
-    plant, suite = scenario.plant, plants().get(scenario.plant.name)
+    plant = scenario.plant
+    suite = plants().get(scenario.plant.name)
     changed = {}
     for name, value in plant.parameters.items():
         if not suite or suite.parameters.get(name) != value:

@@ -75,7 +75,8 @@ def figure(
         else:
             order = ""
         words = f"measured / asked: left of 1 it holds, and is filled{order}"
-        letters, room = style.points(9.5), TEXT_SHARE * 72 * width
+        letters = style.points(9.5)
+        room = TEXT_SHARE * 72 * width
         ax.set_xlabel(style.wrapped(words, 2 * room, letters, lines=2), fontsize=letters)
         narrow = width < pages.NARROW
         ends = {-MAX_DECADES: f"≤ {10**-MAX_DECADES:g}", MAX_DECADES: f"≥ {10**MAX_DECADES:g}"}
@@ -101,7 +102,8 @@ def figure(
 
 def draw(ax: Axes, row: int, claim: Claim) -> None:
     """Draw the checks of a claim: a line of dots for each set of gains."""
-    colour, sets = COLOURS[claim.verdict], list(claim.verdicts)
+    colour = COLOURS[claim.verdict]
+    sets = list(claim.verdicts)
     dot = {
         "marker": "o",
         "ls": "",
@@ -121,9 +123,11 @@ def place(check: Check) -> float:
     from 0.
     """
     if check.relation in ("<", "<="):
-        over, under = (check.value, check.limit)
+        over = check.value
+        under = check.limit
     else:
-        over, under = (check.limit, check.value)
+        over = check.limit
+        under = check.value
     edge = -MAX_DECADES if check.holds else MAX_DECADES
     if not (0.0 < over < math.inf and 0.0 < under < math.inf):
         return edge
@@ -146,7 +150,8 @@ def badge(name: str, claims: Sequence[Claim]) -> str:
     for verdict, count in totals(claims).items():
         fields.append((f"{count} {verdict.removesuffix(' supported')}", COLOURS[verdict]))
     about = escape(f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}")
-    parts, x = [], 0
+    parts = []
+    x = 0
     for text, colour in fields:
         length = style.width(text, FONT_SIZE)  # DejaVu Sans is as wide as Verdana
         width = round(length + 2 * MARGIN)

@@ -20,7 +20,8 @@ from smc_mujoco.evidence.audit.variants import variant
 from smc_mujoco.evidence.audit.verdict import Evidence, sentences
 
 MUTANTS = ("reversed", "zero", "forgetful", "relay")  # of VARIANTS
-KEPT, BLIND = "kept by every mutant", "not supported, and no mutant changes its numbers"
+KEPT = "kept by every mutant"
+BLIND = "not supported, and no mutant changes its numbers"
 
 
 def survivors(

@@ -48,7 +48,8 @@ from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
 from smc_mujoco.simulation.conditions import Condition, condition, find_condition, read_fields
 from smc_mujoco.simulation.scenario import Scenario
 
-PAPER_FILE, CODE_FILE = "paper.toml", "claims.py"
+PAPER_FILE = "paper.toml"
+CODE_FILE = "claims.py"
 SHIPPED_PACKAGE = "smc_mujoco.evidence.papers"
 KINDS_OF_CLAIM = {"paper": "of its sentences", "derived": "derived", "ours": "beside it"}
 NO_FIELDS: Mapping[str, Any] = frozen({})
@@ -61,11 +62,9 @@ SPREAD_SETS, NEAR_SETS = (
     6,
     3,
 )  # sets of gains that a search tries over the bounds, and around the best of them
-A_TEXT, A_LIST, FIELDS_CURE = (
-    (str, "a text"),
-    (list, "a list of names"),
-    'fields of a scenario, as "duration=5.0"',
-)
+A_TEXT = (str, "a text")
+A_LIST = (list, "a list of names")
+FIELDS_CURE = 'fields of a scenario, as "duration=5.0"'
 PAPER_FIELDS = {  # field of a paper -> its type and what to write
     **dict.fromkeys(TEXT_FIELDS, A_TEXT),
     "claim": (list, "tables, each under a line [[claim]]"),
@@ -217,7 +216,8 @@ class Paper:
 
     def bound(self, law: str, gains: Mapping[str, float]) -> Component:
         """Return a law with these gains, and its defaults for the rest."""
-        base, defaults = find("law", law, laws_known() | self.laws), {}
+        base = find("law", law, laws_known() | self.laws)
+        defaults = {}
         if isinstance(base, Component):
             base, defaults = base.template or base, base.gains
         values = {**defaults, **gains}

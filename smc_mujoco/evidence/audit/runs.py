@@ -111,13 +111,13 @@ class Runs:
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
-        runs.used, runs.checked = {}, set()
-        runs.plants, runs.laws, runs.conditions = (
-            entry.plants,
-            entry.laws,
-            entry.conditions or ("nominal",),
-        )
-        runs.values, runs.fields = entry.values, entry.fields
+        runs.used = {}
+        runs.checked = set()
+        runs.plants = entry.plants
+        runs.laws = entry.laws
+        runs.conditions = entry.conditions or ("nominal",)
+        runs.values = entry.values
+        runs.fields = entry.fields
         runs.thresholds = {threshold.measure: threshold for threshold in entry.thresholds}
         return runs
 
@@ -126,7 +126,8 @@ class Runs:
         used by the claim.
         """
         runs = copy.copy(self)
-        runs.searched, runs.quick = {law: dict(gains)}, quick
+        runs.searched = {law: dict(gains)}
+        runs.quick = quick
         return runs
 
     def on(self, plant: str) -> "Runs":
@@ -185,7 +186,8 @@ class Runs:
         earlier. A changed `plant` may have other parameters or another size. The gains stay those
         of the named plant.
         """
-        paper, its = self.paper, self.fields
+        paper = self.paper
+        its = self.fields
         machine = paper.plant(plant)
         duration = {"duration": DURATION, **paper.fields, **its, **changes}["duration"]
         fields: dict[str, Any] = {"plant": machine, **paper.fields}
@@ -212,7 +214,8 @@ class Runs:
         """Return every metric of every scenario, in order; a run that fails has inf in every
         metric.
         """
-        wanted, known = self._keyed(scenarios), ChainMap(self.shared, self.table)
+        wanted = self._keyed(scenarios)
+        known = ChainMap(self.shared, self.table)
         new = {name: scenario for name, scenario in wanted if name not in known}
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):

@@ -62,7 +62,8 @@ def _decisive(
     entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str
 ) -> Evidence:
     """Return the evidence at the gains that decide on all plants of a claim."""
-    law, best = entry.searched or entry.laws[0], min if entry.over == "all" else max
+    law = entry.searched or entry.laws[0]
+    best = min if entry.over == "all" else max
     theorem = Theorem(entry, runs)
     in_full: list[Tried] = []
     quickly: list[Tried] = []
@@ -77,9 +78,11 @@ def _decisive(
 
     def search() -> None:
         if runs.quick:
-            spread, near = (QUICK_SPREAD_SETS, QUICK_NEAR_SETS)
+            spread = QUICK_SPREAD_SETS
+            near = QUICK_NEAR_SETS
         else:
-            spread, near = (theorem.allowed.spread, theorem.allowed.near)
+            spread = theorem.allowed.spread
+            near = theorem.allowed.near
         if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
             return
         centre = best(quickly, key=lambda tried: tried.rank).gains

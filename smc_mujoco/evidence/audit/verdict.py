@@ -26,8 +26,11 @@ from typing import Any, NamedTuple
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown
 
-SUPPORTED, PARTLY, REFUTED = "supported", "partly supported", "refuted"
-NOT_SHOWN, NOT_TESTABLE = "not shown", "not testable"
+SUPPORTED = "supported"
+PARTLY = "partly supported"
+REFUTED = "refuted"
+NOT_SHOWN = "not shown"
+NOT_TESTABLE = "not testable"
 VERDICTS: tuple[str, ...] = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
 ANSWERS: dict[str, str] = dict(
     zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True)
@@ -38,7 +41,9 @@ PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
 DISTANCE_WORDS = ", distance from "  # in a range check's name, between number and range
-UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"
+UNIVERSAL = "universal"
+NAMED = "of what it names"
+EXISTENTIAL = "existential"
 QUANTIFIERS = {
     "universal": UNIVERSAL,
     "existential": EXISTENTIAL,
@@ -416,7 +421,8 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
         others = ", ".join(
             words for words in rest if not words.endswith(f"with {statement.rivals} gains")
         )
-        overall, flips = verdicts[statement.rivals], False
+        overall = verdicts[statement.rivals]
+        flips = False
         sentence = f"Decided by a search over the law's gains, with {statement.rivals} gains of the other laws"
         if others:
             sentence += f"; for one set of gains each: {others}."

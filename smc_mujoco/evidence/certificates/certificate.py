@@ -163,7 +163,8 @@ class Certificate:
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """All conditions of the theorems."""
-        x, made = self.data["unit"], []
+        x = self.data["unit"]
+        made = []
         for part in self.data["parts"]:
             for name, margin in ((row["name"], row["margin"]) for row in part["conditions"]):
                 unit, asks, fails = CONDITIONS[name]
@@ -202,7 +203,8 @@ class Certificate:
             f"no theorem here is about {here}"
             + f"; nor about what is not here: {absent}" * bool(absent)
         )
-        d0, unit = self.data["disturbance"], EFFORT[self.data["unit"]]
+        d0 = self.data["disturbance"]
+        unit = EFFORT[self.data["unit"]]
         silent = d0 > 0.0 and self.theorems == ("saturated PD",)
         nothing = (f"nothing is proven under every |d| <= {d0:g} {unit}",) * silent
         return *(self._sentence(part) for part in self.data["parts"]), *nothing, left_out
@@ -211,7 +213,9 @@ class Certificate:
         """Return what a theorem says of this plant, or which of its conditions fail and by how
         much.
         """
-        theorem, x, d0 = part["theorem"], self.data["unit"], self.data["disturbance"]
+        theorem = part["theorem"]
+        x = self.data["unit"]
+        d0 = self.data["disturbance"]
         if d0:
             under = f"under every |d| <= {d0:g} {EFFORT[x]}"
         else:
@@ -287,10 +291,12 @@ class Certificate:
         x, v, c = np.asarray(x, float), np.asarray(v, float), self.surface
         xs, ss, W = (np.array(part[key]) for key in ("x", "s", "W"))
         sign = np.where(x >= 0.0, 1.0, -1.0)
-        px, ps = x * sign, (v + c * x) * sign
+        px = x * sign
+        ps = (v + c * x) * sign
         i = np.clip(np.searchsorted(xs, px, side="right") - 1, 0, xs.size - 2)
         j = np.clip(np.searchsorted(ss, ps, side="right") - 1, 0, ss.size - 2)
-        f, g = (px - xs[i]) / (xs[i + 1] - xs[i]), (ps - ss[j]) / (ss[j + 1] - ss[j])
+        f = (px - xs[i]) / (xs[i + 1] - xs[i])
+        g = (ps - ss[j]) / (ss[j + 1] - ss[j])
         W = (1 - f) * ((1 - g) * W[i, j] + g * W[i, j + 1]) + f * (
             (1 - g) * W[i + 1, j] + g * W[i + 1, j + 1]
         )

@@ -107,7 +107,9 @@ def fields(doc):
     """Refuse fields that the format does not have, or that are missing, and a whole number that is
     none.
     """
-    plant, law, parts = doc["plant"], doc["law"], doc["parts"]
+    plant = doc["plant"]
+    law = doc["law"]
+    parts = doc["parts"]
     told = [
         ("the certificate", doc),
         ("plant", plant),
@@ -148,7 +150,8 @@ def margins(part, derived):
     kept = []
     for name, margin in derived.items():
         if margin is None:
-            value, terms = (arb(told[name]), 0)
+            value = arb(told[name])
+            terms = 0
         else:
             value, terms = margin
         equal(told[name], value, f"the margin of {name}", terms)
@@ -179,8 +182,11 @@ def words(told):
 
 def equation(plant):
     """Return the coefficients of a plant's equation."""
-    p, n = Space(**{name: arb(value) for name, value in plant["parameters"].items()}), plant["n"]
-    zero, name, network = arb(0), plant["name"], "network" in plant["name"]
+    p = Space(**{name: arb(value) for name, value in plant["parameters"].items()})
+    n = plant["n"]
+    zero = arb(0)
+    name = plant["name"]
+    network = "network" in plant["name"]
     need(
         n >= 2 if network else n == 1 and plant["mechanism"] == "equation",
         f"{name} with {n} channels",
@@ -200,10 +206,8 @@ def feedback(law, u_max):
     """Return sigma: its kind, largest value K (None: unbounded), slope a at 0, slope c of s; gains;
     force to spare.
     """
-    g, name = (
-        Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None}),
-        law["name"],
-    )
+    g = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None})
+    name = law["name"]
     room = lambda top: (arb(0), 0) if u_max is None else (u_max - top, abs(top))  # noqa: E731
     top = lambda force: force if u_max is None else force.min(arb(u_max))  # the actuator clips  # noqa: E731
     spare = lambda force: (room(force)[0].max(arb(0)), room(force)[1])  # noqa: E731
@@ -229,7 +233,8 @@ def feedback(law, u_max):
         k2 = (g.a2 + (g.a2 * g.a2 + 2 * g.b * k1 + g.b * g.b * g.q2 / g.r).sqrt()) / g.b
     else:
         need(name == "pid" and g.ki == 0, f"law {name}")
-        k1, k2 = g.kp, g.kd
+        k1 = g.kp
+        k2 = g.kd
     K = u_max and arb(u_max)  # the actuator's bound is part of a linear law
     return Space(kind="sat", K=K, a=k2, c=k1 / k2, g=g, room=(arb(0), 0), theorems=(0, 2))
 
@@ -256,7 +261,8 @@ def sigma(f, s):
 def slope(f, s):
     """Return sigma' over a ball, away from 0 for sgn."""
     if f.kind == "tanh":
-        rate, force = f.a / (s.cosh() * s.cosh()), f.a * abs(s).tanh()
+        rate = f.a / (s.cosh() * s.cosh())
+        force = f.a * abs(s).tanh()
         if force > f.K:
             return arb(0)
         if f.a <= f.K or force < f.K:
@@ -314,20 +320,24 @@ def restoring(told, e, f):
     """Check that (1 - m) sigma(c x) >= phi(x) for x > 0, by boxes without a gap, and that m <= 1 is
     tight.
     """
-    m, c, smooth = arb(told["margin"]), f.c, f.kind != "sgn"
+    m = arb(told["margin"])
+    c = f.c
+    smooth = f.kind != "sgn"
     if "at" in told:
         need(told["at"] > 0 and m < 0, "the place where the law is too weak")
         return equal(
             m, 1 - phi(e, arb(told["at"])) / sigma(f, c * told["at"]), "the margin of restoring", 1
         )
-    boxes, best = told["boxes"], (1 - (e.A + e.B) / (f.a * c)).min(arb(1)) if smooth else arb(1)
+    boxes = told["boxes"]
+    best = (1 - (e.A + e.B) / (f.a * c)).min(arb(1)) if smooth else arb(1)
     joined = all(box[1] == following[0] for box, following in pairwise(boxes))
     need(
         joined and boxes[0][0] == 0 and boxes[-1][1] is None,
         "boxes from 0 to infinity, without a gap",
     )
     for a, b in boxes[:-1]:
-        x, mid = hull(a, b), arb(a) / 2 + arb(b) / 2
+        x = hull(a, b)
+        mid = arb(a) / 2 + arb(b) / 2
         rate = (1 - m) * c * slope(f, c * x) - e.A * x.cos() - e.B - 3 * e.C * x * x
         if a == 0 and (smooth or m == 1):
             q = rate
@@ -358,7 +368,8 @@ def levels(doc, part, e, f):
         arb(doc["disturbance"]),
         *(part[key] for key in ("x", "s", "W", "inner", "outer")),
     )
-    middle, border = ss.index(0), min([*W[-1], *(row[0] for row in W), *(row[-1] for row in W)])
+    middle = ss.index(0)
+    border = min([*W[-1], *(row[0] for row in W), *(row[-1] for row in W)])
     rising = all(a < b for edges in (xs, ss) for a, b in pairwise(edges))
     need(
         rising and xs[0] == 0 and [-s for s in reversed(ss)] == ss and W[0] == W[0][::-1],
@@ -416,20 +427,22 @@ def falls(e, f, d0, box, corners, depth=MAX_HALVINGS):
     A box where that is not certain is cut into quarters.
     """
     (x0, x1, s0, s1), (w00, w10, w01, w11) = map(arb, box), map(arb, corners)
-    x, s, edge = hull(x0, x1), hull(s0, s1), x1 - x0
-    v, D = s - f.c * x, e.E + e.F * x * x
-    Wx, Ws = hull((w10 - w00) / edge, (w11 - w01) / edge), hull(w01 - w00, w11 - w10) / (s1 - s0)
+    x = hull(x0, x1)
+    s = hull(s0, s1)
+    edge = x1 - x0
+    v = s - f.c * x
+    D = e.E + e.F * x * x
+    Wx = hull((w10 - w00) / edge, (w11 - w01) / edge)
+    Ws = hull(w01 - w00, w11 - w10) / (s1 - s0)
     if (Wx + f.c * Ws - D * Ws / e.M) * v + (
         Ws * (phi(e, x) - sigma(f, s)) + d0 * abs(Ws)
     ) / e.M < 0:
         return True
     w = [[w00, (w00 + w01) / 2, w01], [], [w10, (w10 + w11) / 2, w11]]
     w[1] = [(a + b) / 2 for a, b in zip(w[0], w[2], strict=True)]
-    X, S, quarters = (
-        (x0, (x0 + x1) / 2, x1),
-        (s0, (s0 + s1) / 2, s1),
-        ((0, 0), (0, 1), (1, 0), (1, 1)),
-    )
+    X = (x0, (x0 + x1) / 2, x1)
+    S = (s0, (s0 + s1) / 2, s1)
+    quarters = ((0, 0), (0, 1), (1, 0), (1, 1))
     parts = (
         ((*X[i : i + 2], *S[j : j + 2]), (*w[i][j : j + 2], *w[i + 1][j : j + 2]))
         for i, j in quarters
@@ -447,12 +460,15 @@ def quadratic(P, e, f, corners):
     det = p * r - q * q
     x, s = (r / det).sqrt(), (p / det).sqrt()  # the largest |x| and |s| where the form is at most 1
     push = e.A * hull(x.sin() / x, 1) + e.B + e.C * hull(0, x * x)  # phi(x) / x for x < pi
-    D, gain = hull(e.E, e.E + e.F * x * x), hull(sigma(f, s) / s, f.a)
+    D = hull(e.E, e.E + e.F * x * x)
+    gain = hull(sigma(f, s) / s, f.a)
     low, high = (
         (push + D * f.c) / e.M - f.c * f.c,
         f.c - (D + gain) / e.M,
     )  # x' = s - c x, s' = low x + high s
-    a, b, d = 2 * (q * low - p * f.c), p + q * (high - f.c) + r * low, 2 * (q + r * high)
+    a = 2 * (q * low - p * f.c)
+    b = p + q * (high - f.c) + r * low
+    d = 2 * (q + r * high)
     need(p > 0 and det > 0 and x < 3 and a < 0 and a * d - b * b > 0, "a positive form that falls")
     need(
         all(p * x * x + 2 * q * x * s + r * s * s <= 1 for x, s in corners),
@@ -478,16 +494,15 @@ def reaching(doc, part, e, f):
     )
 
     def push(a, b, s):
-        x, D = hull(a, b), e.E + e.F * hull(a, b) ** 2
+        x = hull(a, b)
+        D = e.E + e.F * hull(a, b) ** 2
         if not terminal:
             return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
         v, vs = (g.b * hull(a**power if a > 0 else 0, b**power) for power in (g.p, 2 * g.p - 1))
         return abs(phi(e, x) + D * v + (g.b * g.p * vs).min(g.bound) - e.M * g.b * g.p * vs) + d0
 
-    edges, strips = (
-        [X * i / 64 for i in range(65)],
-        [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)],
-    )
+    edges = [X * i / 64 for i in range(65)]
+    strips = [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
     least = min((f.K - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
     need(bool(X > 0) is bool(least > 0), "reaching")
     return {"reaching": (least, g.k), "actuator": f.room}
@@ -508,15 +523,22 @@ def super_twisting(doc, part, e, f):
     )
     det = p * r - q * q
     for end in (L, -L):
-        a, b, low = -g.k1 / (2 * e.M), 1 / (2 * e.M), end - g.k2
-        n11, n12, n22 = 2 * (a * p + low * q), b * p + a * q + low * r, 2 * b * q
+        a = -g.k1 / (2 * e.M)
+        b = 1 / (2 * e.M)
+        low = end - g.k2
+        n11 = 2 * (a * p + low * q)
+        n12 = b * p + a * q + low * r
+        n22 = 2 * b * q
         need(n11 < 0 and n11 * n22 - n12 * n12 > 0, f"a falling form at L = {end}")
-    z1, z2 = (size * r / det).sqrt(), (size * p / det).sqrt()
+    z1 = (size * r / det).sqrt()
+    z2 = (size * p / det).sqrt()
     need(
         z1 * z1 <= g.c * X and p > 0 and det > 0 and size > 0 and L > 0 and e.n == 1,
         "a positive form, |s| <= c X",
     )
-    v, x, D = z1 * z1 + g.c * X, hull(-X, X), hull(e.E, e.E + e.F * X * X)
+    v = z1 * z1 + g.c * X
+    x = hull(-X, X)
+    D = hull(e.E, e.E + e.F * X * X)
     rate = e.A * x.cos() + e.B + 3 * e.C * x * x - g.c * (e.M * g.c - D)
     fast = abs(e.M * g.c - D) * (g.k1 * z1 + z2) / e.M + 2 * abs(e.F) * X * v * v
     w = z2 + abs(phi(e, x)) + abs(e.M * g.c - D) * v + doc["disturbance"]
@@ -565,20 +587,17 @@ def check(doc):
         need(doc["format"] == FORMAT and doc["seal"] == seal(doc), "the seal")
         fields(doc)
         words(doc["leaves_out"])
-        e, f = equation(doc["plant"]), feedback(doc["law"], doc["u_max"])
+        e = equation(doc["plant"])
+        f = feedback(doc["law"], doc["u_max"])
         strong = f.kind is None or ((f.K is None or f.K > 0) and (f.a is None or f.a > 0))
-        unit, least = (
-            "rad" if "pendulum" in doc["plant"]["name"] else "m",
-            min(doc["disturbance"], doc["slope"] or 0),
-        )
+        unit = "rad" if "pendulum" in doc["plant"]["name"] else "m"
+        least = min(doc["disturbance"], doc["slope"] or 0)
         need(
             e.M > 0 and f.c > 0 and strong and least >= 0 and doc["unit"] == unit,
             "plant, law, bounds and unit",
         )
-        theorems, known = (
-            [part["theorem"] for part in doc["parts"]],
-            list(THEOREMS)[slice(*f.theorems)],
-        )
+        theorems = [part["theorem"] for part in doc["parts"]]
+        known = list(THEOREMS)[slice(*f.theorems)]
         need(
             0 < len(theorems) == len(set(theorems)) and set(theorems) <= set(known),
             "a theorem of this law",

@@ -33,7 +33,8 @@ def draw(
     worst_of: int = 0,
 ) -> Any:
     """Draw a certificate's state plane; see `Certificate.figure`."""
-    data, unit = certificate.data, certificate.data["unit"]
+    data = certificate.data
+    unit = certificate.data["unit"]
     if data["plant"]["n"] > 1:
         raise ScenarioError(
             f"the states of {data['plant']['n']} pendulums do not fit into a plane: draw a single one"
@@ -47,7 +48,8 @@ def draw(
     law = style.law_colour(certificate.law)
     shades = style.ramp(law, 3, LIGHTEST)
     bounded = part is not None and not certificate.rests
-    width, height = FIGURE_SIZE[0] if bounded else 0.62 * FIGURE_SIZE[0], FIGURE_SIZE[1]
+    width = FIGURE_SIZE[0] if bounded else 0.62 * FIGURE_SIZE[0]
+    height = FIGURE_SIZE[1]
     with style.page(FIGURE_SIZE[0]):
         page = pages.blank(width, height, None)
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
@@ -102,7 +104,8 @@ def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.nda
         far_x = max(far_x, np.abs(X[inside]).max())
         far_v = max(far_v, np.abs(S - certificate.surface * X)[inside].max())
     elif not ends:
-        far_x, far_v = 2.0, 6.0
+        far_x = 2.0
+        far_v = 6.0
     return np.linspace(-1.08 * far_x, 1.08 * far_x, AXIS_POINTS), np.linspace(
         -1.08 * far_v, 1.08 * far_v, AXIS_POINTS
     )
@@ -162,7 +165,8 @@ def _key(certificate: Any, part: Any, shades: Sequence[str]) -> list[pages.Handl
 
 def _run_words(trace: Trace, unit: str, worst_of: int) -> str:
     """Return what a run is, with the range of its disturbance."""
-    low, high = trace.d.min(), trace.d.max()
+    low = trace.d.min()
+    high = trace.d.max()
     if low < high:
         drawn = f"d from {low:.3g} to {high:.3g}"
     else:

@@ -81,16 +81,23 @@ def _loop(
     A, B, C, E, F = terms
     top = math.inf if u_max is None else u_max
     if law.name == "observer_free":
-        sigma, steep, c = (lambda s: np.clip(law.lam * np.tanh(s), -top, top)), law.lam, law.k1
+        sigma = lambda s: np.clip(law.lam * np.tanh(s), -top, top)
+        steep = law.lam
+        c = law.k1
     elif law.name in ("classical", "terminal", "super_twisting"):
         k = min(getattr(law, "k", 0.0), top)
-        sigma, steep, c = (lambda s: k * np.sign(s)), math.inf, getattr(law, "c", 1.0)
+        sigma = lambda s: k * np.sign(s)
+        steep = math.inf
+        c = getattr(law, "c", 1.0)
     else:
         kp, kd = linear_gains(law)
         if law.name == "boundary_layer":
             top = min(law.k, top)
-        sigma, steep, c = (lambda s: np.clip(kd * s, -top, top)), kd, kp / kd
-    phi, D = (lambda x: A * np.sin(x) + x * (B + C * x * x)), (lambda x: E + F * x * x)
+        sigma = lambda s: np.clip(kd * s, -top, top)
+        steep = kd
+        c = kp / kd
+    phi = lambda x: A * np.sin(x) + x * (B + C * x * x)
+    D = lambda x: E + F * x * x
     return Loop(M=M, c=c, d0=d0, phi=phi, D=D, sigma=sigma, steep=steep)
 
 

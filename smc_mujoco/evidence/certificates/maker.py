@@ -87,7 +87,8 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
             f"certify is about a Scenario, not {shown(scenario)}: give smc.Scenario(...)"
         )
     _check(scenario)
-    plant, law = scenario.plant, scenario.law
+    plant = scenario.plant
+    law = scenario.law
     d0, rate = (bound + more for bound, more in zip(_bounds(scenario), _class(within), strict=True))
     u_max = scenario.limits[0]
     values = {name: float(value) for name, value in vars(plant.values(scenario.mismatch)).items()}
@@ -168,7 +169,8 @@ def _numbers(parts: Sequence[Any]) -> dict[str, dict[str, float]]:
 
 def _check(scenario: Scenario) -> None:
     """Raise ScenarioError for a scenario that no theorem here is about."""
-    plant, law = scenario.plant, scenario.law
+    plant = scenario.plant
+    law = scenario.law
     if law.name not in LAWS or law.function is None or plant.name not in PLANTS or plant.own:
         raise ScenarioError(
             f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} on one of "
@@ -224,7 +226,8 @@ def _class(within: Uncertainty | None) -> tuple[float, float]:
 def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     """Return the theorems of a law on a plant with their data."""
     plant, (loop, terms, law) = document["plant"], loop_of(document)
-    e, f = checker.equation(plant), checker.feedback(document["law"], document["u_max"])
+    e = checker.equation(plant)
+    f = checker.feedback(document["law"], document["u_max"])
 
     def judge(theorem: str, data: dict) -> dict[str, Any] | None:
         """Return the margins of a theorem's conditions, or None if the checker refuses the data."""
@@ -244,7 +247,9 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     if law.name == "super_twisting":
         return [_super_twisting(document, loop, law, judge)]
     parts = [_saturated(document, loop, terms, judge)]
-    single, reach, box = plant["n"] == 1, GRID_REACH[scenario.plant.unit](scenario.plant), None
+    single = plant["n"] == 1
+    reach = GRID_REACH[scenario.plant.unit](scenario.plant)
+    box = None
     if single and law.name in ("classical", "terminal"):
         reaching = _reaching(0.5 * loop.c if law.name == "classical" else 0.0, reach, judge)
         box = reaching["X"], reaching["S"]
@@ -342,7 +347,8 @@ def _reaching(lean: float, reach: float, judge: Judge) -> dict:
     """Return the largest set |x| <= X, |s| <= lean X where s = 0 is surely reached; X = 0 if there
     is none.
     """
-    low, high = 0.0, reach
+    low = 0.0
+    high = reach
     for _ in range(SIZE_HALVINGS):
         middle = 0.5 * (low + high)
         if judge("reaching", {"X": middle, "S": lean * middle}):
@@ -354,7 +360,8 @@ def _reaching(lean: float, reach: float, judge: Judge) -> dict:
 
 def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
     """Return x and s of a scenario's start."""
-    x, v = scenario.resolved.x0[0], scenario.resolved.v0[0]
+    x = scenario.resolved.x0[0]
+    v = scenario.resolved.v0[0]
     return x, v + loop.c * x
 
 
@@ -386,7 +393,9 @@ def _cell(levels: search.Levels, x: float, s: float) -> float:
 
 def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Judge) -> dict:
     """Return the largest set that Moreno & Osorio's quadratic form proves."""
-    d0, slope, best = document["disturbance"], document["slope"], None
+    d0 = document["disturbance"]
+    slope = document["slope"]
+    best = None
     if slope is None:
         cure = "give one, as in smc.Uncertainty(disturbance=1.0, slope=2.0)"
         raise ScenarioError(f"super_twisting needs a bound of d': {cure}")
@@ -402,7 +411,8 @@ def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Jud
             P = None
         if P is None:
             continue
-        low, high = 1e-12, 1e6
+        low = 1e-12
+        high = 1e6
         for _ in range(SIZE_HALVINGS):
             middle = math.sqrt(low * high)
             if proven(_ellipse(P, L, middle, loop.c)):

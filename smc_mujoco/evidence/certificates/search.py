@@ -92,7 +92,9 @@ def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
             [loop.c * damping / loop.M - K / loop.M - loop.c**2, loop.c - damping / loop.M],
         ]
     )
-    slow, best, push = -max(np.linalg.eigvals(A).real), None, np.array([0.0, loop.d0 / loop.M])
+    slow = -max(np.linalg.eigvals(A).real)
+    best = None
+    push = np.array([0.0, loop.d0 / loop.M])
     for rate in np.linspace(0.02, 1.98, 99) * slow if slow > 0.0 else ():
         Q = solve_continuous_lyapunov(A + rate / 2.0 * np.eye(2), -np.outer(push, push) / rate)
         if np.linalg.eigvalsh(Q).min() > 0.0 and (best is None or Q[0, 0] < best[0, 0]):
@@ -105,13 +107,15 @@ def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | Non
     falls; or None.
     """
     h = 1e-6 * reach
-    push, D0 = float(loop.phi(np.array(h))) / h, float(loop.D(np.zeros(())))
+    push = float(loop.phi(np.array(h))) / h
+    D0 = float(loop.D(np.zeros(())))
     A = np.array([[-loop.c, 1.0], [0.0, loop.c - (D0 + loop.steep) / loop.M]])
     A[1, 0] = (push + D0 * loop.c) / loop.M - loop.c**2
     if max(np.linalg.eigvals(A).real) >= 0.0:
         return None
     P = solve_continuous_lyapunov(A.T, -np.diag([1.0, 1.0 / max(1.0, loop.c) ** 2]))
-    low, high = 1e-9, (0.9 * reach) ** 2
+    low = 1e-9
+    high = (0.9 * reach) ** 2
     for _ in range(60):
         middle = (low * high) ** 0.5
         if attracts(P / middle):
@@ -162,10 +166,8 @@ def levels(
         small = np.array(target)
     else:
         small = np.sqrt(np.diag(np.linalg.inv(P)))
-    x, s = (
-        axis(reach, small[0] / TARGET_CELLS),
-        axis((loop.c + SPEED_RATIO) * reach, small[1] / TARGET_CELLS),
-    )
+    x = axis(reach, small[0] / TARGET_CELLS)
+    s = axis((loop.c + SPEED_RATIO) * reach, small[1] / TARGET_CELLS)
     X, S = np.meshgrid(x, s, indexing="ij")
     size = np.maximum(np.abs(X) / small[0], np.abs(S) / small[1])
     if P is not None:
@@ -184,7 +186,8 @@ def levels(
             else:
                 numbers = (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
             outer = float(f"{window[1] - 2e-6:.6f}")
-            inner, bound = _inner(window), grid.bound(window)
+            inner = _inner(window)
+            bound = grid.bound(window)
             return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=bound, P=numbers)
     return None
 
@@ -200,8 +203,11 @@ class _Grid:
     def __init__(
         self, loop: Loop, x: np.ndarray, s: np.ndarray, W: np.ndarray, size: np.ndarray | None
     ):
-        n, self.loop = x.size // 2, loop
-        self.x, self.s, self.W = x[n:], s, W[n:]
+        n = x.size // 2
+        self.loop = loop
+        self.x = x[n:]
+        self.s = s
+        self.W = W[n:]
         self.W[0] = np.maximum(self.W[0], self.W[0, ::-1])
         self.corners = np.stack(
             [self.W[:-1, :-1], self.W[1:, :-1], self.W[:-1, 1:], self.W[1:, 1:]]
@@ -224,7 +230,8 @@ class _Grid:
         spans = sorted(
             [*zip(self.low[self.bad], self.high[self.bad], strict=True), (self.border, 2.0)]
         )
-        covered, widest = 0.0, (0.0, MIN_RANGE)
+        covered = 0.0
+        widest = (0.0, MIN_RANGE)
         for low, high in spans:
             if covered < self.limit - 1e-5 and low - covered > widest[1] - widest[0]:
                 widest = covered, low
@@ -252,11 +259,10 @@ class _Grid:
         if start[0] >= 0.0:
             x, s = start
         else:
-            x, s = (-start[0], -start[1])
-        i, j = (
-            np.searchsorted(self.x, x, side="right") - 1,
-            np.searchsorted(self.s, s, side="right") - 1,
-        )
+            x = -start[0]
+            s = -start[1]
+        i = np.searchsorted(self.x, x, side="right") - 1
+        j = np.searchsorted(self.s, s, side="right") - 1
         within = (
             i < self.high.shape[0] and 0 <= j < self.high.shape[1] and self.high[i, j] < window[1]
         )
@@ -292,15 +298,20 @@ def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndar
     the grid is left.
     """
     X, S = np.meshgrid(x, s, indexing="ij")
-    hx, hs, cells, shares = np.gradient(x)[:, None], np.gradient(s)[None, :], [], []
+    hx = np.gradient(x)[:, None]
+    hs = np.gradient(s)[None, :]
+    cells = []
+    shares = []
     ends = (-loop.d0, loop.d0)
     fastest = [
         np.maximum(np.abs(S - loop.c * X) / hx, np.abs(loop.fall(X, S, d)) / hs) for d in ends
     ]
     step = 1.0 / (0.1 + np.maximum.reduce(fastest))
     for d in ends:  # midpoint rule
-        mx, ms = X + 0.5 * step * (S - loop.c * X), S + 0.5 * step * loop.fall(X, S, d)
-        px, ps = X + step * (ms - loop.c * mx), S + step * loop.fall(mx, ms, d)
+        mx = X + 0.5 * step * (S - loop.c * X)
+        ms = S + 0.5 * step * loop.fall(X, S, d)
+        px = X + step * (ms - loop.c * mx)
+        ps = S + step * loop.fall(mx, ms, d)
         if loop.switches:
             px, ps = (
                 np.where(S == 0.0, X - step * loop.c * X, px),
@@ -346,10 +357,12 @@ def _sweep(W, open_, cells, shares, decay):
                     continue
                 worst = 0.0
                 for k in range(cells.shape[0]):
-                    p, q = cells[k, 0, i, j], cells[k, 1, i, j]
+                    p = cells[k, 0, i, j]
+                    q = cells[k, 1, i, j]
                     value = 1.0
                     if p >= 0:
-                        f, g = shares[k, 0, i, j], shares[k, 1, i, j]
+                        f = shares[k, 0, i, j]
+                        g = shares[k, 1, i, j]
                         low = (1.0 - g) * W[p, q] + g * W[p, q + 1]
                         value = (1.0 - f) * low + f * (
                             (1.0 - g) * W[p + 1, q] + g * W[p + 1, q + 1]
@@ -367,14 +380,18 @@ def falls(
     """Return the least and the largest W' at samples of each cell under the worst d, two arrays of
     (n, 2 n).
     """
-    hx, hs, values = np.diff(x)[:, None], np.diff(s)[None, :], []
+    hx = np.diff(x)[:, None]
+    hs = np.diff(s)[None, :]
+    values = []
     w00, w10, w01, w11 = corners
     for a in np.linspace(0.0, 1.0, CELL_SAMPLES):
         for b in np.linspace(0.0, 1.0, CELL_SAMPLES):
-            X, S = x[:-1, None] + a * hx, s[None, :-1] + b * hs
+            X = x[:-1, None] + a * hx
+            S = s[None, :-1] + b * hs
             Wx = ((1.0 - b) * (w10 - w00) + b * (w11 - w01)) / hx
             Ws = ((1.0 - a) * (w01 - w00) + a * (w11 - w10)) / hs
-            v, law = S - loop.c * X, loop.sigma(s[None, :-1] + 0.5 * hs if loop.switches else S)
+            v = S - loop.c * X
+            law = loop.sigma(s[None, :-1] + 0.5 * hs if loop.switches else S)
             force = loop.phi(X) - loop.D(X) * v - law
             values.append(Wx * v + (Ws * force + loop.d0 * np.abs(Ws)) / loop.M + Ws * loop.c * v)
     return np.min(values, axis=0), np.max(values, axis=0)

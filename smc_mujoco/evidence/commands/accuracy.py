@@ -63,13 +63,13 @@ def accuracy(
         from smc_mujoco.evidence.accuracy.accuracy import accuracy as measure
         from smc_mujoco.mechanisms.named import as_plant
 
-    terminal, pictures = Terminal(), files(out)
+    terminal = Terminal()
+    pictures = files(out)
     options.check_files(json, *pictures)
-    machines, chosen = (
-        [as_plant(text) for text in options.names(plants)],
-        options.laws(law, gain_sets.LAWS),
-    )
-    h, start = _periods(periods), options.starts(x0)
+    machines = [as_plant(text) for text in options.names(plants)]
+    chosen = options.laws(law, gain_sets.LAWS)
+    h = _periods(periods)
+    start = options.starts(x0)
     with bar("accuracy") as progress:
         table = measure(
             chosen, machines, h, condition, seeds, gains, duration, start, threads, progress.reached

@@ -68,7 +68,8 @@ def certify(
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.simulation.run import run
 
-    terminal, pictures = Terminal(), files(figure)
+    terminal = Terminal()
+    pictures = files(figure)
     options.check_files(out, *pictures)
     scenario = worst_run = None
     if check:
@@ -121,7 +122,8 @@ def _certified(
     from smc_mujoco.simulation.grid import case
     from smc_mujoco.studies.worst_case import worst_case
 
-    machine, chosen = jointed(plant, "a theorem"), options.law(law)
+    machine = jointed(plant, "a theorem")
+    chosen = options.law(law)
     if isinstance(chosen, str) and gain_sets.in_set(machine, chosen, gains):
         chosen = gain_sets.law(
             machine, chosen, gains

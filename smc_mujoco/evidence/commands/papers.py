@@ -99,7 +99,8 @@ def claims(
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
 
-    terminal, about = Terminal(), find_paper(paper or DEFAULT_PAPER)
+    terminal = Terminal()
+    about = find_paper(paper or DEFAULT_PAPER)
     sets = None if gains is None else options.names(gains)
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")

@@ -145,7 +145,8 @@ def _tell(name: str, seeds: int, figure: Path | None) -> None:
         from smc_mujoco.evidence.rigs.rig import rig as find_rig
 
     writable(figure)
-    terminal, rows = Terminal(), twin_figures.rows(name)
+    terminal = Terminal()
+    rows = twin_figures.rows(name)
     twin = find_rig(name) if name else None
     if twin is not None and not rows:
         raise ScenarioError(
@@ -204,7 +205,8 @@ def _fit(
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
-    terminal, named = Terminal(), columns
+    terminal = Terminal()
+    named = columns
     options.check_files(json, figure)
     identified = find(
         as_plant(rig) if rig not in rigs() and (rig in plants() or ":" in rig) else rig,
@@ -246,7 +248,8 @@ def _repeat(
         from smc_mujoco.simulation.run import run
         from smc_mujoco.simulation.trace import Trace
 
-    terminal, twin = Terminal(), find_rig(rig)
+    terminal = Terminal()
+    twin = find_rig(rig)
     writable(figure, film and with_ending(film, ".mp4"))
     record = load(file, columns)
     if isinstance(record, Trace):

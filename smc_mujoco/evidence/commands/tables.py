@@ -97,7 +97,8 @@ def _print_claim(claim: Claim, console: Console) -> None:
     console.print(
         Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim"))
     )
-    about, lost = plain(Column(style="dim"), ""), claim.verdict != verdicts.SUPPORTED
+    about = plain(Column(style="dim"), "")
+    lost = claim.verdict != verdicts.SUPPORTED
     parts = {
         "whose": claim.source + (f": {claim.how}" if claim.how else ""),
         "kind": claim.quantifier,
@@ -181,7 +182,8 @@ def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:
     """
     right = functools.partial(Column, justify="right", no_wrap=True)
     heads = [right("machine"), right("twin"), right("range"), right("fit, %"), right("public")]
-    table, before = titled(label, "record", *heads, pad_edge=False), ("", "")
+    table = titled(label, "record", *heads, pad_edge=False)
+    before = ("", "")
     for row in rows:
         if (row.record, row.variant) != before:
             before = row.record, row.variant

@@ -59,7 +59,8 @@ class About:
     @functools.cached_property
     def conditions(self) -> dict[str, str]:
         """Condition -> the Scenario fields that it sets, in words."""
-        texts, duration = {}, self.plan.duration
+        texts = {}
+        duration = self.plan.duration
         for name in self.plan.conditions:
             known = find_condition(name)
             fields = {}

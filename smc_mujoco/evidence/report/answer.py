@@ -125,7 +125,8 @@ def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
             least = max(best.median, best.floor)
-            times, rounded = score.median / least if least else math.inf, best.median < best.floor
+            times = score.median / least if least else math.inf
+            rounded = best.median < best.floor
             arrives = settles(by_cell, plant, condition, best.law)
             lost.append(
                 Loss(
@@ -211,18 +212,17 @@ def robust(attacked: Mapping[str, WorstCases]) -> str:
 def _both(case: WorstCase) -> str:
     """Return law, plant, worst found and median."""
     median = f"{case.shown(case.median)} {case.unit * (case.median < math.inf)}".strip()
-    law, plant = words.law(case.nominal.law.name), words.plant(case.nominal.plant.name)
+    law = words.law(case.nominal.law.name)
+    plant = words.plant(case.nominal.plant.name)
     return f"{law} on {plant} {case.words} ({median})"
 
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
     own = [s for s in findings.scores if s.law == words.PAPER_LAW and s.metric in metrics]
-    lost, wins, parts = (
-        len(losses(cells(findings.scores), metrics)),
-        sum(s.wins for s in own) or "none",
-        [],
-    )
+    lost = len(losses(cells(findings.scores), metrics))
+    wins = sum(s.wins for s in own) or "none"
+    parts = []
     if own:
         unclear = sum(not s.best and not s.beaten for s in own)
         also = f", and has too few samples to tell in {unclear}" * bool(unclear)

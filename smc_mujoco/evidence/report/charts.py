@@ -156,9 +156,11 @@ def _span(values: Sequence[float], floor: float | None) -> tuple[float, float]:
     """
     above = [v for v in values if v > 0] or [1.0]
     if floor is None:
-        low, high = (min(above), min(max(above), 1e3 * min(above)))
+        low = min(above)
+        high = min(max(above), 1e3 * min(above))
     else:
-        low, high = (0.0, max(above))
+        low = 0.0
+        high = max(above)
     return max(low, min(above), (floor or 0.0) * high) / 1.4, high * 1.4
 
 
@@ -193,8 +195,10 @@ def margins(drawn: "Sequence[Margin]", kind: str) -> bytes:
 
 def _margin(ax: Axes, margin: "Margin", line: int, end: float) -> None:
     """Draw a law's margin on its line of a panel that ends at `end`."""
-    none, more = math.isnan(margin.value), margin.value >= margin.searched
-    at, colour = 0.0 if none else min(margin.value, end), words.colour(margin.law)
+    none = math.isnan(margin.value)
+    more = margin.value >= margin.searched
+    at = 0.0 if none else min(margin.value, end)
+    colour = words.colour(margin.law)
     if none:
         value = "none"
     else:
@@ -285,8 +289,10 @@ def orders(table: "AccuracyTable") -> bytes:
 
 def record(shown: "Repeated") -> bytes:
     """Draw the columns of a record, measured and as its twin repeats them, and the residuals."""
-    fits, title = {"twin": shown.fits["the twin’s"]}, f"{shown.rig.name}: {shown.name}"
-    units, twin = shown.rig.units, {"twin": shown.twin}
+    fits = {"twin": shown.fits["the twin’s"]}
+    title = f"{shown.rig.name}: {shown.name}"
+    units = shown.rig.units
+    twin = {"twin": shown.twin}
     return picture(
         lambda path: residual_figure(title, shown.t, shown.measured, twin, fits, units, path)
     )

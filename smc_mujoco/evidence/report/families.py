@@ -62,7 +62,8 @@ def told(values: np.ndarray) -> tuple[np.ndarray, list[int]]:
 
     `values`: (laws, runs).
     """
-    scores, best = np.empty(values.shape[1]), []
+    scores = np.empty(values.shape[1])
+    best = []
     for half in (0, 1):
         best.append(int(np.median(values[:, 1 - half :: 2], axis=1).argmin()))
         scores[half::2] = values[best[-1], half::2]
@@ -104,7 +105,8 @@ def leads(
     """Return the lead in every cell of a study's table that has one; families: name -> names of
     laws.
     """
-    found, by_row = [], paired_runs.by_row(table, metric)
+    found = []
+    by_row = paired_runs.by_row(table, metric)
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)

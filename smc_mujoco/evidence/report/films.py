@@ -56,7 +56,8 @@ def medians(table: "Table", condition: str) -> bytes:
     """Draw each law's median in one condition, with its interval: a row of panels per plant, a
     column per metric.
     """
-    title, some = f"Medians, {words.condition(condition)}", table.select(condition=condition)
+    title = f"Medians, {words.condition(condition)}"
+    some = table.select(condition=condition)
     plants, laws = (len(set(some.column(name).tolist())) for name in ("plant", "law"))
     size = WIDTH, 1.1 + plants * (0.7 + dot_plot.LINE_HEIGHT * (laws + 1))
     return picture(

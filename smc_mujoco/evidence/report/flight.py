@@ -59,7 +59,8 @@ class Flight:
         """Return who is unbeaten how often, in the median, and whose worst run is the smallest how
         often.
         """
-        count, blocks = len(self.board.blocks), self.board.blocks
+        count = len(self.board.blocks)
+        blocks = self.board.blocks
         unbeaten = [law for law in self.laws for block in blocks if law in block.best]
         least = [
             min(self.laws, key=lambda law: self.worst[block.condition, law]) for block in blocks
@@ -82,11 +83,10 @@ def flight(work: Work) -> Flight:
     """Return the comparison of all laws of flight, with tuned gains where all have some, else with
     default ones.
     """
-    plan, drone = work.plan, plant(PLANT)
-    names, conditions = (
-        [name for name in laws(drone) if name != "none"],
-        plan.flights or ("nominal", *CONDITIONS),
-    )
+    plan = work.plan
+    drone = plant(PLANT)
+    names = [name for name in laws(drone) if name != "none"]
+    conditions = plan.flights or ("nominal", *CONDITIONS)
     if all(gain_sets.in_set(drone, name, GAINS) for name in names):
         gains = GAINS
     else:

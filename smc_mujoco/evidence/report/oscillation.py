@@ -70,13 +70,10 @@ def _on(
 
     Laws whose chattering cannot be predicted are left out.
     """
-    rows, cases = (
-        [],
-        [
-            case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)})
-            for law in laws
-        ],
-    )
+    rows = []
+    cases = [
+        case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws
+    ]
     traces = run(cases, threads)
     changes = step_halving(traces, 0, threads)
     for done, (scenario, trace, change) in enumerate(zip(cases, traces, changes, strict=True)):
@@ -111,5 +108,6 @@ def sentence(rows: tuple[Oscillation, ...]) -> str:
     if not both:
         return f"{text}."
     errors = [abs(row.error) for row in both]
-    median, largest = statistics.median(errors), max(errors)
+    median = statistics.median(errors)
+    largest = max(errors)
     return f"{text}. The median error of the predicted amplitude is {median:.2g} %, the largest {largest:.0f} %."

@@ -70,7 +70,8 @@ def page(findings: Findings) -> str:
     """Return the report as HTML."""
     from markupsafe import Markup
 
-    made, share = environment(), findings.about.plan.relevant
+    made = environment()
+    share = findings.about.plan.relevant
     made.globals |= {
         "f": findings,
         "about": findings.about,

@@ -86,7 +86,8 @@ def gains(done: Audit, name: str) -> dict[tuple[str, str], list[str]]:
     plants: dict[tuple[str, str], list[str]] = {}
     for sets in done.used.values():
         for run in sets.get(name, {}).values():
-            law, plant = run.scenario.law, words.plant(run.scenario.plant.name)
+            law = run.scenario.law
+            plant = words.plant(run.scenario.plant.name)
             values = ", ".join(f"{gain} = {number(value)}" for gain, value in law.gains.items())
             on = plants.setdefault((law.name, values), [])
             if plant not in on:

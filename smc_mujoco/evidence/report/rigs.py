@@ -84,7 +84,8 @@ class Repeated:
 
 def machines(work: Work) -> tuple[Machine, ...]:
     """Return the comparison of each rig's laws on its parameter sets."""
-    plan, twins = work.plan, []
+    plan = work.plan
+    twins = []
     for name in plan.rigs:
         twin = rig(name)
         runs = ensemble.runs(twin, seeds=plan.seeds, duration=plan.duration)

@@ -147,10 +147,15 @@ def find(
     )  # first, so that bad files are refused before anything is computed
     table = grid(work)
     claims = judged_claims(work, table)
-    worst, margins = worst_cases(work), all_margins(work)
-    by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
-    machines, flown = rigs.machines(work), flight.flight(work)
-    oscillations, accurate = oscillation.oscillations(work), accuracies(work)
+    worst = worst_cases(work)
+    margins = all_margins(work)
+    by_set = margins_by_set(work, margins)
+    basins = all_basins(work)
+    scenes = all_scenes(work)
+    machines = rigs.machines(work)
+    flown = flight.flight(work)
+    oscillations = oscillation.oscillations(work)
+    accurate = accuracies(work)
     no_film = video.missing() if plan.filmed else None
     with bars.stage("statistics"):
         boards = leaderboard(
@@ -259,7 +264,8 @@ def _margins(
     def search(plant: str, report: Report) -> list[Margin]:
         return margin_search.margins([plant], laws[plant], kinds, **options, report=report)
 
-    plants, depends = [(plant,) for plant in laws], [laws, kinds, work.plan.quick, gains]
+    plants = [(plant,) for plant in laws]
+    depends = [laws, kinds, work.plan.quick, gains]
     by_plant = work.kept(
         stage, "plants", plants, depends, search, margin_search.save, margin_search.load
     )
@@ -274,27 +280,24 @@ def all_basins(work: Work) -> tuple[Basin, ...]:
     def search(plant: str, law: str, report: Report) -> Basin:
         return regions.basin(plant, law, plan.points, **options, report=report)
 
-    pairs, depends = (
-        list(itertools.product(plan.basins, plan.basin_laws)),
-        [plan.points, plan.region, GAINS],
-    )
+    pairs = list(itertools.product(plan.basins, plan.basin_laws))
+    depends = [plan.points, plan.region, GAINS]
     return tuple(work.kept("regions", "maps", pairs, depends, search, Basin.save, regions.load))
 
 
 def accuracies(work: Work) -> AccuracyTable:
     """Return the accuracy of all laws on the plan's plants, condition by condition."""
     plan = work.plan
-    periods, starts = plan.periods, plan.accuracy_starts
+    periods = plan.periods
+    starts = plan.accuracy_starts
 
     def measure(plant: str, condition: str, report: Report) -> AccuracyTable:
         return accuracy(
             plan.laws, plant, periods, condition, starts, GAINS, threads=work.threads, report=report
         )
 
-    pairs, depends = (
-        list(itertools.product(plan.accurate, ACCURACY_CONDITIONS)),
-        [plan.laws, periods, starts, GAINS],
-    )
+    pairs = list(itertools.product(plan.accurate, ACCURACY_CONDITIONS))
+    depends = [plan.laws, periods, starts, GAINS]
     tables = work.kept(
         "accuracy", "tables", pairs, depends, measure, AccuracyTable.save, load_accuracy
     )
@@ -312,15 +315,13 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
             plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS
         )
         traces = run(list(runs.values()), work.threads)
-        film, its = (
-            None,
-            {
-                "plant": plant,
-                "condition": condition,
-                "laws": plan.scene_laws,
-                "seconds": plan.scene,
-            },
-        )
+        film = None
+        its = {
+            "plant": plant,
+            "condition": condition,
+            "laws": plan.scene_laws,
+            "seconds": plan.scene,
+        }
         if scene in plan.scenes[: plan.filmed] and video.missing() is None:
             film = cached(
                 work.folder / f"film-{plant}-{condition}.webm",
@@ -338,10 +339,13 @@ def fields(plan: Plan) -> tuple[Field, ...]:
     """Return V' of the paper's law on the state plane of every plant."""
     planes = []
     for name in plan.plants if words.PAPER_LAW in plan.laws else ():
-        plant, law = find_plant(name), sets.law(name, words.PAPER_LAW, GAINS)
-        lam, k1 = law.gains["lam"], law.gains["k1"]
+        plant = find_plant(name)
+        law = sets.law(name, words.PAPER_LAW, GAINS)
+        lam = law.gains["lam"]
+        k1 = law.gains["k1"]
         x, v = lyapunov.plane(plant, k1, FIELD_POINTS)
-        rate, s = lyapunov.vdot(plant, lam, k1, x, v), lyapunov.surface(plant, lam, k1, x, v)
+        rate = lyapunov.vdot(plant, lam, k1, x, v)
+        s = lyapunov.surface(plant, lam, k1, x, v)
         planes.append(Field(plant=name, x=x[0], v=v[:, 0], vdot=rate, s=s))
     return tuple(planes)
 

@@ -27,7 +27,8 @@ def rotary(torque: float, surface: Mapping[str, float]) -> tuple[Law, ...]:
     The surface is that of least quadratic cost for its quantities, with the weights of
     `rotary_swing_up`.
     """
-    force, made = 1.0 / torque, []
+    force = 1.0 / torque
+    made = []
     for name, gains in KINDS.items():
         own = {
             **{key: value * force for key, value in gains.items()},
@@ -59,7 +60,11 @@ def state_feedback(y, gains, memory):
     balances. Source: the controller of the public records of decargroup/closed_loop_koopman (MIT),
     whose gains are the defaults, in V/rad, V s/rad and 1/s.
     """
-    started, e_, q_, de, dq = memory[0], memory[1], memory[2], memory[3], memory[4]
+    started = memory[0]
+    e_ = memory[1]
+    q_ = memory[2]
+    de = memory[3]
+    dq = memory[4]
     if started != 0.0:
         de = (gains.cutoff * (y.e - e_) + de) / (1.0 + gains.cutoff * y.dt)
         dq = (gains.cutoff * (y.q - q_) + dq) / (1.0 + gains.cutoff * y.dt)

@@ -51,7 +51,8 @@ def runs(
         [law for law in chosen if isinstance(law, Candidate) == searched]
         for searched in (False, True)
     )
-    scenarios, around = [], _starts(rig, starts)
+    scenarios = []
+    around = _starts(rig, starts)
     for name, fields in _machines(rig).items():
         free = dict(fields)
         plant = free.pop("plant")
@@ -109,7 +110,9 @@ def tuned(
     A law that has no gains to search keeps its own, and its remark says why. `laws` and `starts`
     are as in `runs`; `folder` keeps each search.
     """
-    goal, plant, found = objective(rig, starts), _machines(rig)["set 1"]["plant"], []
+    goal = objective(rig, starts)
+    plant = _machines(rig)["set 1"]["plant"]
+    found = []
     for law in map(coerce.law, _chosen(rig, laws)):
         try:
             with warnings.catch_warnings():
@@ -142,7 +145,8 @@ def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
             f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
             "from records and draw other sets with Identified.drawn"
         )
-    shipped, given = {law.name: law for law in rig.laws}, rig.laws if laws is None else laws
+    shipped = {law.name: law for law in rig.laws}
+    given = rig.laws if laws is None else laws
     if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
         raise ScenarioError(
             f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)"

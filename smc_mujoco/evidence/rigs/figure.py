@@ -51,7 +51,8 @@ def residual_figure(
         ):
             left.plot(t, values, color=style.INK, lw=1.6)
             right.axhline(0.0, color=style.RULE, lw=0.8)
-            reached, left_over = [], []
+            reached = []
+            left_over = []
             for twin, colour in colours.items():
                 residual = values - predicted[twin][name]
                 left.plot(t, predicted[twin][name], color=colour, lw=0.9)
@@ -112,7 +113,8 @@ def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
         height = len(names) * 1.2 + sum(1.0 + BESIDE * (len(its) - 1) for its in groups.values())
         page = pages.blank(PHONE_WIDTH, pages.head_height(PHONE_WIDTH, keys) + ROW * height + 0.6)
         ax = page.subplots()
-        place, ticks = 0.0, []
+        place = 0.0
+        ticks = []
         for (rig, _, figure), its in groups.items():
             if rig in names:  # its first
                 names.remove(rig)

@@ -15,7 +15,9 @@ from numba.extending import register_jitable
 from smc_mujoco.control.law import law_function
 from smc_mujoco.control.units import Gain
 
-LINEAR, TWO_STATES, FOUR_STATES = 0.0, 1.0, 2.0
+LINEAR = 0.0
+TWO_STATES = 1.0
+FOUR_STATES = 2.0
 TICK = 5e-3  # s, the period that the firmware counts with
 STEPS = 1600.0 / 360.0  # a degree
 DEGREES = 180.0 / math.pi
@@ -28,16 +30,16 @@ SLOPE, OLD_RATE, MAX_RATE = (
     0.0588,
     300.0,
 )  # filter of rates: 1/s, share of the old one, deg/s
-ENGAGE_TICKS, ENGAGE_ANGLE, ENGAGE_RATE = 20.0, 3.0, 20.0
+ENGAGE_TICKS = 20.0
+ENGAGE_ANGLE = 3.0
+ENGAGE_RATE = 20.0
 RAMP_TIME, GATE_TIME = 0.1, 0.2  # s after engaging
-FALL_ARM, STOP_ARM, FALL_PENDULUM, FALL_AT_ONCE, FALL_RATE, FALL_TICKS = (
-    80.0,
-    78.0,
-    30.0,
-    25.0,
-    250.0,
-    3.0,
-)
+FALL_ARM = 80.0
+STOP_ARM = 78.0
+FALL_PENDULUM = 30.0
+FALL_AT_ONCE = 25.0
+FALL_RATE = 250.0
+FALL_TICKS = 3.0
 NEAR = 5.0  # deg, of the gates
 MOVE_RATE, MOVE_SPEED, MOVE_ACCELERATION = (
     80.0,
@@ -74,7 +76,8 @@ def clip(value, bound):
 @register_jitable
 def measure(y, m):
     """Read both angles, deg, and filter their rates. Return the time since the last tick, s."""
-    alpha, theta = DEGREES * y.q, DEGREES * y.x
+    alpha = DEGREES * y.q
+    theta = DEGREES * y.x
     passed = TICK
     if m[STARTED] == 0.0:
         m[STARTED], m[ALPHA], m[THETA] = 1.0, alpha, theta
@@ -92,7 +95,8 @@ def move(target, m, passed):
 
     Return its acceleration, deg/s^2.
     """
-    left, old = target - m[REF], m[REF_RATE]
+    left = target - m[REF]
+    old = m[REF_RATE]
     braking = math.sqrt(2.0 * MOVE_ACCELERATION * abs(left))
     wanted = math.copysign(min(MOVE_SPEED, braking), left)
     rate = old + clip(wanted - old, MOVE_ACCELERATION * passed)
@@ -119,7 +123,9 @@ def falls(kind, alpha, m, since):
 @register_jitable
 def acceleration(kind, alpha, m, since, ref_acceleration):
     """Return the law's acceleration of the arm, steps/s^2, and its sliding variable, deg/s."""
-    rate, e, de = m[ALPHA_RATE], m[THETA] - m[REF], m[THETA_RATE] - m[REF_RATE]
+    rate = m[ALPHA_RATE]
+    e = m[THETA] - m[REF]
+    de = m[THETA_RATE] - m[REF_RATE]
     base = STEPS * ref_acceleration + 31.5 * e + 28.3 * de
     if kind == LINEAR:
         tilt = 0.0 if abs(alpha) < DEAD_BAND else alpha
@@ -127,7 +133,8 @@ def acceleration(kind, alpha, m, since, ref_acceleration):
     gate = 150.0 if kind == TWO_STATES else 250.0
     if not (abs(alpha) < NEAR and abs(rate) < gate and since >= GATE_TIME):
         base = 0.0
-    sine, cosine = math.sin(alpha / DEGREES), max(math.cos(alpha / DEGREES), 0.2)
+    sine = math.sin(alpha / DEGREES)
+    cosine = max(math.cos(alpha / DEGREES), 0.2)
     free = DEGREES * GRAVITY * sine + sine * cosine * m[THETA_RATE] ** 2 / DEGREES
     if kind == TWO_STATES:
         s = rate + 15.0 * alpha
@@ -160,12 +167,15 @@ def firmware(y, gains, memory):
     """
     m = memory
     passed = measure(y, m)
-    before, alpha, since = m[SPEED], m[ALPHA] - m[TRIM], y.t - m[ENGAGED]
+    before = m[SPEED]
+    alpha = m[ALPHA] - m[TRIM]
+    since = y.t - m[ENGAGED]
     if m[READY] < ENGAGE_TICKS or m[FALLEN] != 0.0:
         calm = abs(alpha) < ENGAGE_ANGLE and abs(m[ALPHA_RATE]) < ENGAGE_RATE
         m[READY], m[ENGAGED], m[SPEED] = m[READY] + 1.0 if calm else 0.0, y.t, 0.0
         return -before / passed / STEPS / DEGREES, 0.0
-    calm, target = abs(alpha) < NEAR and abs(m[ALPHA_RATE]) < MOVE_RATE, DEGREES * y.r
+    calm = abs(alpha) < NEAR and abs(m[ALPHA_RATE]) < MOVE_RATE
+    target = DEGREES * y.r
     if calm:
         ref_acceleration = move(target, m, passed)
     else:

@@ -47,10 +47,8 @@ SETTINGS = (
     "model",
 )
 # Frictions and inertias of the library's plants, which are 0 or more.
-FRICTIONS, INERTIAS = (
-    frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta")),
-    frozenset(("J", "Jc")),
-)
+FRICTIONS = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta"))
+INERTIAS = frozenset(("J", "Jc"))
 POOR_FIT = (
     80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
 )
@@ -164,7 +162,8 @@ class Identified:
 
         They are drawn from the normal distribution of the errors, and cut to the ranges.
         """
-        names, rng = list(self.values), np.random.default_rng(seed)
+        names = list(self.values)
+        rng = np.random.default_rng(seed)
         spread, middle = (
             np.array([of[name] for name in names]) for of in (self.errors, self.values)
         )
@@ -274,7 +273,8 @@ def identify(
         errors, correlations, independent = statistics(replays, slopes, by_steps)
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
-    states, steps = _starting_states(fitted, data, replays, slopes.point), replays.short_steps
+    states = _starting_states(fitted, data, replays, slopes.point)
+    steps = replays.short_steps
     return Identified(
         rig=fitted,
         before=twin,

@@ -22,7 +22,8 @@ COMPARED_PERIOD = (
 )
 # Hz, and number of poles, of the low-pass filter. Chosen: three times the fastest public exciting
 # motions, 1.6 Hz.
-CUTOFF, POLES = 5.0, 4
+CUTOFF = 5.0
+POLES = 4
 END_DURATION = 0.1  # s, left out at both ends, where the filter knows only one side; chosen
 MIN_DURATION, MAX_STEP = 1.0, 0.05  # s: of a record, and between its samples; chosen
 
@@ -35,7 +36,8 @@ class Filter:
         from scipy.signal import butter
 
         t = data[columns.time]
-        self.data, self.step = data, step_of(t)
+        self.data = data
+        self.step = step_of(t)
         if not long_enough(data, columns):
             raise ScenarioError(
                 f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
@@ -90,8 +92,11 @@ def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     """Return the torque of each joint in the measured motion, below CUTOFF, N m, by MuJoCo's
     inverse dynamics.
     """
-    filtered, model = Filter(data, columns), plant.load()
-    state, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
+    filtered = Filter(data, columns)
+    model = plant.load()
+    state = mujoco.MjData(model)
+    joints = joint_ids(model)
+    dofs = dof_ids(model)
     x, v, a = (
         np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3)
     )

@@ -95,7 +95,8 @@ class Told:
         """Return the rank correlation (Kendall's tau) of the laws over machine and twin, the mean
         over sets.
         """
-        order, taus = self.prediction.order, []
+        order = self.prediction.order
+        taus = []
         for one in self.medians(condition, without).values():
             signs = []
             for i, a in enumerate(order):

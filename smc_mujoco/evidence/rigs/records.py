@@ -129,7 +129,9 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
     """Return a run's positions by column, with the encoder's bias and rounding and, if `noisy`, the
     run's noise.
     """
-    s, sensor, by_column = trace.scenario, trace.scenario.sensor, {}
+    s = trace.scenario
+    sensor = trace.scenario.sensor
+    by_column = {}
     for i, name in enumerate(columns.x):
         x = trace.x[:, i] + (sensor.bias if sensor else 0.0)
         if noisy and s.noise.position:
@@ -145,7 +147,8 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
 
 def of_trace(trace: Trace, columns: Columns) -> Record:
     """Return a run as a record with a rig's columns."""
-    offset, feedforward = columns.offset or (0.0,) * len(columns.x), trace.scenario.feedforward
+    offset = columns.offset or (0.0,) * len(columns.x)
+    feedforward = trace.scenario.feedforward
     record = {columns.time: trace.t, columns.u: trace.u[:, 0], columns.reference: trace.r[:, 0]}
     for (name, x), zero in zip(positions(trace, columns, noisy=True).items(), offset, strict=True):
         record[name] = x + zero
@@ -196,7 +199,8 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
     def at(sample: int) -> str:
         return f"{sample}, from {t[sample]:.6g} s to {t[sample + 1]:.6g} s"
 
-    back, step = np.flatnonzero(np.diff(t) <= 0.0), step_of(t)
+    back = np.flatnonzero(np.diff(t) <= 0.0)
+    step = step_of(t)
     if len(back):
         raise ScenarioError(
             f"time of {rig} runs backward after sample {at(back[0])}: give times that increase"

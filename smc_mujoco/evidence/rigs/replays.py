@@ -105,7 +105,8 @@ class Slopes:
         States that the noise hides, such as a starting velocity in dry friction, do not move.
         """
         noise = math.sqrt(self.cost / sum(map(len, self.residuals)))
-        rows, moves = [], []
+        rows = []
+        moves = []
         for r, J, S in zip(self.residuals, self.by_values, self.by_states, strict=True):
             left, sizes, right = np.linalg.svd(S, full_matrices=False)
             kept = sizes > noise
@@ -148,13 +149,11 @@ class Replays:
         pieces of the rig's `window` under the recorded command, or the `whole` record. `report` is
         called with the number of replays of all records after a batch.
         """
-        self.twin, self.names, self.data, self.closed, self.report = (
-            twin,
-            names,
-            data,
-            closed,
-            report,
-        )
+        self.twin = twin
+        self.names = names
+        self.data = data
+        self.closed = closed
+        self.report = report
         self.whole = whole or closed or not twin.window
         self.known = known = [twin.quantities[name] for name in names]
         self.scales = np.array([_scale(quantity) for quantity in known])
@@ -211,7 +210,8 @@ class Replays:
 
     def at_rest(self, point: Point) -> Point:
         """Return the point with velocity 0 at the start of each piece. Velocities must be free."""
-        n, states = len(self.twin.columns.x), point.states.copy()
+        n = len(self.twin.columns.x)
+        states = point.states.copy()
         for k, piece in enumerate(self.pieces):
             states[k, -n:] = -self._part(k).state[n:] / piece.scales[-n:]
         return Point(point.values, states)
@@ -313,7 +313,8 @@ class Replays:
         """Return residuals and their derivatives at a point, by central differences that stay
         within the ranges.
         """
-        p, s = len(self.names), len(self.free)
+        p = len(self.names)
+        s = len(self.free)
         moved = []
         for sign in (1.0, -1.0):
             for e in np.eye(p):
@@ -322,7 +323,8 @@ class Replays:
             for e in np.eye(s):
                 moved.append(Point(point.values, point.states + sign * DIFFERENCE_STEP * e))
         residuals, *rows = self.residuals([point, *moved])
-        ahead, back = rows[: p + s], rows[p + s :]
+        ahead = rows[: p + s]
+        back = rows[p + s :]
         gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [
             2.0 * DIFFERENCE_STEP
         ] * s
@@ -340,13 +342,16 @@ class Replays:
 
     def _pieces(self, i: int) -> list[Piece]:
         """Return the pieces of record i."""
-        twin, data = self.twin, self.twin.checked(self.data[i])
+        twin = self.twin
+        data = self.twin.checked(self.data[i])
         if twin.dynamics is not None:
             measured = inverse.measured(data, twin.columns)
             spread = {name: _norm(values) for name, values in measured.items()}
             return [Piece(i, None, 0, measured, spread, np.zeros(0))]
-        period, t = twin.step(data), data[twin.columns.time]
-        first, last = round(twin.start / period), len(t) - 1
+        period = twin.step(data)
+        t = data[twin.columns.time]
+        first = round(twin.start / period)
+        last = len(t) - 1
         shortest = max(twin.window, (records.MIN_SAMPLES + 1) * period)
         if self.whole:
             count = 1
@@ -388,12 +393,11 @@ def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
     RK4 has errors of first order only where dry friction changes its direction. It cannot integrate
     friction that has a state.
     """
-    integrator, step = (
-        "RK4",
-        scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9),
-    )
+    integrator = "RK4"
+    step = scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9)
     if scenario.input_delay or any(part.bristles for part in scenario.friction):
-        integrator, step = scenario.resolved.integrator, scenario.resolved.physics_step
+        integrator = scenario.resolved.integrator
+        step = scenario.resolved.physics_step
     return {"integrator": integrator, "physics_step": step / 2**halvings}
 
 

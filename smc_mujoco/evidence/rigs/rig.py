@@ -263,7 +263,8 @@ class Rig:
 
     def _too_short(self, data: Record, what: str, samples: int) -> ScenarioError:
         """Return the error for a record of fewer samples than it takes to repeat or to score it."""
-        period, count = self.step(data), len(data[self.columns.time])
+        period = self.step(data)
+        count = len(data[self.columns.time])
         return ScenarioError(
             f"the record of {self.name} lasts {count * period:.3g} s, too short to {what} it: give at least "
             f"{samples * period:.3g} s"
@@ -306,8 +307,11 @@ class Rig:
         is 0.
         """
         scenario = self.replay(record, start, duration)
-        data, period, n = self.checked(record), scenario.control_period, scenario.plant.n
-        first, count = round((self.start if start is None else start) / period), scenario.samples
+        data = self.checked(record)
+        period = scenario.control_period
+        n = scenario.plant.n
+        first = round((self.start if start is None else start) / period)
+        count = scenario.samples
         part = slice(first, first + count + 1)
         if scenario.sensor:
             bias = scenario.sensor.bias
@@ -429,7 +433,8 @@ class Rig:
             or "rad" not in self.scenario("none").plant.units
         ):
             return
-        joints, references = self.columns.x, self.columns.references
+        joints = self.columns.x
+        references = self.columns.references
         pairs = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
         sets = (
             (*joints, *references),
@@ -486,7 +491,8 @@ class Rig:
         `states`: at the start of each, (2n,), in place of the measured ones. `changes`: fields of
         the replays that differ, such as their physics step.
         """
-        data, names = [self.checked(record) for record in many], self.columns
+        data = [self.checked(record) for record in many]
+        names = self.columns
         if self.dynamics is not None:
             plant = self.dynamics(Values(**self.values))
             return [
@@ -504,10 +510,8 @@ class Rig:
         replayed = []
         for columns, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period
-            first, after = (
-                round(self.score_from / period),
-                round((self.score_from - self.start) / period),
-            )
+            first = round(self.score_from / period)
+            after = round((self.score_from - self.start) / period)
             if len(trace.t) < after + records.MIN_SAMPLES:
                 raise self._too_short(columns, "score", first + records.MIN_SAMPLES)
             predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
@@ -529,7 +533,8 @@ class Rig:
         open loop it stays where the record is at `score_from`. If torques are predicted, they are
         0.
         """
-        data, columns = self.checked(record), self.columns
+        data = self.checked(record)
+        columns = self.columns
         if self.dynamics is not None:
             measured = inverse.measured(data, columns)
             return percentages(
@@ -542,10 +547,8 @@ class Rig:
                 {name: np.full_like(values, values[0]) for name, values in measured.items()},
                 measured,
             )
-        references, zero = (
-            dict(zip(columns.x, columns.references, strict=False)),
-            np.zeros(len(data[columns.time])),
-        )
+        references = dict(zip(columns.x, columns.references, strict=False))
+        zero = np.zeros(len(data[columns.time]))
         predicted = {name: data.get(references.get(name, ""), zero)[first:] for name in columns.x}
         predicted["u"], measured["u"] = (
             data.get(columns.feedforward, zero)[first:],
@@ -582,10 +585,8 @@ def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
     None.
     """
     for name, values in predicted.items():
-        error, span = (
-            np.nan_to_num(np.abs(values - measured[name]), nan=np.inf),
-            np.ptp(measured[name]),
-        )
+        error = np.nan_to_num(np.abs(values - measured[name]), nan=np.inf)
+        span = np.ptp(measured[name])
         if error.max() > FALL_RANGES * span > 0.0:
             return Fall(float(t[np.argmax(error > span)]))
     return None

@@ -68,7 +68,8 @@ def _by_torques(replays: Replays) -> Point | None:
     """
     from scipy.optimize import least_squares
 
-    twin, start = replays.twin, replays.start
+    twin = replays.twin
+    start = replays.start
     data = [twin.checked(record) for record in replays.data]
     direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
     columns = dataclasses.replace(
@@ -101,7 +102,8 @@ def _by_torques(replays: Replays) -> Point | None:
 
 def _random(replays: Replays, count: int, seed: int) -> list[Point]:
     """Return the best `count` of many random points, best first."""
-    rng, start = np.random.default_rng(seed), replays.start
+    rng = np.random.default_rng(seed)
+    start = replays.start
     magnitudes = np.maximum(np.abs(start.values), 1.0)
     drawn = []
     for _ in range(CANDIDATES * count):
@@ -175,7 +177,8 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     Each piece chooses the best move of its own states.
     """
     groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
-    trials, size = [point for group in groups for point in group], len(groups[0])
+    trials = [point for group in groups for point in group]
+    size = len(groups[0])
     costs = np.array([[cost([rows]) for rows in pieces] for pieces in replays.residuals(trials)])
     reached = []
     for i, group in enumerate(groups):
@@ -208,7 +211,9 @@ def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Poin
 def _moved(replays: Replays, slopes: Slopes, damping: float) -> np.ndarray:
     """Return the quantities after a damped Gauss-Newton step, within their ranges, (p,)."""
     J, r = (np.concatenate(slopes.freed(rows)) for rows in (slopes.by_values, slopes.residuals))
-    values, low, high = slopes.point.values, replays.low, replays.high
+    values = slopes.point.values
+    low = replays.low
+    high = replays.high
     descent = -J.T @ r
     inside = ~((values <= low) & (descent < 0.0) | (values >= high) & (descent > 0.0))
     A = J.T @ J

@@ -85,7 +85,8 @@ def _replayed(t, theta, alpha, target, gains):
     """Return what the firmware shows at each tick of measured angles, rad: alpha, its rate, theta,
     its rate; deg.
     """
-    memory, rows = np.zeros(15), np.zeros((len(t), 4))
+    memory = np.zeros(15)
+    rows = np.zeros((len(t), 4))
     for i in range(len(t)):
         _firmware(Seen(t[i], theta[i], alpha[i], target[i]), gains, memory)
         rows[i, 0], rows[i, 1] = (
@@ -106,7 +107,8 @@ def logged(trace: Trace) -> dict[str, np.ndarray]:
         late.append(after_pauses(k, s.steps, pause, samples, phase) if pause else 0)
     ran = np.flatnonzero(np.array(late) >= 0)
     t = s.control_period * ran + s.physics_step * np.array(late)[ran]
-    sensor, places = s.sensor or IDEAL_SENSOR, []
+    sensor = s.sensor or IDEAL_SENSOR
+    places = []
     for i in range(2):
         x = np.interp(t - sensor.delay - i * sensor.skew, trace.t, trace.x[:, i]) + sensor.bias
         count = sensor.quantum(True)
@@ -147,7 +149,8 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
         return float(np.sqrt(np.mean(values**2)))
 
     runs = np.abs(speed) >= STOP_BAND
-    row, starts = float(np.median(np.diff(t))), np.sum(np.diff(runs.astype(int)) == 1)
+    row = float(np.median(np.diff(t)))
+    starts = np.sum(np.diff(runs.astype(int)) == 1)
     edges = np.flatnonzero(np.diff(np.concatenate(([True], runs, [True])).astype(int))).reshape(
         -1, 2
     )
@@ -161,12 +164,14 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
     at = int(np.flatnonzero(inside)[np.argmax(power[inside])])
 
     def response(output: np.ndarray, driver: np.ndarray) -> complex:
-        cross, own = signal.csd(driver, output, **settings)[1], signal.welch(driver, **settings)[1]
+        cross = signal.csd(driver, output, **settings)[1]
+        own = signal.welch(driver, **settings)[1]
         if own[at] > 0.0:
             return complex(cross[at] / own[at])
         return complex(np.nan)
 
-    tilt, follow = response(alpha, theta), response(theta_rate, speed / firmware.STEPS)
+    tilt = response(alpha, theta)
+    follow = response(theta_rate, speed / firmware.STEPS)
     return {
         "alpha_rms": rms(alpha),
         "alpha_max": float(np.abs(alpha).max()),

@@ -31,7 +31,9 @@ ABOUT = (
     "A figure of a signal is its rms about its mean. Range: over the twin's parameter sets, or 5 to 95 % of its runs. "
     "Public: by published numbers. Held out: the twin was identified from other records. Unfitted: from none here."
 )
-UNFITTED, FITTED, HELD_OUT = "unfitted", "fitted on", "held out"
+UNFITTED = "unfitted"
+FITTED = "fitted on"
+HELD_OUT = "held out"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,8 @@ MAX_CORRELATION = 0.98  # beyond this correlation records cannot tell two quanti
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
 # Of the jackknife, chosen: blocks of time in all pieces together, and the length of a block in
 # correlation times of the residuals.
-BLOCKS, CORRELATION_TIMES = (60, 400), 10.0
+BLOCKS = (60, 400)
+CORRELATION_TIMES = 10.0
 MIN_POWER = 1e-300  # in place of the power 0 of residuals that are all 0
 SINGULAR_RATIO = (
     1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
@@ -55,7 +56,8 @@ def statistics(
     if singular[-1] < SINGULAR_RATIO * singular[0]:
         raise _alike(replays.twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
     covariance = jackknife(slopes)
-    deviation, count = np.sqrt(np.diag(covariance)), independent(slopes)
+    deviation = np.sqrt(np.diag(covariance))
+    count = independent(slopes)
     with np.errstate(all="ignore"):
         correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
     deviation = np.maximum(deviation, by_correlation(slopes, J, count))
@@ -156,7 +158,8 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
     It is the root mean square over REPEATS simulations of the records with their noise and
     rounding, at first order.
     """
-    rig, pieces = replays.rig(point), replays.pieces
+    rig = replays.rig(point)
+    pieces = replays.pieces
     known = [
         (piece.part, replays.state(point, k))
         for k, piece in enumerate(pieces)

@@ -39,7 +39,9 @@ def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[s
     if plant is None:
         return found
     table = mixer(plant)
-    rows, count, keeping = table.ravel(), len(table), int(keeps_torques(table))
+    rows = table.ravel()
+    count = len(table)
+    keeping = int(keeps_torques(table))
 
     def actuators(y, u, controls):
         command = np.zeros(len(u))

@@ -63,7 +63,8 @@ def folder() -> Path:
     for the old one.
     """
     with no_room():
-        path, owner = tempfile.mkdtemp(prefix="smc_mujoco-"), os.getpid()
+        path = tempfile.mkdtemp(prefix="smc_mujoco-")
+        owner = os.getpid()
 
     @atexit.register
     def remove() -> None:
@@ -105,7 +106,9 @@ def library(
 
     Return the library and the warnings.
     """
-    path, target, command = str(source.resolve()), fresh(".so"), compiler()
+    path = str(source.resolve())
+    target = fresh(".so")
+    command = compiler()
     if set('"\\\n') & set(path):
         raise ScenarioError(
             f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
@@ -167,11 +170,14 @@ def undefined(source: Path, symbol: str) -> str:
 
 def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
     """Return the first error in a compiler's output, with a cure."""
-    error, name = ERROR.search(output), source.name
+    error = ERROR.search(output)
+    name = source.name
     if error:
-        what, file = (error["what"], Path(error["file"]).name)
+        what = error["what"]
+        file = Path(error["file"]).name
     else:
-        what, file = ("", "")
+        what = ""
+        file = ""
     if (f"'{symbol}'" in what and "undeclared" in what) or re.search(
         rf"ndefined \w+.*\b_?{symbol}\b", output
     ):

@@ -75,7 +75,8 @@ def law_to_c(
     joints = number_of_joints(law, joints)
     if numbers == "q15":
         law = _in_q15(law)
-        slots, code = 0, _fixed_point(law)
+        slots = 0
+        code = _fixed_point(law)
     else:
         slots, code = translated(law, numbers == "float", joints, plant)
     return with_head(law, numbers, slots, code, joints, measured=True)
@@ -205,7 +206,8 @@ def _fixed_point(law: Component) -> str:
     """Return the C of the fixed-point law, with its table and the words of its gains."""
     from smc_mujoco.control.laws import observer_free_q15 as q15
 
-    gains, word = law.gains, q15.word.py_func
+    gains = law.gains
+    word = q15.word.py_func
     words = {
         "ON_E": word(gains["k1"] * gains["e_range"] / 8.0, 16.0),
         "ON_DE": word(gains["de_range"] / 8.0, 16.0),
@@ -267,9 +269,11 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
         doc = inspect.cleandoc(law.function.__doc__ or "")
     gains = ", ".join(f"{name} = {gain_text(value)}" for name, value in law.gains.items()) or "none"
     if joints:
-        many, unit = (f" of {joints} joints", "joint")
+        many = f" of {joints} joints"
+        unit = "joint"
     else:
-        many, unit = ("", "channel")
+        many = ""
+        unit = "channel"
     facts = {
         "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),
         "numbers": {
@@ -305,7 +309,9 @@ def _tools(command: tuple[str, ...]) -> tuple[str, str]:
 
 def _measured(code: str) -> str:
     """Return the bytes of code and of constants in words, or why they are not measured."""
-    source, target, command = build.fresh(".c"), build.fresh(".o"), build.compiler()
+    source = build.fresh(".c")
+    target = build.fresh(".o")
+    command = build.compiler()
     with no_room():
         source.write_text(code, encoding="utf-8")
     try:

@@ -49,7 +49,8 @@ class CLaw(AtAddress):
     """
 
     def __init__(self, path: Path, symbol: str, file: Path):
-        self.path, self.symbol = path, symbol
+        self.path = path
+        self.symbol = symbol
         self.code = file.read_bytes()
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
         self._function, self.library = sandbox.entry(str(file), symbol)
@@ -65,7 +66,8 @@ class CLaw(AtAddress):
             self.address = self._trampoline.address
         self.sizes = 0, 1  # number of gains, and of memory slots
         self.__name__ = re.sub(r"\W", "_", path.stem)
-        self.__module__, self.__doc__ = path.name, None
+        self.__module__ = path.name
+        self.__doc__ = None
 
     def __call__(self, y: Any, gains: Sequence[Any], memory: np.ndarray) -> tuple[Any, Any]:
         """Return u and s, two vectors of a law of many joints.
@@ -152,16 +154,12 @@ def _trampoline(address: int, arithmetic: Arithmetic) -> Function:
     It restores the arithmetic of its thread, and returns ALTERED_ARITHMETIC if the C function has
     changed it.
     """
-    numbers, environment = (
-        ctypes.addressof(arithmetic.numbers),
-        ctypes.addressof(arithmetic.environment),
-    )
+    numbers = ctypes.addressof(arithmetic.numbers)
+    environment = ctypes.addressof(arithmetic.environment)
     restore = ctypes.cast(arithmetic.library.fesetenv, ctypes.c_void_p).value or 0
-    results, altered, compute = (
-        arithmetic.results,
-        sandbox.ALTERED_ARITHMETIC,
-        njit(computed, error_model="numpy"),
-    )
+    results = arithmetic.results
+    altered = sandbox.ALTERED_ARITHMETIC
+    compute = njit(computed, error_model="numpy")
 
     def native(y: Any, g: Any, m: Any, out: Any):
         output = carray(pointer(out), (2,))
@@ -240,9 +238,11 @@ def _try(library: sandbox.Library, about: "About") -> str:
     Return why there were none, or an empty text.
     """
     if about.joints:
-        fields, channels = (ARRAYS, about.joints)
+        fields = ARRAYS
+        channels = about.joints
     else:
-        fields, channels = (Measurement._fields, 1)
+        fields = Measurement._fields
+        channels = 1
     gains = []
     for gain in about.gains.values():
         for i in range(channels):
@@ -336,7 +336,8 @@ def _about(
     library: sandbox.Library, gains: Mapping[str, float | Gain] | None, memory: int | None
 ) -> About:
     """Return the properties of a library's law: the arguments, or else what the file states."""
-    facts, file = sandbox.load(library), library.path.name
+    facts = sandbox.load(library)
+    file = library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
     if "smc_law_shared" in facts and not facts["glue"]:
         raise ScenarioError(f"{file} is a library with a law of many joints: give its .c file")

@@ -101,7 +101,8 @@ def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any
     try:
         return tried(__name__, words, library.timeout)
     except Failed as failed:
-        why, file = str(failed).replace(str(library.file), library.path.name), library.path.name
+        why = str(failed).replace(str(library.file), library.path.name)
+        file = library.path.name
         if (
             library.symbol in why
             and failed.stage == "loading"
@@ -140,9 +141,11 @@ def sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
         raise ScenarioError(f"{library.path.name}: {late}: give timeout=") from None
     if done.returncode == 0:
         return ""
-    what, places = "it does not end as without sanitizers", []
+    what = "it does not end as without sanitizers"
+    places = []
     if report := UNDEFINED_LINE.search(done.stderr):
-        what, places = report["what"], [report]
+        what = report["what"]
+        places = [report]
     elif report := ACCESS_LINE.search(done.stderr):
         what = ", ".join(filter(None, report.group("what", "size")))
         places = []
@@ -168,7 +171,8 @@ def entry(path: str, symbol: str):
     library = ctypes.CDLL(path, mode=getattr(os, "RTLD_NOW", 0) | getattr(os, "RTLD_LOCAL", 0))
     glued = hasattr(library, "smc_mujoco_entry")
     function = getattr(library, "smc_mujoco_entry" if glued else symbol)
-    function.restype, function.argtypes = ctypes.c_int64 if glued else ctypes.c_int, [DOUBLES] * 4
+    function.restype = ctypes.c_int64 if glued else ctypes.c_int
+    function.argtypes = [DOUBLES] * 4
     return function, library
 
 
@@ -226,7 +230,8 @@ class Requests:
 
         product = ON_REQUEST(lambda w, parameters, memory, out: answer(out, coriolis, w[:joints]))
         tip = ON_REQUEST(lambda nothing, parameters, memory, out: answer(out, jacobian))
-        self.joints, self.functions = joints, (product, tip)
+        self.joints = joints
+        self.functions = (product, tip)
         addresses = [
             float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions
         ]
@@ -271,13 +276,12 @@ class Trial:
 
     def __init__(self, law, order, calls):
         self.calls = calls
-        self.law, self.fields, self.size, self.modelled = (
-            law,
-            order["fields"],
-            order["memory"],
-            order["modelled"],
-        )
-        self.joints, self.channels = order["joints"], max(1, order["joints"])
+        self.law = law
+        self.fields = order["fields"]
+        self.size = order["memory"]
+        self.modelled = order["modelled"]
+        self.joints = order["joints"]
+        self.channels = max(1, order["joints"])
         self.requests = Requests(
             self.joints, lambda w: [0.1 * element for element in w], self.jacobian
         )
@@ -288,7 +292,8 @@ class Trial:
         self.gains = Fenced(order["gains"], math.nan)  # a gain without a name is NaN
         self.gains_before = bytes(self.gains.whole)
         calls.write(bytes(self.gains.values))
-        self.random, self.arithmetic = random.Random(0), Arithmetic()
+        self.random = random.Random(0)
+        self.arithmetic = Arithmetic()
         self.first: list[
             tuple[list[float], str]
         ] = []  # measurements of the first calls, and the law's answers
@@ -328,17 +333,19 @@ class Trial:
 
         After `steps` the time grows geometrically.
         """
-        xs, vs, dt, memory = (
-            [x0 - 0.1 * i for i in range(self.channels)],
-            [0.0] * self.channels,
-            1e-3,
-            self.state(),
-        )
+        xs = [x0 - 0.1 * i for i in range(self.channels)]
+        vs = [0.0] * self.channels
+        dt = 1e-3
+        memory = self.state()
         for k in range(steps + LATER_STEPS):
-            t, seen = dt * (k if k < steps else steps * TIME_RATIO ** (k - steps)), []
-            r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
+            t = dt * (k if k < steps else steps * TIME_RATIO ** (k - steps))
+            seen = []
+            r = 0.1 * math.sin(t)
+            dr = 0.1 * math.cos(t)
+            ddr = -0.1 * math.sin(t)
             for x, v in zip(xs, vs, strict=True):
-                e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
+                e = x + self.random.gauss(0.0, 1e-3) - r
+                de = v + self.random.gauss(0.0, 1e-2) - dr
                 channel = {
                     "t": t,
                     "dt": dt,
@@ -361,14 +368,13 @@ class Trial:
                 if surfaced:
                     channel |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
                 seen.append(channel)
-            y, before = self.measurement(seen), bytes(memory.values)
+            y = self.measurement(seen)
+            before = bytes(memory.values)
             code, us, ss = self.call(y, memory)
             for i, (channel, u, s) in enumerate(zip(seen, us, ss, strict=True)):
                 if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
-                    what, joint = (
-                        code or f"u = {u}, s = {s}",
-                        f" of joint {i}" * bool(self.joints and not code),
-                    )
+                    what = code or f"u = {u}, s = {s}"
+                    joint = f" of joint {i}" * bool(self.joints and not code)
                     where = f"t = {t:g}, e = {channel['e']:g}, de = {channel['de']:g}"
                     cure = (
                         "fix it, or name all gains that it reads in smc_law_gains, or give gains="
@@ -438,7 +444,8 @@ class Trial:
 
 def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
     """Load, set up and on request call a law. Return the library's constants."""
-    arithmetic, symbol = Arithmetic(), order["symbol"]
+    arithmetic = Arithmetic()
+    symbol = order["symbol"]
 
     def done(step: str) -> None:
         if arithmetic.changed():

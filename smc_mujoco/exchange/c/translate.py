@@ -52,7 +52,8 @@ CHANNEL_FIELDS = {
 
 # Laws of many joints: dimensions that are macros in the file, fields of the measurement -> their
 # dimensions, and what the caller of the law provides.
-JOINTS, SLOTS = "SMC_JOINTS", "SMC_LAW_MEMORY"
+JOINTS = "SMC_JOINTS"
+SLOTS = "SMC_LAW_MEMORY"
 JOINT_FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(
     ("t", "dt", "model"), ""
 )
@@ -68,7 +69,11 @@ TOKEN = re.compile(
 LONE_TOKEN = re.compile("(?<!\\w)\\((\x02\\d+\x03)\\)")  # the same in parentheses
 
 # Precedence of C's operators. An operand of lower precedence is put in parentheses.
-ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
+ATOM = 5
+UNARY = 4
+PRODUCT = 3
+SUM = 2
+LOOSE = 1
 OPERATORS: dict[type, tuple[str, int]] = {
     ast.Add: ("+", SUM),
     ast.Sub: ("-", SUM),
@@ -144,7 +149,8 @@ HELPERS = {
     "greater": "a >= b || a != a ? a : b",
     "sign": "a > 0 ? 1 : a < 0 ? -1 : a",
 }
-SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
+SQUARE = "(a * a)"
+FOURTH = "((a * a) * (a * a))"
 POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
     "power_2": "a * a",
     "power_3": f"a * {SQUARE}",
@@ -227,8 +233,11 @@ class Program:
     """The C file of a component: constant arrays, functions, and the names they use."""
 
     def __init__(self, component: Component, single: bool, joints: int):
-        self.component, self.gains, self.single = component, component.gains, single
-        self.symbol, self.joints = f"smc_{component.kind}", joints
+        self.component = component
+        self.gains = component.gains
+        self.single = single
+        self.symbol = f"smc_{component.kind}"
+        self.joints = joints
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
         self.translated: dict[
@@ -261,14 +270,17 @@ class Program:
         if written in self.changing:
             return self.changing[written]
         self.changing[written] = set()
-        tree, known = parsed(written)[1], around(written)
-        names, inside = [a.arg for a in tree.args.args], in_body(tree)
+        tree = parsed(written)[1]
+        known = around(written)
+        names = [a.arg for a in tree.args.args]
+        inside = in_body(tree)
         given = [
             (target.id, root(value))
             for target, value in pairs(inside)
             if isinstance(target, ast.Name)
         ]
-        origins, before = {name: name for name in names}, 0
+        origins = {name: name for name in names}
+        before = 0
         while before != (before := len(origins)):
             origins |= {
                 name: origins[source]
@@ -304,7 +316,8 @@ class Program:
             function = name
         else:
             function = f"{name}_{kind}"
-        body, of = (HELPERS | POWERS)[name], TYPES[kind]
+        body = (HELPERS | POWERS)[name]
+        of = TYPES[kind]
         second = f", {of} b" if "b" in body else ""
         self.used_names.add(function)
         self.functions.setdefault(
@@ -321,13 +334,16 @@ class Program:
             raise refuse(
                 None, f"the constant {name}, which is not a one-dimensional array of numbers,"
             )
-        kind, of = "real", "smc_real"
+        kind = "real"
+        of = "smc_real"
         items = [literal(float(v), self.single, ast.Constant(0)).text for v in data]
         if data.dtype.kind == "i":
-            kind, largest = "int", int(np.abs(data).max(initial=0))
+            kind = "int"
+            largest = int(np.abs(data).max(initial=0))
             if largest >= 2**31:
                 raise refuse(None, f"the constant {name}, beyond 32 bits,")
-            of, items = "int16_t" if largest < 2**15 else "int32_t", [str(int(v)) for v in data]
+            of = "int16_t" if largest < 2**15 else "int32_t"
+            items = [str(int(v)) for v in data]
         content = f"[{len(items)}] = {{\n{rows(items)}\n}};"
         for known, text in self.arrays.items():
             if text == f"static const {of} {known}{content}":
@@ -395,7 +411,9 @@ class Function:
         constants: Mapping[str, float],
         entry: bool = False,
     ):
-        self.program, self.constants, self.entry = program, constants, entry
+        self.program = program
+        self.constants = constants
+        self.entry = entry
         self.counters = set[str]()  # variables of the present loops that are never negative
         self.frames = list[
             tuple[list[str], list[Value]]
@@ -467,14 +485,14 @@ class Function:
         unread = [self.c_name(n) for n in self.kinds if n not in self.read]
         top = [*self.arrays(), *(f"{types.pop(n)}{n} = 0;" for n in unread if n in types)]
         top += [f"(void){n};" for n in unread]  # compilers warn of unused variables
-        lines, depth = list[str](), 1
+        lines = list[str]()
+        depth = 1
         for line in self.lines:
             depth -= line.startswith("}")
-            target, words = line.partition(" = ")[0], re.findall(r"\w+", line)
-            indent, declaration = (
-                "    " * depth,
-                types.pop(target) if depth == 1 and target in types else "",
-            )
+            target = line.partition(" = ")[0]
+            words = re.findall(r"\w+", line)
+            indent = "    " * depth
+            declaration = types.pop(target) if depth == 1 and target in types else ""
             top += [f"{types.pop(n)}{n} = 0;" for n in list(types) if n in words]
             lines += wrapped(indent, declaration + line)
             depth += line.endswith("{")
@@ -533,7 +551,8 @@ class Function:
 
     def sharing(self, text: str) -> set[str]:
         """Return all names in C of the array that some C begins with."""
-        first, names = re.findall(r"\w+", text)[0], {self.c_name(n): n for n in self.kinds}
+        first = re.findall(r"\w+", text)[0]
+        names = {self.c_name(n): n for n in self.kinds}
         of = self.origin(names.get(first, ""))
         return {first} | {c for c, n in names.items() if of and self.origin(n) == of}
 
@@ -605,7 +624,8 @@ class Function:
             else:
                 yield f"{self.destination(target, number.kind)} = {number.text};"
             return
-        targets, values = target.elts, self.parts(value, len(target.elts))
+        targets = target.elts
+        values = self.parts(value, len(target.elts))
         if values and any(
             self.set_by(targets[:i]) & self.arrays_in([v]) for i, v in enumerate(values)
         ):
@@ -652,7 +672,8 @@ class Function:
         """Return whether a name is always the part of an array that a value is, so that it can be a
         pointer into it.
         """
-        nodes, array = [*ast.walk(self.tree)], self.origin(value)
+        nodes = [*ast.walk(self.tree)]
+        array = self.origin(value)
         in_loops = {
             n for loop in nodes if isinstance(loop, ast.For | ast.While) for n in ast.walk(loop)
         }
@@ -706,7 +727,9 @@ class Function:
         )
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
-        pointers, stores, read = [], [], self.arrays_in(call.args)
+        pointers = []
+        stores = []
+        read = self.arrays_in(call.args)
         for target, kind in zip(targets, kinds, strict=True):
             pointer = self.receiver(target, kind, read)
             if not pointer:
@@ -797,7 +820,8 @@ class Function:
     def loop(self, node: ast.For, variable: str) -> Iterator[str]:
         """Translate for i in range(...) and for element in array."""
         if isinstance(node.iter, ast.Name) and len(shape(self.kinds.get(node.iter.id, ""))) == 1:
-            array, i = self.value(node.iter), self.index()
+            array = self.value(node.iter)
+            i = self.index()
             yield f"for (int32_t {i} = 0; {i} < {shape(array.kind)[0]}; {i}++) {{"
             yield f"{self.destination(node.target, base(array.kind))} = {array.text.replace(ROW, i)};"
             yield from self.block(node.body)
@@ -834,11 +858,14 @@ class Function:
         if len(bounds) == 2:
             first, last = bounds
         else:
-            first, last = (Value("0", "int"), bounds[0])
+            first = Value("0", "int")
+            last = bounds[0]
         if step == 1:
-            sign, change = ("<", "++")
+            sign = "<"
+            change = "++"
         else:
-            sign, change = (">", "--")
+            sign = ">"
+            change = "--"
         yield f"for (int32_t {name} = {first.text}; {name} {sign} {last.within(SUM)}; {name}{change}) {{"
         yield from self.block(node.body)
         yield "}"
@@ -891,7 +918,8 @@ class Function:
         if isinstance(target, ast.Name):
             if target.id in self.parameters:
                 raise refuse(target, "an assignment to an argument that is an array")
-            before, kind = self.kinds.get(target.id, ""), value.kind
+            before = self.kinds.get(target.id, "")
+            kind = value.kind
             if shape(before) and self.same_shape(
                 before, kind
             ):  # 3 or SMC_JOINTS, where there are three joints
@@ -940,7 +968,8 @@ class Function:
         """Take back and return the lines that have just computed a value, if they can write to a
         place itself.
         """
-        name, given = value.pointer, place.pointer
+        name = value.pointer
+        given = place.pointer
         lines = [line for line in self.before if name and re.search(rf"\b{name}\b", line)]
         if (
             name not in self.temporaries
@@ -971,7 +1000,8 @@ class Function:
 
     def is_array(self, target: ast.expr) -> bool:
         """Return whether a target of an assignment is an array already."""
-        kind, indices = self.kinds.get(root(target), ""), 0
+        kind = self.kinds.get(root(target), "")
+        indices = 0
         while isinstance(target, ast.Subscript):
             if isinstance(target.slice, ast.Tuple):
                 places = target.slice.elts
@@ -1109,7 +1139,8 @@ class Function:
 
         An array that the function changes is a pointer, with its stride.
         """
-        changed, values = self.program.changes(function), list[Value]()
+        changed = self.program.changes(function)
+        values = list[Value]()
         shared = [self.shared(a) for a in call.args]
         for i, node in enumerate(call.args):
             if i not in changed or not isinstance(node, ast.Name | ast.Subscript | ast.Attribute):
@@ -1196,7 +1227,9 @@ class Function:
     def _attribute(self, node: ast.Attribute) -> Value:
         if (constant := self.resolve(node)) is not None:
             return self.outer(node, constant)
-        owner, name, joints = self.outside(self.value, node.value), node.attr, self.program.joints
+        owner = self.outside(self.value, node.value)
+        name = node.attr
+        joints = self.program.joints
         if owner.kind == "y":
             kind = self.program.component.kind
             if joints:
@@ -1230,7 +1263,8 @@ class Function:
         return array._replace(pointer="")
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        constants, joints = self.resolve(node.value), self.program.joints
+        constants = self.resolve(node.value)
+        joints = self.program.joints
         if isinstance(constants, tuple | list | np.ndarray):
             owner = self.outer(node.value, np.asarray(constants))
         else:
@@ -1250,12 +1284,15 @@ class Function:
 
     def elements(self, node: ast.Subscript, owner: Value, places: Sequence[ast.expr]) -> Value:
         """Return some elements of an array, by an index or a colon for each dimension."""
-        dimensions, text, pointer = shape(owner.kind), owner.text, owner.pointer
+        dimensions = shape(owner.kind)
+        text = owner.text
+        pointer = owner.pointer
         if len(dimensions) == 2:
             strides = [dimensions[1], ""]
         else:
             strides = [owner.stride]
-        left, steps = list[str](), list[str]()
+        left = list[str]()
+        steps = list[str]()
         for token, place, dimension, stride in zip(
             (ROW, COLUMN), places, dimensions, strides, strict=False
         ):
@@ -1322,7 +1359,8 @@ class Function:
         self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str
     ) -> None:
         """Refuse an index that is no integer, or out of range as far as it is known."""
-        constant, component = self.constant(place), self.program.component
+        constant = self.constant(place)
+        component = self.program.component
         if index.kind != "int":
             raise refuse(node, "an index that is not an integer")
         if dimension == SLOTS:
@@ -1398,15 +1436,18 @@ class Function:
         if type(operator) not in OPERATORS:
             raise refuse(node, f"the operator {type(operator).__name__}")
         sign, level = OPERATORS[type(operator)]
-        first, kind = left.within(level), wider(left.kind, right.kind)
+        first = left.within(level)
+        kind = wider(left.kind, right.kind)
         if whole:
             kind = "int"
             if sign == "/":
-                first, kind = f"(smc_real){left.within(UNARY)}", "real"
+                first = f"(smc_real){left.within(UNARY)}"
+                kind = "real"
         return Value(f"{first} {sign} {right.within(level + 1)}", kind, level)
 
     def _power(self, node: ast.BinOp) -> Value:
-        base, exponent = self.numeric(node.left), self.constant(node.right)
+        base = self.numeric(node.left)
+        exponent = self.constant(node.right)
         if base.kind in WHOLE_KINDS:
             raise refuse(node, "a power of a whole number")
         if exponent == 1:
@@ -1442,7 +1483,9 @@ class Function:
         )
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        yes, no, test = self.numeric(node.body), self.numeric(node.orelse), self.truth(node.test)
+        yes = self.numeric(node.body)
+        no = self.numeric(node.orelse)
+        test = self.truth(node.test)
         return self.chosen(Value(test, "bool", LOOSE if " " in test else ATOM), yes, no)
 
     def chosen(self, test: Value, yes: Value, no: Value) -> Value:
@@ -1638,14 +1681,16 @@ class Function:
                 numbers = self.program.changes(self.resolve(node.func))
                 changed |= {self.origin(node.args[i]) for i in numbers if i < len(node.args)}
         for target, value in pairs(nodes):
-            copies, shares = bound([target]) - self.origins.keys(), self.shared(value)
+            copies = bound([target]) - self.origins.keys()
+            shares = self.shared(value)
             of_array = any(shape(self.kinds.get(name, "")) for name in copies)
             if of_array and (shares & changed or (shares and copies & changed)):
                 raise refuse(value, f"an array, {SHARED_WORDS},")
 
     def shared(self, node: ast.expr) -> set[str]:
         """Return the names of arrays with which the value of an expression may share its numbers."""
-        names, parts = set[str](), list[ast.expr]()
+        names = set[str]()
+        parts = list[ast.expr]()
         match node:
             case ast.Name() | ast.Subscript() if self.is_array(node):
                 if is_tuple(self.kinds.get(self.origin(node), "")):
@@ -1804,7 +1849,9 @@ def may_return_argument(function: Any) -> bool:
     if written is None:
         return False
     tree = parsed(written)[1]
-    nodes, arguments, known = [*ast.walk(tree)], {a.arg for a in tree.args.args}, around(written)
+    nodes = [*ast.walk(tree)]
+    arguments = {a.arg for a in tree.args.args}
+    known = around(written)
     given = [(name, value) for target, value in pairs(nodes) for name in bound([target])]
 
     def may_share(value: ast.expr, seen: frozenset[str] = frozenset()) -> bool:

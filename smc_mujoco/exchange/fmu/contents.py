@@ -145,7 +145,8 @@ class ExportedLaw:
 
 def variables(exported: ExportedLaw) -> list[Variable]:
     """Return the variables in the order of their value references."""
-    places, of_model = exported.places, JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
+    places = exported.places
+    of_model = JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
     wanted = inputs(exported)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
@@ -190,9 +191,11 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     for kind, (slots, _) in exported.code.items():
         for i in range(max(1, exported.joints)):
             if exported.joints:
-                joint, place = (f", joint {i + 1}", f"{i + 1},")
+                joint = f", joint {i + 1}"
+                place = f"{i + 1},"
             else:
-                joint, place = ("", "")
+                joint = ""
+                place = ""
             listed += [
                 Variable(
                     f"{kind}.memory[{place}{k}]",
@@ -211,10 +214,8 @@ def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
     """
     if name not in ("M", "C", "J"):
         return dict.fromkeys(exported.places, float(name in ("g", "gq") and not exported.joints))
-    rows, columns = (
-        range(1, 4 if name == "J" else exported.joints + 1),
-        range(1, exported.joints + 1),
-    )
+    rows = range(1, 4 if name == "J" else exported.joints + 1)
+    columns = range(1, exported.joints + 1)
     return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
 
 
@@ -223,7 +224,8 @@ def inputs(exported: ExportedLaw) -> set[str]:
     texts = []
     for _, text in exported.code.values():
         texts.append(text if exported.modelled else UNREACHED.sub(r"\1", text))
-    read, wanted = reads("".join(texts)), {*REQUIRED_INPUTS}
+    read = reads("".join(texts))
+    wanted = {*REQUIRED_INPUTS}
     if exported.estimator is None or "v" in reads(exported.code["estimator"][1]):
         wanted.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
@@ -350,7 +352,9 @@ def helpers(exported: ExportedLaw) -> str:
     """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and
     jacobian.
     """
-    wanted, needs, functions = inputs(exported), reads(exported.code["law"][1]), ""
+    wanted = inputs(exported)
+    needs = reads(exported.code["law"][1])
+    functions = ""
     if "coriolis" in needs:
         given = "C" in wanted
         if given:
@@ -372,9 +376,11 @@ static void coriolis(void *plant, const double *w, double *out)
 
 """
     if "jacobian" in needs:
-        source, unused = "NAN", "    (void)plant;\n"
+        source = "NAN"
+        unused = "    (void)plant;\n"
         if "J" in wanted:
-            source, unused = f"((const double *)plant)[{place('J[1,1]')} + i]", ""
+            source = f"((const double *)plant)[{place('J[1,1]')} + i]"
+            unused = ""
         functions += f"""static void jacobian(void *plant, double *out)
 {{
 {unused}    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};
@@ -389,11 +395,16 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
 
     What is of each joint is in a loop over j.
     """
-    wanted, many = inputs(exported), exported.joints
+    wanted = inputs(exported)
+    many = exported.joints
     if many:
-        j, u, s = ("[j]", "[j]", "[SMC_JOINTS + j]")
+        j = "[j]"
+        u = "[j]"
+        s = "[SMC_JOINTS + j]"
     else:
-        j, u, s = ("", "[0]", "[1]")
+        j = ""
+        u = "[0]"
+        s = "[1]"
 
     def value(name: str, absent: str = "0.0") -> str:
         if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:

@@ -93,10 +93,8 @@ def model_description(
     xml.SubElement(
         root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(exported.period)
     )
-    variables, structure = (
-        xml.SubElement(root, "ModelVariables"),
-        xml.SubElement(root, "ModelStructure"),
-    )
+    variables = xml.SubElement(root, "ModelVariables")
+    structure = xml.SubElement(root, "ModelStructure")
     for reference, variable in enumerate(listed):
         variables.append(_variable(reference, variable, joint))
     outputs = [str(reference) for reference, variable in enumerate(listed) if is_output(variable)]

@@ -142,7 +142,8 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
         raise ScenarioError(
             f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead"
         )
-    s, limits = scenario.resolved, set(scenario.limits)
+    s = scenario.resolved
+    limits = set(scenario.limits)
     several = len(limits) > 1 and not s.law.joint
     if several or s.feedforward is not None or s.stepper is not None:
         if several:
@@ -176,10 +177,8 @@ def _exported(
     plant: Plant | None = None,
 ) -> ExportedLaw:
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
-    sliding, estimator = (
-        coerce.surface("surface", surface, None),
-        coerce.velocity("velocity", velocity, None),
-    )
+    sliding = coerce.surface("surface", surface, None)
+    estimator = coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
     count = number_of_joints(chosen, joints)
     if sliding is not None and count:
@@ -264,10 +263,8 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
     """
     (machine, suffix), command = platform_tuple(), build.compiler()
     with scratch() as folder:
-        sources, target = (
-            {Path(n).name: t for n, t in files.items() if n.startswith("sources/")},
-            folder / "out",
-        )
+        sources = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}
+        target = folder / "out"
         with no_room():
             for name, text in sources.items():
                 (folder / name).write_text(text, encoding="utf-8")

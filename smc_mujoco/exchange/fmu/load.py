@@ -146,7 +146,8 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
     """
     if period is None:
         return 1, dt
-    slower, faster = period / dt, dt / period
+    slower = period / dt
+    faster = dt / period
     if abs(slower - round(slower)) < PERIOD_TOLERANCE * slower and round(slower) >= 1:
         return round(slower), round(slower) * dt
     if abs(faster - round(faster)) < PERIOD_TOLERANCE * faster:
@@ -313,9 +314,11 @@ def _meanings(
         if ours not in (*INPUT_FIELDS, *OUTPUTS):
             raise unknown("meaning of a variable", ours, (*INPUT_FIELDS, *OUTPUTS))
         if ours in OUTPUTS:
-            side, theirs_known = ("output", outs)
+            side = "output"
+            theirs_known = outs
         else:
-            side, theirs_known = ("input", ins)
+            side = "input"
+            theirs_known = ins
         errors.find(f"{side} of {file}", theirs, dict.fromkeys(theirs_known, ""))
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))

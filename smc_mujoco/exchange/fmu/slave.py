@@ -65,7 +65,8 @@ class Slave:
         self.arithmetic = Arithmetic()
         about = fmpy.read_model_description(folder, validate=False)
         self.known = {variable.name: variable for variable in about.modelVariables}
-        self.two, self.said = str(about.fmiVersion).startswith("2"), list[str]()
+        self.two = str(about.fmiVersion).startswith("2")
+        self.said = list[str]()
         self.inputs, self.outputs = self._by_type(inputs), self._by_type(outputs)
         self.fmu: Any = self._called(
             "instantiation", instantiate_fmu, folder, about, "CoSimulation", logger=self._log
@@ -169,10 +170,13 @@ def attempt(order: Mapping[str, Any], say: Callable) -> None:
     """
     say("instantiation")
     slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
-    length, x, v = order["step"] or TRIAL_PERIOD, 0.5, 0.0
+    length = order["step"] or TRIAL_PERIOD
+    x = 0.5
+    v = 0.0
     for k in range(TRIAL_STEPS):
         say(f"the step from t = {k * length:g} s")
-        r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
+        r = 0.1 * math.sin(k * length)
+        dr = 0.1 * math.cos(k * length)
         seen = {
             "t": k * length,
             "dt": length,

@@ -36,7 +36,8 @@ ONE_JOINT = (
     mujoco.mjtTrn.mjTRN_JOINT.value,
     mujoco.mjtTrn.mjTRN_JOINTINPARENT.value,
 )  # transmissions to one joint
-FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
+FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
+NO_BIAS = mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
 FLIES = (
     4  # independent forces and torques that hold a heading: a thrust, and a torque about each axis
@@ -222,7 +223,8 @@ def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
         if joint.limited[0]:
             low, high = joint.range
         else:
-            low, high = (-math.inf, math.inf)
+            low = -math.inf
+            high = math.inf
         rows.append((joint.name, float(low), float(high)))
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
@@ -272,7 +274,8 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
     ends[model.actuator_forcelimited[drives] == 1] = clamped[
         model.actuator_forcelimited[drives] == 1
     ]
-    largest, forces = np.abs(ends).max(axis=1), exerted(model, model.joint(joint).id, drives)
+    largest = np.abs(ends).max(axis=1)
+    forces = exerted(model, model.joint(joint).id, drives)
     sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
     reached = [float(np.sum(largest[column > 0.0] * column[column > 0.0])) for column in sizes.T]
     return (reached[0],) * 3 + tuple(reached[1:])
@@ -312,7 +315,8 @@ def add_pose(spec: mujoco.MjSpec, joint: str, drives: Sequence[int]) -> None:
     """
     body = spec.joint(joint).parent
     site = body.add_site(name=POSE, size=(1e-6,) * 3, group=5)
-    site.pos, site.quat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    site.pos = (0.0, 0.0, 0.0)
+    site.quat = (1.0, 0.0, 0.0, 0.0)
     kinds = mujoco.mjtSensor
     for end, kind in (
         (":x", kinds.mjSENS_FRAMEPOS),
@@ -346,7 +350,8 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
     actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
     if channel.motor:
-        takes, cure = f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange"
+        takes = f"joint {joint!r} of {label} takes"
+        cure = "widen its actuatorfrcrange"
         return Motor(
             joint, _limit(takes, cure, *bounds, _together(model, actuators)), tuple(actuators)
         )
@@ -402,8 +407,10 @@ def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
 
 def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
     """Return the least and the largest force of an actuator at its joint, N m or N."""
-    gain, gear = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0]
-    low, high = -math.inf, math.inf
+    gain = model.actuator_gainprm[i, 0]
+    gear = model.actuator_gear[i, 0]
+    low = -math.inf
+    high = math.inf
     clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
     if model.actuator_ctrllimited[i] and clamped:
         low, high = sorted(float(gain * end) for end in model.actuator_ctrlrange[i])
@@ -453,16 +460,13 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
             limit = motor.limit
         else:
             limit = 0.0
-        made.gear, made.ctrllimited, made.forcelimited = (
-            (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            False,
-            limit > 0.0,
-        )
-        made.ctrlrange, made.forcerange = (0.0, 0.0), (-limit, limit)
-        made.armature, made.damping, made.delay, made.nsample, made.group = (
-            0.0,
-            (0.0, 0.0, 0.0),
-            0.0,
-            0,
-            MOTOR_GROUP,
-        )
+        made.gear = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        made.ctrllimited = False
+        made.forcelimited = limit > 0.0
+        made.ctrlrange = (0.0, 0.0)
+        made.forcerange = (-limit, limit)
+        made.armature = 0.0
+        made.damping = (0.0, 0.0, 0.0)
+        made.delay = 0.0
+        made.nsample = 0
+        made.group = MOTOR_GROUP

@@ -242,7 +242,8 @@ def _full_precision_xml(spec: mujoco.MjSpec) -> str:
     """Return the XML of a compiled spec, with all digits if this version of MuJoCo can write them."""
     library = libmujoco.library()
     try:
-        get, put = library._mjPRIVATE__get_xml_precision, library._mjPRIVATE__set_xml_precision
+        get = library._mjPRIVATE__get_xml_precision
+        put = library._mjPRIVATE__set_xml_precision
     except AttributeError:  # the caller checks what is lost, with `_difference`
         return spec.to_xml()
     with _lock:
@@ -257,7 +258,8 @@ def _full_precision_xml(spec: mujoco.MjSpec) -> str:
 def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     """Return the first field in which two models differ by more than rounding, or ""."""
     for name in fields(model):
-        a, b = getattr(model, name), getattr(again, name)
+        a = getattr(model, name)
+        b = getattr(again, name)
         if a.shape != b.shape or not np.allclose(
             a, b, rtol=ROUNDING, atol=ROUNDING, equal_nan=True
         ):
@@ -348,8 +350,11 @@ def digest(path: Path) -> str:
 
     If a name fits files in several folders, all of them are hashed.
     """
-    texts, files = [path], {path.resolve(): None}
-    names, folders, inner = [], {}, {"": None}
+    texts = [path]
+    files = {path.resolve(): None}
+    names = []
+    folders = {}
+    inner = {"": None}
     for text in texts:  # grows as files name further files
         folders[text.parent] = None
         elements = _elements(text)

@@ -42,7 +42,8 @@ def attempt(order: Mapping[str, Any], say: Callable) -> None:
     for plugin in order["plugins"]:
         library.mj_loadPluginLibrary(plugin.encode())
     say("reading")
-    error, files = ctypes.create_string_buffer(MESSAGE_SIZE), None
+    error = ctypes.create_string_buffer(MESSAGE_SIZE)
+    files = None
     if order["path"]:
         spec = library.mj_parseXML(os.fsencode(order["path"]), None, error, MESSAGE_SIZE)
     else:

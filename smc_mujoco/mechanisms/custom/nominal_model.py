@@ -136,7 +136,8 @@ class NominalModel:
             mujoco.mj_fwdVelocity(model, data)
             mujoco.mj_fwdActuation(model, data)
             mujoco.mj_fwdAcceleration(model, data)
-            unit, moved = np.zeros((1, model.nv)), np.zeros((1, model.nv))
+            unit = np.zeros((1, model.nv))
+            moved = np.zeros((1, model.nv))
             unit[0, places["qvel"][j]] = 1.0
             mujoco.mj_solveM(model, data, moved, unit)
             dof = places["qvel"][i]
@@ -162,11 +163,9 @@ class NominalModel:
     def native(self, parameters: Mapping[str, float]) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
-        data, seen, solved = (
-            borrowed.data,
-            np.full((2, len(places)), np.nan),
-            np.zeros((2, model.nv)),
-        )
+        data = borrowed.data
+        seen = np.full((2, len(places)), np.nan)
+        solved = np.zeros((2, model.nv))
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places, *seen, *solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         sizes = len(places), len(driven(places)), model.nv
@@ -190,7 +189,8 @@ class NominalModel:
     def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
         """Return M, h and g of all channels, at their x and v, (n,) each."""
         with self._placed(x, p) as (model, places, data):
-            dense, forces = np.zeros((model.nv, model.nv)), {}
+            dense = np.zeros((model.nv, model.nv))
+            forces = {}
             mujoco.mj_fullM(model, data, dense)
             for name, velocity in (("g", np.zeros(len(x))), ("h", v)):
                 data.qvel[places["qvel"]] = velocity
@@ -228,7 +228,9 @@ class NominalModel:
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = data.qfrc_actuator[:] = 0.0
-        dense, v, moves = np.zeros(model.nv**2), np.zeros(len(places)), np.zeros(3 * model.nv)
+        dense = np.zeros(model.nv**2)
+        v = np.zeros(len(places))
+        moves = np.zeros(3 * model.nv)
         forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
         arrays = data.qpos, data.qvel, *forces, places, dense, v, moves
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
@@ -273,7 +275,8 @@ def prepared(
         1  # MuJoCo tells only the first; telling it inside a control callback would never end
     )
     joints = joint_ids(model)
-    ctrl, places = model.actuator_ctrladr[drive_ids(model)], np.full(len(joints), -1, PLACE)
+    ctrl = model.actuator_ctrladr[drive_ids(model)]
+    places = np.full(len(joints), -1, PLACE)
     places["qpos"], places["qvel"] = model.jnt_qposadr[joints], dof_ids(model)
     if free_joint(model) >= 0:
         places["qpos"] += np.arange(len(joints))
@@ -329,31 +332,31 @@ def native_dynamics() -> Function:
         _mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation")
     )
     kinematics, centres, inertia = map(_mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM"))
-    rates, passives, newton_euler = (
-        _mujoco("mj_comVel"),
-        _mujoco("mj_passive"),
-        _mujoco("mj_rne", 2),
-    )
+    rates = _mujoco("mj_comVel")
+    passives = _mujoco("mj_passive")
+    newton_euler = _mujoco("mj_rne", 2)
     full = _mujoco("mj_fullM", 1)
 
     def native(y, p, m, out):
-        at, read = dynamics_at(p, 0), seen_at(y, 0)
-        n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
-        x, v, kept, places = pointer(read.x), pointer(read.v), pointer(int(at.v)), int(at.places)
-        qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (nv,))
-        bias, passive = (
-            carray(pointer(int(at.bias)), (nv,)),
-            carray(pointer(int(at.passive)), (nv,)),
-        )
-        actuator, dense = (
-            carray(pointer(int(at.actuator)), (nv,)),
-            carray(pointer(int(at.dense)), (nv, nv)),
-        )
-        M, h, g = (
-            carray(pointer(out), (n, n)),
-            pointer(out + 8 * n * n),
-            pointer(out + 8 * (n * n + n)),
-        )
+        at = dynamics_at(p, 0)
+        read = seen_at(y, 0)
+        n = int(at.n)
+        nv = int(at.nv)
+        model = int(at.model)
+        data = int(at.data)
+        x = pointer(read.x)
+        v = pointer(read.v)
+        kept = pointer(int(at.v))
+        places = int(at.places)
+        qpos = carray(pointer(int(at.qpos)), (1 << 40,))
+        qvel = carray(pointer(int(at.qvel)), (nv,))
+        bias = carray(pointer(int(at.bias)), (nv,))
+        passive = carray(pointer(int(at.passive)), (nv,))
+        actuator = carray(pointer(int(at.actuator)), (nv,))
+        dense = carray(pointer(int(at.dense)), (nv, nv))
+        M = carray(pointer(out), (n, n))
+        h = pointer(out + 8 * n * n)
+        g = pointer(out + 8 * (n * n + n))
         for j in range(n):
             kept[j] = v[j]
             qpos[place_at(places, j).qpos] = x[j]
@@ -401,18 +404,22 @@ def native_coriolis() -> Function:
 
     Its input is w, (n,).
     """
-    rates, newton_euler, velocities = (
-        _mujoco("mj_comVel"),
-        _mujoco("mj_rne", 2),
-        _mujoco("mj_fwdVelocity"),
-    )
+    rates = _mujoco("mj_comVel")
+    newton_euler = _mujoco("mj_rne", 2)
+    velocities = _mujoco("mj_fwdVelocity")
 
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
-        n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
-        w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
-        v, qvel = pointer(int(at.v)), carray(pointer(int(at.qvel)), (nv,))
-        bias, places = carray(pointer(int(at.bias)), (nv,)), int(at.places)
+        n = int(at.n)
+        nv = int(at.nv)
+        model = int(at.model)
+        data = int(at.data)
+        w = carray(pointer(y), (n,))
+        output = carray(pointer(out), (n,))
+        v = pointer(int(at.v))
+        qvel = carray(pointer(int(at.qvel)), (nv,))
+        bias = carray(pointer(int(at.bias)), (nv,))
+        places = int(at.places)
         for j in range(n):
             output[j] = 0.0
         for part in range(2):
@@ -440,8 +447,11 @@ def native_jacobian() -> Function:
 
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
-        n, nv, site = int(at.n), int(at.nv), int(at.site)
-        output, moves = carray(pointer(out), (3, n)), carray(pointer(int(at.moves)), (3, nv))
+        n = int(at.n)
+        nv = int(at.nv)
+        site = int(at.site)
+        output = carray(pointer(out), (3, n))
+        moves = carray(pointer(int(at.moves)), (3, nv))
         if site < 0:
             return 1
         of_site(int(at.model), int(at.data), int(at.moves), 0, site)
@@ -465,20 +475,26 @@ def native() -> Function:
     )
 
     def native(y, p, m, out):
-        read, at = seen_at(y, 0), nominal_at(p, 0)
-        i, n, driven, nv = read.i, int(at.n), int(at.driven), int(at.nv)
-        x, v, u = pointer(read.x), pointer(read.v), pointer(read.u)
-        model, data, places = int(at.model), int(at.data), int(at.places)
-        qpos, qvel = (
-            carray(pointer(int(at.qpos)), (1 << 40,)),
-            carray(pointer(int(at.qvel)), (1 << 40,)),
-        )
-        ctrl, qacc = (
-            carray(pointer(int(at.ctrl)), (1 << 40,)),
-            carray(pointer(int(at.acceleration)), (nv,)),
-        )
-        last_x, last_v = carray(pointer(int(at.x)), (n,)), carray(pointer(int(at.v)), (n,))
-        unit, moved = carray(pointer(int(at.unit)), (nv,)), carray(pointer(int(at.moved)), (nv,))
+        read = seen_at(y, 0)
+        at = nominal_at(p, 0)
+        i = read.i
+        n = int(at.n)
+        driven = int(at.driven)
+        nv = int(at.nv)
+        x = pointer(read.x)
+        v = pointer(read.v)
+        u = pointer(read.u)
+        model = int(at.model)
+        data = int(at.data)
+        places = int(at.places)
+        qpos = carray(pointer(int(at.qpos)), (1 << 40,))
+        qvel = carray(pointer(int(at.qvel)), (1 << 40,))
+        ctrl = carray(pointer(int(at.ctrl)), (1 << 40,))
+        qacc = carray(pointer(int(at.acceleration)), (nv,))
+        last_x = carray(pointer(int(at.x)), (n,))
+        last_v = carray(pointer(int(at.v)), (n,))
+        unit = carray(pointer(int(at.unit)), (nv,))
+        moved = carray(pointer(int(at.moved)), (nv,))
         fresh = False
         for j in range(n):
             if (
@@ -501,7 +517,8 @@ def native() -> Function:
             unit[j] = 0.0
         unit[place_at(places, i % driven).qvel] = 1.0
         solve(model, data, int(at.moved), int(at.unit), 1)
-        output, dof = carray(pointer(out), (2,)), place_at(places, i).qvel
+        output = carray(pointer(out), (2,))
+        dof = place_at(places, i).qvel
         output[0], output[1] = qacc[dof], moved[dof]
         return 0
 

@@ -192,8 +192,10 @@ def _plant(
     source: Source, pairs: Pairs, name: str | None, keyframe: str | None, tip: str | None
 ) -> Plant:
     """Return the plant of a model, see `plant_from`."""
-    label, spec = source.label, source.read()
-    model, title = source.compiled(spec), spec.modelname
+    label = source.label
+    spec = source.read()
+    model = source.compiled(spec)
+    title = spec.modelname
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
     pairs = tuple(
@@ -218,7 +220,8 @@ def _plant(
     build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
-    fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
+    fields = UserFields(mass, gravity)
+    limits = tuple(motor.limit for motor in motors)
     if pose and (tip or scenarios):
         if tip:
             cure = "leave the tip out"
@@ -232,11 +235,13 @@ def _plant(
         units = ("m",) * 3 + ("rad",) * 3
     else:
         units = tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
-    why_not, file = missing(model, joints, motors), label.removesuffix(".xml")
+    why_not = missing(model, joints, motors)
+    file = label.removesuffix(".xml")
     file = label if catalogue().taken(file) else file  # a plant of the library has this name
     plant_name = file if name is None else name
     if pose:
-        start, checked = ({}, [])
+        start = {}
+        checked = []
     else:
         start, checked = own.starts(model, joints, pairs, keyframe)
     check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])

@@ -63,7 +63,9 @@ def peg(spec: mujoco.MjSpec, x: float) -> None:
     """Add a post on the front rail that the cart, coming from the right, hits when its middle is at
     x, m.
     """
-    machine, place, y = spec.body("machine"), x - FACE_X - POST_RADIUS, RAIL_Y["front"]
+    machine = spec.body("machine")
+    place = x - FACE_X - POST_RADIUS
+    y = RAIL_Y["front"]
     buffers(spec, "left", -1)
     box(
         machine,
@@ -83,7 +85,8 @@ def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
         buffer = cart.add_geom(
             name=f"{side}_{rail}_buffer", type=mujoco.mjtGeom.mjGEOM_SPHERE, material="ink"
         )
-        buffer.pos, buffer.size = (sign * HALF_BLOCK, y, MIDDLE_Z - RAIL_Z), (BUFFER_RADIUS, 0, 0)
+        buffer.pos = (sign * HALF_BLOCK, y, MIDDLE_Z - RAIL_Z)
+        buffer.size = (BUFFER_RADIUS, 0, 0)
 
 
 def bed(spec: mujoco.MjSpec, length: float) -> None:
@@ -94,7 +97,8 @@ def bed(spec: mujoco.MjSpec, length: float) -> None:
         if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")
     ]:
         spec.delete(geom)
-    machine, cart = spec.body("machine"), spec.body("cart")
+    machine = spec.body("machine")
+    cart = spec.body("cart")
     box(machine, "bed", (-length, -0.150, 0.225), (length, 0.150, BOTTOM_Z - 0.012), "graphite")
     box(
         machine,

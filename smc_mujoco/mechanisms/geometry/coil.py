@@ -41,7 +41,8 @@ def tube(spec, name, start, end, *, span, radius, material):
 
 def _line(start, end):
     """Return the ends of the line between two positions in the world, its direction, and up."""
-    first, last = np.array(start[2], float), np.array(end[2], float)
+    first = np.array(start[2], float)
+    last = np.array(end[2], float)
     return first, last, (last - first) / np.linalg.norm(last - first), np.array([0.0, 0.0, 1.0])
 
 
@@ -50,11 +51,13 @@ def _skin(spec, name, start, end, material, vertices, s):
     and s, (rings,).
     """
     ring = np.arange(len(s) - 1)[:, None] * SIDES
-    a, b = ring + np.arange(SIDES), ring + (np.arange(SIDES) + 1) % SIDES
+    a = ring + np.arange(SIDES)
+    b = ring + (np.arange(SIDES) + 1) % SIDES
     faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)
 
     skin = spec.add_skin(name=name, material=material)
-    skin.vert, skin.face = vertices.ravel(), faces.ravel()
+    skin.vert = vertices.ravel()
+    skin.face = faces.ravel()
     skin.bodyname = [start[0], end[0]]
     skin.bindpos = [*start[1], *end[1]]
     skin.bindquat = [1.0, 0.0, 0.0, 0.0] * 2

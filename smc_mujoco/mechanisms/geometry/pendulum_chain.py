@@ -60,7 +60,8 @@ def compose(single, n, x0):
         spring = spec.add_tendon(name=f"coupling{i}", stiffness=COUPLING, springlength=(0.0, 0.0))
         spring.wrap_joint(f"p{i}/hinge", -1.0)
         spring.wrap_joint(f"p{i + 1}/hinge", 1.0)
-        near, far = pivot(spec, i), pivot(spec, i + 1)
+        near = pivot(spec, i)
+        far = pivot(spec, i + 1)
         draw_spring(
             spec,
             i,
@@ -140,10 +141,8 @@ def draw_spring(spec, i, start, end, radius, turns):
     """
     if len(spec.keys[0].qpos) > MAX_DRAWN:
         return
-    near, far = (
-        (f"p{i}/pendulum", pivot(spec, i), start),
-        (f"p{i + 1}/pendulum", pivot(spec, i + 1), end),
-    )
+    near = (f"p{i}/pendulum", pivot(spec, i), start)
+    far = (f"p{i + 1}/pendulum", pivot(spec, i + 1), end)
     coil.draw(
         spec, f"spring{i}", near, far, radius=radius, turns=turns, wire=0.0045, material="brass"
     )
@@ -158,7 +157,8 @@ def fields(model, p):
 
 def pendulum_fields(model, p):
     """Yield the fields of the pendulums alone, without the springs between them."""
-    n, side = size(model), above(model.body("p0/pendulum").ipos)
+    n = size(model)
+    side = above(model.body("p0/pendulum").ipos)
     bodies = [model.body(f"p{i}/pendulum").id for i in range(n)]
     yield Field("body_mass", bodies, p.m)
     yield Field("body_ipos", bodies, (0.0, 0.0, side * p.l))
@@ -184,7 +184,8 @@ def above(bob):
 
 def bobs(spec):
     """Put the pivots side by side and let neighbouring bobs hit each other."""
-    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob").pos)
+    n = len(spec.keys[0].qpos)
+    side = above(spec.geom("p0/bob").pos)
     width = (n - 1) * ROW_PITCH
     for i in range(n):
         spec.body(f"p{i}/pendulum").frame.pos = (i * ROW_PITCH - width / 2, 0.0, HEIGHT)
@@ -206,7 +207,8 @@ def bobs(spec):
 
 def springs(spec):
     """Replace the torsion springs by real springs between the rods."""
-    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob").pos)
+    n = len(spec.keys[0].qpos)
+    side = above(spec.geom("p0/bob").pos)
     for item in [*spec.tendons, *spec.skins]:
         spec.delete(item)
     for i in range(n):
@@ -240,7 +242,8 @@ def stand_row(spec, n, width):
     """Add a beam behind the row between two posts, and a camera that looks at the row from the
     front.
     """
-    machine, end = spec.body("machine"), width / 2 + 0.20
+    machine = spec.body("machine")
+    end = width / 2 + 0.20
     box(
         machine,
         "beam",

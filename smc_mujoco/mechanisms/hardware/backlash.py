@@ -66,7 +66,8 @@ class Backlash(Actuator):
             joint = spec.joint(actuator.target)
             _add_rotor(spec, joint, rigid, pose)
             play = spec.add_tendon(name=PLAY + joint.name, limited=True, range=(-1.0, 1.0))
-            play.solref_limit, play.solimp_limit = STOP_SOLREF, HARD_SOLIMP
+            play.solref_limit = STOP_SOLREF
+            play.solimp_limit = HARD_SOLIMP
             play.wrap_joint(ROTOR + joint.name, 1.0)
             play.wrap_joint(joint.name, -1.0)
             actuator.target = ROTOR + joint.name
@@ -97,7 +98,8 @@ def _add_rotor(
     body = rigid.jnt_bodyid[i]
     parent = rigid.body_parentid[body]
     frame = pose.xmat[parent].reshape(3, 3)
-    anchor, axis = frame.T @ (pose.xanchor[i] - pose.xpos[parent]), frame.T @ pose.xaxis[i]
+    anchor = frame.T @ (pose.xanchor[i] - pose.xpos[parent])
+    axis = frame.T @ pose.xaxis[i]
     # all inertia is in the joint's armature, so that it weighs nothing
     light = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13), "explicitinertial": True}
     rotor = joint.parent.parent.add_body(name=ROTOR + joint.name, pos=anchor, **light)

@@ -38,7 +38,8 @@ from smc_mujoco.mechanisms.plant import Field, Plant
 
 Pair = tuple[float, float]
 Ends = tuple[Sequence[float], Sequence[float]]  # of a bar
-HIT, RUB = "hit:", "rub:"
+HIT = "hit:"
+RUB = "rub:"
 # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is met within 4 % at h = 0.25 ms
 DEPTH = 0.005
 # m per m/s: chosen, so that no rod of a falling chain passes through a bob. With h = 0.25 ms such a
@@ -52,7 +53,8 @@ MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
 # Constant impedances d: firm for blows on a fixed obstacle, soft for blows between bobs and for
 # sliding. The spring carries 1 - d of a steady load. At 0.95 a body that leans on an obstacle rests
 # within 0.1 mm; at 0.99 it rattles.
-FIRM_IMPEDANCE, SOFT_IMPEDANCE = 0.95, 0.01
+FIRM_IMPEDANCE = 0.95
+SOFT_IMPEDANCE = 0.01
 REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # no effect if d is constant
 SOLREF_RUB = (
     0.008,
@@ -145,7 +147,8 @@ def damping_ratio(restitution: float) -> float:
     aim = -0.5 * math.log(
         max(restitution, MIN_RESTITUTION)
     )  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
-    low, high = 0.0, 1.0 + aim
+    low = 0.0
+    high = 1.0 + aim
     high *= high
     while high - low > 1e-12 * high:
         zeta = 0.5 * (low + high)
@@ -224,14 +227,17 @@ def _pair(
 def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float]) -> None:
     """Add an invisible box to hit, behind a visible face: so deep that no blow passes through it."""
     block = box(body, name, low, high, "ink")
-    block.group, block.rgba = 5, (0.0, 0.0, 0.0, 0.0)
+    block.group = 5
+    block.rgba = (0.0, 0.0, 0.0, 0.0)
 
 
 def box(
     body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str
 ) -> mujoco.MjsGeom:
     """Add a box between two corners, m in the body's frame, and return its geom."""
-    a, b, kind = np.array(low, float), np.array(high, float), mujoco.mjtGeom.mjGEOM_BOX
+    a = np.array(low, float)
+    b = np.array(high, float)
+    kind = mujoco.mjtGeom.mjGEOM_BOX
     return body.add_geom(name=name, type=kind, pos=(a + b) / 2, size=(b - a) / 2, material=material)
 
 

@@ -215,11 +215,14 @@ class DCMotor(Actuator):
         return min(self.voltage * self.constant / self.resistance, self.constant * self.current)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        kind, constants = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE), (self.constant, self.constant)
+        kind = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE)
+        constants = (self.constant, self.constant)
         for actuator in drives(spec):
             actuator.set_to_dcmotor(motorconst=constants, resistance=self.resistance, ctrlspec=kind)
-            actuator.ctrllimited, actuator.ctrlrange = True, (-1.0, 1.0)
-            actuator.forcelimited, actuator.forcerange = True, (-1.0, 1.0)
+            actuator.ctrllimited = True
+            actuator.ctrlrange = (-1.0, 1.0)
+            actuator.forcelimited = True
+            actuator.forcerange = (-1.0, 1.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
@@ -230,7 +233,8 @@ class DCMotor(Actuator):
         )  # `rippled` bounds it before the ripple
         if self.delay:  # the callback simulates the winding, and bounds its voltage
             rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
-            share, voltage = winding_step(model.opt.timestep / self.delay, rk4)[1], math.inf
+            share = winding_step(model.opt.timestep / self.delay, rk4)[1]
+            voltage = math.inf
         yield Field(
             "actuator_gainprm", (ids, WINDING), (share * self.resistance, share * self.constant)
         )
@@ -296,10 +300,13 @@ class DriveStep(NamedTuple):
         """Return the mean force over a step, and both states at its end; all have the shape of u
         and the speeds v.
         """
-        a, b = first - u, second - u
-        force, first_after = u + self.force_first * a, u + self.first_left * a
+        a = first - u
+        b = second - u
+        force = u + self.force_first * a
+        first_after = u + self.first_left * a
         if self.voltage:
-            torque, mean = second - self.drag * v, np.clip(force, -self.voltage, self.voltage)
+            torque = second - self.drag * v
+            mean = np.clip(force, -self.voltage, self.voltage)
             end = np.clip(u + self.second_first * a, -self.voltage, self.voltage)
             force = mean + self.force_second * (torque - mean) - self.force_drag * v
             return (

@@ -127,15 +127,14 @@ def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     for sensor in sensor_ids(model):
         count = int(model.sensor_history[sensor, 0])
         interval = float(model.sensor_interval[sensor, 0]) or model.opt.timestep
-        joint, position = (
-            model.sensor_objid[sensor],
-            model.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTPOS,
-        )
+        joint = model.sensor_objid[sensor]
+        position = model.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTPOS
         if position:
             value = data.qpos[model.jnt_qposadr[joint]]
         else:
             value = data.qvel[model.jnt_dofadr[joint]]
-        times, values = interval * np.arange(-count, 0.0), np.full((count, 1), value)
+        times = interval * np.arange(-count, 0.0)
+        values = np.full((count, 1), value)
         mujoco.mj_initSensorHistory(
             model, data, sensor, times, values, -interval - EARLY_SHARE * model.opt.timestep
         )

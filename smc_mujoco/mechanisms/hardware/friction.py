@@ -100,9 +100,13 @@ def coulomb_step(v, smooth, level, mobility, h):
       moment, see `drives._rise`; and the time for which it holds the joint at rest, s, which is the
       last of the step.
     """
-    left, mean, moment, held = h, 0.0, 0.0, 0.0
+    left = h
+    mean = 0.0
+    moment = 0.0
+    held = 0.0
     while left > 0.0:
-        force, span = -smooth, left
+        force = -smooth
+        span = left
         if v == 0.0 and abs(smooth) <= level:
             held = left
         else:
@@ -176,7 +180,8 @@ class LuGre(Friction):
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for joint in joints(spec)[: len(drives(spec)) if self.driven else None]:
-            name, on_joint = PASSIVE + joint.name, mujoco.mjtTrn.mjTRN_JOINT
+            name = PASSIVE + joint.name
+            on_joint = mujoco.mjtTrn.mjTRN_JOINT
             spec.add_actuator(name=name, target=joint.name, trntype=on_joint).set_to_dcmotor(
                 motorconst=(1e-9, 1e-9),  # a dcmotor needs a motor constant: too small to notice
                 resistance=1.0,

@@ -22,7 +22,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
-PASSIVE, ROTOR = "passive:", "rotor:"
+PASSIVE = "passive:"
+ROTOR = "rotor:"
 PLAY = "play:"  # a tendon of length rotor - joint
 # The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two
 # steps.
@@ -159,13 +160,13 @@ def exerted(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndar
     """Return force and torque on a free joint, in the body's axes, for each actuator's unit of
     force, (drives, 6).
     """
-    data, place, dof = mujoco.MjData(model), model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+    data = mujoco.MjData(model)
+    place = model.jnt_qposadr[joint]
+    dof = model.jnt_dofadr[joint]
     data.qpos[place : place + 7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     mujoco.mj_forward(model, data)
-    moments, rows = (
-        np.zeros((model.nout, model.nv)),
-        (data.moment_rownnz, data.moment_rowadr, data.moment_colind),
-    )
+    moments = np.zeros((model.nout, model.nv))
+    rows = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
     mujoco.mju_sparse2dense(moments, data.actuator_moment, *rows)
     return moments[model.actuator_outadr[drives], dof : dof + 6]
 

@@ -89,10 +89,13 @@ def spun(rotor, W, c, t):
     z = W - c obeys z' = -(first + second z) z, with first = a + 2 b c and second = b.
     """
     if c >= W:
-        a, b = (rotor.rise, rotor.rise2)
+        a = rotor.rise
+        b = rotor.rise2
     else:
-        a, b = (rotor.fall, rotor.fall2)
-    z, first = W - c, a + 2.0 * b * c
+        a = rotor.fall
+        b = rotor.fall2
+    z = W - c
+    first = a + 2.0 * b * c
     left = math.exp(-first * t)
     if first == 0.0:
         passed = t

@@ -84,10 +84,8 @@ class Sliding(Friction):
         for name in self.names:
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != plant.n:
-                what, cure = (
-                    f"{type(self).__name__}'s {name} is {shown(value)}",
-                    f"give one number, or {plant.n}",
-                )
+                what = f"{type(self).__name__}'s {name} is {shown(value)}"
+                cure = f"give one number, or {plant.n}"
                 raise ScenarioError(f"{what}, and {plant.name} has {plant.n} channels: {cure}")
 
     def parameters(self, i: int) -> tuple[float, ...]:

@@ -214,11 +214,13 @@ def command(g, p, u, t):
     """Give the firmware a command u at time t, s."""
     g.speed = min(max(g.speed + p.per_unit * u * (t - g.commanded), -p.top), p.top)
     g.commanded = t
-    size, direction = math.floor(abs(g.speed) + ROUNDING), math.copysign(1.0, g.speed)
+    size = math.floor(abs(g.speed) + ROUNDING)
+    direction = math.copysign(1.0, g.speed)
     if abs(g.speed) < p.band or size < 1.0 or direction == -g.wanted:
         g.wanted = 0.0
     else:
-        g.wanted, g.rate = direction, size
+        g.wanted = direction
+        g.rate = size
 
 
 def advance(g, p, queue, start, end):
@@ -252,7 +254,9 @@ def next_step(g, p):
         g.n -= 1.0
         return g.direction
     if g.direction != g.wanted:
-        g.direction, g.n, g.period = g.wanted, 0.0, math.inf
+        g.direction = g.wanted
+        g.n = 0.0
+        g.period = math.inf
     if g.direction == 0.0:
         return 0.0
     period = 1.0 / g.rate
@@ -274,9 +278,12 @@ def field(g, p, queue, start, end):
     """Turn the field from `start` to `end`, s, and keep its mean, and its rise as `drives._rise`
     defines it.
     """
-    t, mean, moment = start, 0.0, 0.0
+    t = start
+    mean = 0.0
+    moment = 0.0
     if p.steady != 0.0:
-        g.slope, g.until = g.speed, math.inf
+        g.slope = g.speed
+        g.until = math.inf
     while t < end:
         if g.head < g.tail:
             step_time = queue[2 * int(g.head % p.slots)]
@@ -284,7 +291,8 @@ def field(g, p, queue, start, end):
             step_time = math.inf
         reached = g.until if g.slope != 0.0 else math.inf
         after = max(min(step_time, reached, end), t)
-        span, left = after - t, end - t
+        span = after - t
+        left = end - t
         mean += span * (g.position + 0.5 * g.slope * span)
         moment += span * (
             g.position * (left - 0.5 * span) + g.slope * span * (0.5 * left - span / 3.0)
@@ -292,19 +300,23 @@ def field(g, p, queue, start, end):
         g.position += g.slope * span
         t = after
         if t == reached:
-            g.position, g.slope = g.target, 0.0
+            g.position = g.target
+            g.slope = 0.0
         if t == step_time:
             g.target += queue[2 * int(g.head % p.slots) + 1]
             g.head += 1.0
             interval = p.spread * min(t - g.stepped, p.longest)
-            g.stepped, g.until = t, t + interval
+            g.stepped = t
+            g.until = t + interval
             if interval > 0.0:
                 g.slope = (g.target - g.position) / interval
             else:
-                g.position, g.slope = g.target, 0.0
+                g.position = g.target
+                g.slope = 0.0
     h = end - start
     mean, moment = mean / h, moment / (h * h)
-    g.middle, g.rise = mean, 6.0 * (0.5 * mean - moment)
+    g.middle = mean
+    g.rise = 6.0 * (0.5 * mean - moment)
 
 
 def torque(g, p, x, moved):

@@ -27,7 +27,8 @@ def build(n):
 
 
 def fields(model, p):
-    pole, across = model.body("pole").id, p.m * p.l**2 / 3
+    pole = model.body("pole").id
+    across = p.m * p.l**2 / 3
     yield Field("body_mass", model.body("cart").id, p.M)
     yield Field("body_mass", pole, p.m)
     yield Field("body_ipos", pole, (0.0, 0.0, p.l))
@@ -40,7 +41,8 @@ def fields(model, p):
 
 
 def nominal(x, v, i, p):
-    lever, inertia = p.m * p.l * cos(x[1]), p.m * p.l * p.l * 4.0 / 3.0
+    lever = p.m * p.l * cos(x[1])
+    inertia = p.m * p.l * p.l * 4.0 / 3.0
     determinant = (p.M + p.m) * inertia - lever * lever
     along = p.m * p.l * sin(x[1]) * v[1] * v[1] - p.b * v[0]
     about = p.m * p.grav * p.l * sin(x[1]) - p.bq * v[1]

@@ -60,7 +60,8 @@ def build(n):
 
 
 def fields(model, p):
-    upper, lower = model.body("upper").id, model.body("lower").id
+    upper = model.body("upper").id
+    lower = model.body("lower").id
     dofs = [model.joint(name).dofadr[0] for name in ("shoulder", "elbow")]
     rotor = model.tendon("rotor").id
     across = (
@@ -90,11 +91,14 @@ def accelerations(q1, q2, v1, v2, m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, 
     M11 = I1 + I2 + m2 * l1 * l1 + 2.0 * a * cos(q2) + (gear * gear + 1.0) * Ir
     M12 = I2 + a * cos(q2) - gear * Ir
     M22 = I2 + gear * gear * Ir
-    h, outer = a * sin(q2), m2 * r2 * grav * sin(q1 + q2)
+    h = a * sin(q2)
+    outer = m2 * r2 * grav * sin(q1 + q2)
     F1 = h * (2.0 * v1 + v2) * v2 - (m1 * r1 + m2 * l1) * grav * sin(q1) - outer - b1 * v1
     F2 = -h * v1 * v1 - outer - b2 * v2
     determinant = M11 * M22 - M12 * M12
-    W11, W12, W22 = M22 / determinant, -M12 / determinant, M11 / determinant
+    W11 = M22 / determinant
+    W12 = -M12 / determinant
+    W22 = M11 / determinant
     return W11 * F1 + W12 * F2, W12 * F1 + W22 * F2, W11, W12, W22
 
 

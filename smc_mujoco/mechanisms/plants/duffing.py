@@ -61,8 +61,10 @@ def peg(spec):
 
 
 def add_springs(spec):
-    machine, body = spec.body("machine"), spec.body("cart")
-    joint, up = spec.joint("slide"), SPRING_Z - body.pos[2]
+    machine = spec.body("machine")
+    body = spec.body("cart")
+    joint = spec.joint("slide")
+    up = SPRING_Z - body.pos[2]
     joint.stiffness = [0.0, 0.0, 0.0]
     bar(body, "spring_post", ((0, 0, 0.13), (0, 0, up + 0.03)), 0.022, "steel")
     body.add_site(name="snap", pos=(0, 0, up))

@@ -36,7 +36,8 @@ def build(n):
 
 
 def fields(model, p):
-    arm, pendulum = model.body("arm").id, model.body("pendulum").id
+    arm = model.body("arm").id
+    pendulum = model.body("pendulum").id
     dofs = [model.joint(name).dofadr[0] for name in ("arm", "hinge")]
     yield Field("body_mass", pendulum, p.m)
     yield Field("body_inertia", arm, (p.J, p.J, p.J - MIN_INERTIA))
@@ -53,10 +54,15 @@ def fields(model, p):
 
 
 def nominal(x, v, i, p):
-    s, c, Jp = sin(x[1]), cos(x[1]), p.Jc + p.m * p.l * p.l
-    weight, tz = p.m * p.grav, sqrt(max(0.0, 1.0 - p.tx * p.tx - p.ty * p.ty))
-    w, out = p.tx * cos(x[0]) + p.ty * sin(x[0]), p.tx * sin(x[0]) - p.ty * cos(x[0])
-    around, lever = p.J + p.m * p.L * p.L + Jp * s * s, p.m * p.L * p.l * c
+    s = sin(x[1])
+    c = cos(x[1])
+    Jp = p.Jc + p.m * p.l * p.l
+    weight = p.m * p.grav
+    tz = sqrt(max(0.0, 1.0 - p.tx * p.tx - p.ty * p.ty))
+    w = p.tx * cos(x[0]) + p.ty * sin(x[0])
+    out = p.tx * sin(x[0]) - p.ty * cos(x[0])
+    around = p.J + p.m * p.L * p.L + Jp * s * s
+    lever = p.m * p.L * p.l * c
     along = (
         p.m * p.L * p.l * s * v[1] * v[1] - 2.0 * Jp * s * c * v[0] * v[1] - p.b * v[0] - p.k * x[0]
     )

@@ -50,12 +50,14 @@ def nominal(x, v, i, p):
 
 def on_floor(spec):
     """Lower the machine so that the bob reaches the floor."""
-    machine, down = spec.body("machine"), HINGE_Z + LENGTH * cos(FLOOR_ANGLE) - BOB_RADIUS
+    machine = spec.body("machine")
+    down = HINGE_Z + LENGTH * cos(FLOOR_ANGLE) - BOB_RADIUS
     machine.pos = (0.0, 0.0, -down)
     for name in ("foot", "step"):
         spec.geom(name).pos[2] += down
     column = spec.geom("column")
-    bottom, top = 0.03 + down, column.pos[2] + column.size[1]
+    bottom = 0.03 + down
+    top = column.pos[2] + column.size[1]
     column.pos[2], column.size[1] = (bottom + top) / 2, (top - bottom) / 2
     spec.stat.center[2] -= down
     hit(spec, ("floor", "bob"), FLOOR_RESTITUTION)
@@ -103,7 +105,8 @@ def stops(spec):
 
 
 def wall(spec):
-    machine, face = spec.body("machine"), LENGTH * sin(WALL_ANGLE) + BOB_RADIUS
+    machine = spec.body("machine")
+    face = LENGTH * sin(WALL_ANGLE) + BOB_RADIUS
     box(machine, "wall_foot", (face - 0.02, -0.20, 0.0), (face + 0.16, 0.20, 0.028), "graphite")
     box(machine, "wall", (face, -0.15, 0.0), (face + 0.05, 0.15, 1.36), "ivory")
     for y in (-0.11, 0.11):
@@ -120,8 +123,10 @@ def wall(spec):
 
 
 def peg(spec):
-    machine, angle = spec.body("machine"), PEG_ANGLE - asin((ROD_RADIUS + PEG_RADIUS) / PEG_ARM)
-    x, z = PEG_ARM * sin(angle), HINGE_Z + PEG_ARM * cos(angle)
+    machine = spec.body("machine")
+    angle = PEG_ANGLE - asin((ROD_RADIUS + PEG_RADIUS) / PEG_ARM)
+    x = PEG_ARM * sin(angle)
+    z = HINGE_Z + PEG_ARM * cos(angle)
     bar(machine, "peg", ((x, 0.045, z), (x, -0.055, z)), PEG_RADIUS, "brass", round_ends=True)
     bar(machine, "peg_collar", ((x, 0.045, z), (x, 0.028, z)), 0.032, "graphite")
     hit(spec, ("peg", "rod"), PEG_RESTITUTION)

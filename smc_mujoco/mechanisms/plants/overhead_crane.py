@@ -40,7 +40,8 @@ def fields(model, p):
 
 
 def nominal(x, v, i, p):
-    lever, inertia = -p.m * p.l * cos(x[1]), p.m * p.l * p.l
+    lever = -p.m * p.l * cos(x[1])
+    inertia = p.m * p.l * p.l
     determinant = (p.M + p.m) * inertia - lever * lever
     along = -p.m * p.l * sin(x[1]) * v[1] * v[1] - p.b * v[0]
     about = -p.m * p.grav * p.l * sin(x[1]) - p.bq * v[1]

@@ -109,8 +109,10 @@ def build(n):
 
 
 def fields(model, p):
-    links, ball = [model.body(name).id for name in LINKS], model.body("payload").id
-    share, radius = p.m / LINK_MASS, math.cbrt(3.0 * p.payload / (4.0 * math.pi * STEEL_DENSITY))
+    links = [model.body(name).id for name in LINKS]
+    ball = model.body("payload").id
+    share = p.m / LINK_MASS
+    radius = math.cbrt(3.0 * p.payload / (4.0 * math.pi * STEEL_DENSITY))
     inertia = 0.4 * p.payload * radius * radius
     masses, centres, frames, inertias = blended(model, links, p.delta)
     yield Field("body_mass", links, masses * share)
@@ -133,8 +135,10 @@ def blended(model, links, delta):
     """
     if not 0.0 <= delta <= 1.0:
         raise ScenarioError(f"panda's delta is {delta:g}: give the share of the second set, 0 to 1")
-    masses, centres = model.body_mass[links], model.body_ipos[links]
-    frames, inertias = model.body_iquat[links], model.body_inertia[links]
+    masses = model.body_mass[links]
+    centres = model.body_ipos[links]
+    frames = model.body_iquat[links]
+    inertias = model.body_inertia[links]
     if not delta:
         return masses, centres, frames, inertias
     for i, (mass, centre, (xx, yy, zz, xy, xz, yz)) in enumerate(SECOND_SET):

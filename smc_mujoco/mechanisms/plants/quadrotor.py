@@ -167,7 +167,8 @@ def fields(model, p):
     for name in ("rise", "fall", "fall2", "Jr", "Dx", "Dy", "Dz", "lift"):
         if getattr(p, name) < 0.0:
             raise ScenarioError(f"quadrotor's {name} is {getattr(p, name):g}: give 0 or more")
-    body, ball = model.body("machine").id, model.body("payload").id
+    body = model.body("machine").id
+    ball = model.body("payload").id
     rotors = [model.actuator(name).id for name in NAMES]
     radius = math.cbrt(3.0 * p.payload / (4.0 * math.pi * STEEL_DENSITY))
     yield Field("body_mass", [body, ball], (p.m, p.payload))

@@ -69,8 +69,11 @@ def peg(spec):
 
 
 def add_springs(spec):
-    machine, body, joint = spec.body("machine"), spec.body("cart"), spec.joint("slide")
-    joint.stiffness, joint.damping = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    machine = spec.body("machine")
+    body = spec.body("cart")
+    joint = spec.joint("slide")
+    joint.stiffness = [0.0, 0.0, 0.0]
+    joint.damping = [0.0, 0.0, 0.0]
     for name, side in SPRINGS:
         machine.add_site(name=f"{name}_post", pos=(side * POST_END, 0, cart.RAIL_Z))
         body.add_site(name=f"{name}_cart", pos=(side * CART_END, 0, 0))
@@ -86,7 +89,8 @@ def add_springs(spec):
     motor = spec.add_actuator(
         name="passive:active_damper", target="slide", trntype=mujoco.mjtTrn.mjTRN_JOINT
     )
-    motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    motor.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+    motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
     motor.gainprm[0] = 0.0  # takes no command
     bar(body, "damper_post", ((0, 0, 0.13), (0, 0, DAMPER_Z - cart.RAIL_Z + 0.03)), 0.022, "steel")
     bar(machine, "damper_foot", ((0, ANCHOR_Y, 0), (0, ANCHOR_Y, 0.028)), 0.13, "graphite")

@@ -48,7 +48,8 @@ def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(
 
 
 def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatch):
-    drawn, draw = [], np.random.default_rng
+    drawn = []
+    draw = np.random.default_rng
     monkeypatch.setattr(
         search.np.random, "default_rng", lambda seed: drawn.append(seed) or draw(seed)
     )
@@ -68,7 +69,8 @@ def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatc
 def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
     found, killed_in, monkeypatch, tmp_path
 ):
-    made, real = [], search.Task.search
+    made = []
+    real = search.Task.search
 
     def one(task, i, *rest):
         if i == killed_in and len(made) == killed_in:
@@ -277,7 +279,8 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
 def test_the_driven_joint_has_the_scales_of_a_machine_with_a_free_one():
     task = search._task("furuta", smc.law("rotary_swing_up"), Objective(), 8, 0, 1)
     p = smc.plant("furuta").values({})
-    Jp, lever = p.Jc + p.m * p.l**2, p.m * p.L * p.l
+    Jp = p.Jc + p.m * p.l**2
+    lever = p.m * p.L * p.l
     assert task.scales["M"] == pytest.approx(p.J + p.m * p.L**2 - lever**2 / Jp)
     assert task.scales["X"] == 0.2  # of the free joint
 
@@ -485,10 +488,8 @@ def test_a_tuning_says_each_gain_its_range_and_whether_it_is_at_a_bound_or_searc
     assert "J up to 7 times the least" in notes["apart"]
     assert notes["alone"] != notes["plain"] != notes["apart"]
     assert "lam=2" in repr(plain)
-    goal, free = (
-        Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")),
-        Objective(weight=0.0),
-    )
+    goal = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine"))
+    free = Objective(weight=0.0)
     assert all(
         part in str(goal)
         for part in ("nominal, sine", "0.001 TV", "|u| <= 12", "chattering of s <= 0.01")

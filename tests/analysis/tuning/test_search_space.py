@@ -79,9 +79,11 @@ def systems(law, fixed, model, rng):
 def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
     """x / X and u / F over 150 samples, in a system of units."""
     if law.relative_degree == 3:
-        plant, n = (plant_c, 3)
+        plant = plant_c
+        n = 3
     else:
-        plant, n = (plant_b, 2)
+        plant = plant_b
+        n = 2
     start = [value * X / T**i for i, value in enumerate((1.0, 0.4, -0.2)[:n])]
     done = plant(
         law,

@@ -63,7 +63,8 @@ def test_a_trail_is_drawn_until_now():
     times = np.linspace(0.0, 2.0, 41)
     points = np.stack([np.interp(times, [0.0, 1.0, 2.0], place) for place in corners.T], axis=1)
     trail = arm.Trail(points, times, COLOUR, 3.0)
-    early, late = drawn(trail, 0.5), drawn(trail, 2.0)
+    early = drawn(trail, 0.5)
+    late = drawn(trail, 2.0)
     for picture, x, y, inked in (
         (early, 25, 29, True),
         (early, 45, 29, False),
@@ -94,7 +95,8 @@ def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
 def test_the_trail_of_an_arm_is_its_tips_path(trace):
     shown = overlay(trace)
     path = project(tip.tip_paths(trace)[0])
-    early, late = drawn(shown.paths.trails[0], 0.1), drawn(shown.paths.trails[0], 0.5)
+    early = drawn(shown.paths.trails[0], 0.1)
+    late = drawn(shown.paths.trails[0], 0.5)
     before = path[trace.t <= 0.1]
     apart = np.hypot(*(path[:, None] - before).T).min(axis=0)  # px from the early path
     assert apart.max() > 3.0
@@ -126,7 +128,8 @@ def test_bars_are_shares_of_each_joints_limit(trace):
             round(100.0 + arm.BAR_GAP + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2)
         )
     quarter = round(arm.BAR_HEIGHT / 8)
-    up, down = round(zero) - quarter, round(zero) + quarter
+    up = round(zero) - quarter
+    down = round(zero) + quarter
     assert image[up, middles[0]].tolist() == list(style.rgb(COLOUR))
     assert image[down, middles[0]].tolist() == list(style.rgb(style.PAPER))
     assert image[down, middles[1]].tolist() == list(

@@ -8,7 +8,8 @@ from smc_mujoco.common import gl
 from smc_mujoco.draw.film import act, camera, puppet, scene
 from smc_mujoco.draw.film.stage import Stage
 
-SIZE, ROOM = (640, 230), camera.Room(20, 20, 620, 210)
+SIZE = (640, 230)
+ROOM = camera.Room(20, 20, 620, 210)
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 MODEL = """
 <mujoco model="arm">
@@ -68,7 +69,8 @@ def test_what_is_no_camera_is_refused(chosen, sentence):
 def test_an_own_model_s_camera_is_found_by_its_name(trace):
     side = scene.turn(trace.scenario, "side")
     assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
-    azimuth, down = -scene.turn(trace.scenario)[:2, 2], -scene.turn(trace.scenario)[2, 2]
+    azimuth = -scene.turn(trace.scenario)[:2, 2]
+    down = -scene.turn(trace.scenario)[2, 2]
     assert azimuth / np.linalg.norm(azimuth) == pytest.approx(
         [0.0, 1.0]
     )  # the first that stands still, which

@@ -11,7 +11,8 @@ from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.stage import Stage
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
-SIZE, ROOM = (640, 230), camera.Room(20, 20, 620, 210)
+SIZE = (640, 230)
+ROOM = camera.Room(20, 20, 620, 210)
 SEEN = 24  # of 255: a sample of a smoothed edge more or less is no difference
 
 
@@ -42,7 +43,8 @@ def pictures(shown: Stage, push: bool) -> list[np.ndarray]:
 @pytest.mark.parametrize(("plant", "push"), [("van_der_pol", True), ("pendulum_network", False)])
 def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypatch):
     """Shadows and springs too; the first machine stands still."""
-    areas, whole = [], lambda *_: [(0, 0, *SIZE)]
+    areas = []
+    whole = lambda *_: [(0, 0, *SIZE)]
     changed = Canvas.changed
 
     def noted(self, *shapes):
@@ -61,7 +63,8 @@ def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypat
 
 
 def test_rectangles_are_joined_where_one_takes_less_time_than_two():
-    near, far = [(0, 0, 10, 10), (12, 0, 20, 10)], [(0, 0, 10, 10), (500, 0, 510, 10)]
+    near = [(0, 0, 10, 10), (12, 0, 20, 10)]
+    far = [(0, 0, 10, 10), (500, 0, 510, 10)]
     assert canvas.joined(near, lambda area: canvas.pixels(area) + 50) == [(0, 0, 20, 10)]
     assert canvas.joined(far, lambda area: canvas.pixels(area) + 50) == far
     chain = [(0, 0, 10, 10), (100, 0, 110, 10), (10, 0, 100, 10)]  # the third joins the others
@@ -69,7 +72,8 @@ def test_rectangles_are_joined_where_one_takes_less_time_than_two():
 
 
 def test_two_machines_that_move_far_apart_are_drawn_in_two_rectangles(monkeypatch):
-    drawn, render = [], Canvas.render
+    drawn = []
+    render = Canvas.render
     monkeypatch.setattr(
         Canvas, "render", lambda self, area, *rest: drawn.append(area) or render(self, area, *rest)
     )

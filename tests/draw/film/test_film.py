@@ -63,10 +63,8 @@ def machines(picture: np.ndarray) -> np.ndarray:
 
 def share(picture: np.ndarray, colour: str) -> float:
     """Share of pixels whose hue is that of a colour, whatever the light."""
-    pixels, wanted = (
-        machines(picture).reshape(-1, 3).astype(float),
-        np.array(style.rgb(colour), float),
-    )
+    pixels = machines(picture).reshape(-1, 3).astype(float)
+    wanted = np.array(style.rgb(colour), float)
     pixels, wanted = pixels - pixels.min(axis=1, keepdims=True), wanted - wanted.min()
     strong = pixels.max(axis=1) > 60
     alike = pixels @ wanted > 0.985 * np.linalg.norm(pixels, axis=1) * np.linalg.norm(wanted)
@@ -227,7 +225,8 @@ def test_machines_side_by_side_keep_apart(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
     scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
     corners = scene.fixed_boxes(models.compile_model(scenario))[..., :2]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    low = corners.min(axis=1)
+    high = corners.max(axis=1)
     step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]
     for by in (step, 2 * step):
         apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(
@@ -330,7 +329,8 @@ def test_what_is_held_lasts_and_has_no_short_gaps():
 
 
 def test_words_never_flicker():
-    rng, times = np.random.default_rng(0), np.arange(300) / 30
+    rng = np.random.default_rng(0)
+    times = np.arange(300) / 30
     names = [
         states.State("a", states.CALM),
         states.State("b", states.STUCK),

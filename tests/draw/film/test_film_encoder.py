@@ -32,7 +32,8 @@ def test_pictures_are_written_in_order_and_all_by_the_end():
 
 
 def test_no_more_pictures_wait_than_agreed():
-    gate, written = threading.Event(), []
+    gate = threading.Event()
+    written = []
     with in_thread(lambda picture: (gate.wait(), written.append(picture))) as write:
         for _ in range(MAX_WAITING + 1):  # one more is with the writer
             write(PICTURE)

@@ -171,12 +171,14 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
     trace = dataclasses.replace(
         trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)
     )
-    edges, low = np.array([0.08, 0.1, 0.11, 0.24]), np.array([[100.0, 220.0, 260.0, 290.0]])
+    edges = np.array([0.08, 0.1, 0.11, 0.24])
+    low = np.array([[100.0, 220.0, 260.0, 290.0]])
 
     def project(points):
         return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
-    place, find = np.array([[0.1, 0.0, 0.2]]), lambda k, name: np.array([0.4, 0.0, 0.9])
+    place = np.array([[0.1, 0.0, 0.2]])
+    find = lambda k, name: np.array([0.4, 0.0, 0.9])
     stage = SimpleNamespace(where=place, project=project, size=SIZE, scale=0.8, find=find)
     over = arm.Overlay([trace], COLOURS[:1], stage, edges, low)
     within = [(trace.t >= a) & (trace.t < b) for a, b in itertools.pairwise(edges)]
@@ -251,7 +253,8 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_machines_stand_apart_in_their_room_with_their_arrows(kind):
     traces = [machine(law="none", **KINDS[kind]) for _ in range(2)]
-    room, red = camera.Room(30, 60, 610, 270), (1.0, 0.0, 0.0, 1.0)
+    room = camera.Room(30, 60, 610, 270)
+    red = (1.0, 0.0, 0.0, 1.0)
     with Stage(traces, COLOURS, SIZE, room) as stage:
         first, second = stage.shown
         stage.pose(0, np.linspace(0.2, 0.3, first))
@@ -285,7 +288,8 @@ def test_a_model_without_round_shapes_has_no_radii():
     assert roundness(box).tolist() == [0.0, 0.0]
 
 
-GEAR, RUB = {"actuator": smc.Backlash(0.2)}, {"friction": smc.Coulomb(0.2)}
+GEAR = {"actuator": smc.Backlash(0.2)}
+RUB = {"friction": smc.Coulomb(0.2)}
 FLANKS = {"left flank", "right flank"}
 # parts, words while it moves, rests and touches; whether it has dry friction, and contact
 STATES = [
@@ -338,7 +342,8 @@ def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
 
 def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
     two = made(smc.Scenario(plant="cart_pole", law="none", duration=1.0, **RUB, **GEAR))
-    v, force = np.column_stack([0.0 * two.t, 1.0 + two.t]), np.column_stack([two.t, 0.0 * two.t])
+    v = np.column_stack([0.0 * two.t, 1.0 + two.t])
+    force = np.column_stack([two.t, 0.0 * two.t])
     (told,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
     assert told
     assert told.words == "1 of 2 stick, 1 of 2 in play"
@@ -346,7 +351,9 @@ def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
 
 def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     """Of a film, a clip and a still; the pictures are blank."""
-    asked, wrote, told = [], [], []
+    asked = []
+    wrote = []
+    told = []
 
     def blank(frames):
         times = frames.clock.times
@@ -372,7 +379,8 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     monkeypatch.setattr(film, "pictures", blank)
     monkeypatch.setattr(film, "encoder", encoder)
     monkeypatch.setattr(progress.Bar, "advance", lambda bar, work: told.append(work))
-    trace, size = machine("duffing", duration=5.0), (320, 180)
+    trace = machine("duffing", duration=5.0)
+    size = (320, 180)
     looks = {"labels": ["a"], "title": "b", "size": size, "camera": (10.0, -20.0)}
     given = (["a"], "b", size, (10.0, -20.0))
     film.film(trace, tmp_path / "a.mp4", fps=10.0, speed=2.0, **looks)

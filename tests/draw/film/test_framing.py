@@ -63,7 +63,8 @@ def test_machines_fill_the_height_or_the_width(plant, monkeypatch):
     )
     traces = [made(smc.Scenario(plant=plant, law=law, duration=1.0))] * 3
     with filmed(traces, monkeypatch) as (shown, _):
-        low, high = shown.boxes[:, :2].min(axis=0), shown.boxes[:, 2:].max(axis=0)
+        low = shown.boxes[:, :2].min(axis=0)
+        high = shown.boxes[:, 2:].max(axis=0)
         wide, tall = high - low
         assert tall >= 0.7 * STAGE or wide >= 0.85 * SIZE[0]
 
@@ -71,7 +72,8 @@ def test_machines_fill_the_height_or_the_width(plant, monkeypatch):
 def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypatch):
     """The cart stays within 1 m of 0 on a rail of 4.2 m."""
     with filmed(two("cart_pole"), monkeypatch) as (shown, _):
-        whole, cut = smc.plant("cart_pole").load(), shown.model
+        whole = smc.plant("cart_pole").load()
+        cut = shown.model
         rail, post, mark = (
             cut.geom(f"m0/{name}").id for name in ("front_rail", "left_post", "half5")
         )

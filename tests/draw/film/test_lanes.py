@@ -59,7 +59,8 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
         column = picture[
             int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))
         ]
-        paper, ink = np.array([255.0] * 3), np.array(style.rgb(colour), float)
+        paper = np.array([255.0] * 3)
+        ink = np.array(style.rgb(colour), float)
         wanted = paper + charts.LANE_BAND * (ink - paper)
         heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))
     assert heights[0] <= 2

@@ -36,7 +36,9 @@ def test_a_power_law_has_its_exponent_whatever_the_factors_of_its_starts():
 
 
 def test_the_interval_covers_where_errors_and_slopes_scatter():
-    rng, hits, draws = np.random.default_rng(1), 0, 400
+    rng = np.random.default_rng(1)
+    hits = 0
+    draws = 400
     for _ in range(draws):
         slopes = 2.0 + 0.1 * rng.standard_normal((3, 1))
         errors = H**slopes * np.exp(0.2 * rng.standard_normal((3, 5)))
@@ -111,7 +113,8 @@ def test_a_picture_writes_orders_at_the_ends_of_lines_and_draws_none_that_tells_
         }
         return Accuracy(law=name, periods=h, runs=4, failed=0, **about, **scalings)
 
-    told, untold = law("twisting", 1.75, 1.25, 2.25), law("super_twisting", 1.14, -0.21, 2.49)
+    told = law("twisting", 1.75, 1.25, 2.25)
+    untold = law("super_twisting", 1.14, -0.21, 2.49)
     page = orders([told, untold])
     for ax in page.axes:
         fits = [line for line in ax.lines if np.unique(np.asarray(line.get_xdata())).size > 1]

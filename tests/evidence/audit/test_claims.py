@@ -100,7 +100,9 @@ def test_slack_is_the_room_to_the_limit():
 
 # verdicts
 
-YES, NO, ASIDE = check("yes", 1.0, "<", 2.0), check("no", 3.0, "<", 2.0), Beside("theory", 7.0)
+YES = check("yes", 1.0, "<", 2.0)
+NO = check("no", 3.0, "<", 2.0)
+ASIDE = Beside("theory", 7.0)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +252,8 @@ def test_unknown_claims_and_sets_are_refused():
 
 
 def test_late_claims_come_last_and_every_one_is_reported(only):
-    order, told = [], []
+    order = []
+    told = []
     late = dataclasses.replace(
         entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES]
     )
@@ -367,7 +370,9 @@ def test_an_input_gain_multiplies_what_the_actuator_gives_and_not_what_the_law_a
 
 def along(name, period):
     """Finite differences of V along a run, and V' of the map at the same samples."""
-    plant, lam, k1 = find_plant(name), 2.5, 4.0
+    plant = find_plant(name)
+    lam = 2.5
+    k1 = 4.0
     x0 = [0.6] * plant.n  # a network synchronised
     scenario = smc.Scenario(
         plant=plant,
@@ -378,7 +383,8 @@ def along(name, period):
         control_period=period,
     )
     trace = smc.run(scenario)
-    x, v = trace.x[:, 0], trace.v[:, 0]
+    x = trace.x[:, 0]
+    v = trace.v[:, 0]
     height = lyapunov.surface(plant, lam, k1, x, v) ** 2 / 2.0
     measured = (height[2:] - height[:-2]) / (2 * period)
     mapped = lyapunov.vdot(plant, lam, k1, x, v)[1:-1]
@@ -387,7 +393,8 @@ def along(name, period):
 
 @pytest.mark.parametrize("name", PLANTS)
 def test_the_map_is_the_slope_of_v_along_trajectories(name):
-    coarse, fine = along(name, 1e-3), along(name, 2.5e-4)
+    coarse = along(name, 1e-3)
+    fine = along(name, 2.5e-4)
     assert fine < 0.01
     assert (
         3.0 < coarse / fine < 5.0
@@ -397,8 +404,10 @@ def test_the_map_is_the_slope_of_v_along_trajectories(name):
 @pytest.mark.parametrize("name", PLANTS)
 @pytest.mark.parametrize("lam", [0.1, 3.0, 1e3])
 def test_v_rises_on_one_side_of_alpha_0_whatever_lambda_is(name, lam):
-    plant, k1 = find_plant(name), 4.0
-    x, near = 0.7, 1e-6 / lam
+    plant = find_plant(name)
+    k1 = 4.0
+    x = 0.7
+    near = 1e-6 / lam
     sides = lyapunov.vdot(plant, lam, k1, np.full(2, x), -k1 * x + np.array([near, -near]))
     assert sides.max() > 0.0 > sides.min()
 
@@ -433,7 +442,8 @@ def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
 
 
 def test_the_smallest_lambda_is_of_starts_near_rest_without_velocity(monkeypatch):
-    runs, tried = about(("inverted_pendulum_network",)), []
+    runs = about(("inverted_pendulum_network",))
+    tried = []
     trace = SimpleNamespace(t=np.arange(10.0), x=np.zeros((10, 5)))
     monkeypatch.setattr(runs, "traces", lambda grid: tried.extend(grid) or [trace])
     measured.dying(runs, {"inverted_pendulum_network": [2.0]})

@@ -22,15 +22,12 @@ from smc_mujoco.evidence.audit.verdict import (
     summary,
 )
 
-NEAR, FAR = (
-    check("duffing: ripple, m", 0.25, "<", 1.0),
-    check("duffing: settling time, s", math.inf, "<", 3.0),
-)
-LOST, NONE = (
-    check("arm: deviation", math.inf, "<=", 0.02),
-    check("arm: rate, 1/s", math.nan, ">", 4.0),
-)
-EXPONENT, SHARE = Threshold.read("exponent", "2 +- 0.25"), Threshold.read("share", "2 to 15")
+NEAR = check("duffing: ripple, m", 0.25, "<", 1.0)
+FAR = check("duffing: settling time, s", math.inf, "<", 3.0)
+LOST = check("arm: deviation", math.inf, "<=", 0.02)
+NONE = check("arm: rate, 1/s", math.nan, ">", 4.0)
+EXPONENT = Threshold.read("exponent", "2 +- 0.25")
+SHARE = Threshold.read("share", "2 to 15")
 BESIDE = Beside("theory", 7.0)
 
 
@@ -201,8 +198,10 @@ def test_the_figure_has_a_row_for_each_claim_and_a_dot_for_each_check(claims):
         if line.get_marker() == "o":
             for x, y in np.asarray(line.get_xydata()):
                 dots.add((round(x, 3), round(y, 3), line.get_markerfacecolor() != "none"))
-    above, below = -0.125, 0.125
-    holds, never = round(math.log10(0.25), 3), 3.0
+    above = -0.125
+    below = 0.125
+    holds = round(math.log10(0.25), 3)
+    never = 3.0
     due = {(holds, k + above, True) for k in (0, 1, 2, 5)} | {
         (holds, k + below, True) for k in (0, 1, 3, 5)
     }

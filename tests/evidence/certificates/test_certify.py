@@ -87,10 +87,8 @@ def margins(made, theorem="saturated PD"):
 
 def test_margins_are_those_of_the_formulas():
     told = margins(certificate("inverted_pendulum"))
-    p, gains = (
-        smc.plant("inverted_pendulum").parameters,
-        gain_sets.law("inverted_pendulum", "observer_free").gains,
-    )
+    p = smc.plant("inverted_pendulum").parameters
+    gains = gain_sets.law("inverted_pendulum", "observer_free").gains
     weight = p["m"] * p["grav"] * p["l"]
     assert told["damping"] == p["b"]
     assert told["actuator"] == pytest.approx(6.0 - gains["lam"])
@@ -134,7 +132,8 @@ def test_hanging_pendulums_need_more_than_their_weight_to_be_stable_from_everywh
 
 @pytest.mark.parametrize("plant", loops.ONE_JOINT_TERMS)
 def test_the_equations_of_maker_and_checker_are_those_of_the_plant(plant):
-    made, rng = smc.plant(plant), np.random.default_rng(1)
+    made = smc.plant(plant)
+    rng = np.random.default_rng(1)
     e = checker.equation(
         {"name": plant, "n": made.n, "parameters": dict(made.parameters), "mechanism": "equation"}
     )
@@ -190,7 +189,8 @@ def test_a_law_as_strong_as_the_disturbance_reaches_nothing():
 @pytest.mark.slow
 def test_the_margin_of_a_set_is_that_of_its_weakest_place():
     """The weight is largest at pi/2, within the set; at its end the margin is 3.9 N m."""
-    law, within = smc.law("classical", k=5.0, c=0.5), smc.Uncertainty(disturbance=1.0)
+    law = smc.law("classical", k=5.0, c=0.5)
+    within = smc.Uncertainty(disturbance=1.0)
     made = smc.certify(smc.Scenario(plant="inverted_pendulum", law=law), within)
     assert part(made.data, "reaching")["X"] > 3.0
     assert margins(made, "reaching")["reaching"] < 5.0 - 1.0 - 0.5 * 9.81 * 0.5
@@ -199,15 +199,14 @@ def test_the_margin_of_a_set_is_that_of_its_weakest_place():
 @pytest.mark.slow
 def test_levels_of_a_law_that_switches_fall_along_its_surface():
     """Where W is level far out, s = 0 leads nowhere: the outer level lies below."""
-    law, within = smc.law("classical", k=5.0, c=0.3), smc.Uncertainty(disturbance=1.0)
+    law = smc.law("classical", k=5.0, c=0.3)
+    within = smc.Uncertainty(disturbance=1.0)
     assert smc.certify(smc.Scenario(plant="duffing", law=law), within).bound == 0.0
 
 
 def test_the_bound_is_that_of_the_inner_level_to_its_last_digit():
-    plant, law = (
-        smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803),
-        smc.law("classical", k=2.271, c=0.275),
-    )
+    plant = smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803)
+    law = smc.law("classical", k=2.271, c=0.275)
     assert smc.certify(smc.Scenario(plant=plant, law=law, x0=1.58)).bound == 0.0
 
 
@@ -248,7 +247,8 @@ def test_what_has_no_theorem_is_one_sentence(changes, word):
 # the checker
 
 
-SATURATED, LEVELS = "saturated PD", "level sets"
+SATURATED = "saturated PD"
+LEVELS = "level sets"
 
 
 def set_margin(theorem, name, change):
@@ -622,7 +622,8 @@ def test_the_inner_set_lies_where_s_0_is_reached_on_both_sides(side, monkeypatch
         "start": [0, 0],
         "bound": 2,
     }
-    one, law = SimpleNamespace(n=1), SimpleNamespace(room=(1, 1), kind="sgn", c=1)
+    one = SimpleNamespace(n=1)
+    law = SimpleNamespace(room=(1, 1), kind="sgn", c=1)
     for reach, within in ((2, True), (1, False)):
         doc = {"disturbance": 1, "parts": [{"theorem": "reaching", "X": 2, "S": reach}]}
         with (
@@ -711,8 +712,10 @@ def forces(count, d0, rng):
     """The force on each run: constant, with the velocity's sign, against it, and switching at
     random times.
     """
-    kind, period = np.arange(count) % 4, rng.uniform(0.05, 1.0, count)
-    sign, phase = rng.choice([-1.0, 1.0], count), rng.uniform(0.0, 1.0, count)
+    kind = np.arange(count) % 4
+    period = rng.uniform(0.05, 1.0, count)
+    sign = rng.choice([-1.0, 1.0], count)
+    phase = rng.uniform(0.0, 1.0, count)
 
     def d(t, x, v):
         switching = np.sign(np.sin(np.pi * (t / period + phase)))
@@ -723,7 +726,8 @@ def forces(count, d0, rng):
 
 def escapes(plant, count, duration):
     """Runs that leave the certified set, and those that are not within the bound in the end."""
-    d0, rng = FORCE[plant], np.random.default_rng(3)
+    d0 = FORCE[plant]
+    rng = np.random.default_rng(3)
     made = certificate(plant, disturbance=d0)
     x, v = starts(made, count, rng)
     left = np.zeros(count, bool)
@@ -747,7 +751,8 @@ def test_no_start_leaves_its_certified_set_and_all_end_within_the_bound(plant):
 @pytest.mark.parametrize(("plant", "d0"), [("duffing", 2.0), ("inverted_pendulum", 1.0)])
 def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d0):
     """The worst found by the adversary, on the machine that MuJoCo samples."""
-    made, within = certificate(plant, disturbance=d0), smc.Uncertainty(disturbance=d0)
+    made = certificate(plant, disturbance=d0)
+    within = smc.Uncertainty(disturbance=d0)
     worst = smc.worst_case(scenario(plant, duration=4.0), "ultimate_bound", within, budget=16)
     assert made.bound is not None
     assert worst.value <= made.bound <= 2.0 * worst.value
@@ -770,7 +775,8 @@ def test_without_damping_no_bound_holds_from_everywhere():
     """
     free = smc.plant("inverted_pendulum", b=0.0)
     made = smc.certify(smc.Scenario(plant=free, law=gain_sets.law(free, "observer_free")))
-    x, v = np.array([10.0, 20.0]), np.zeros(2)
+    x = np.array([10.0, 20.0])
+    v = np.zeros(2)
     reached = [x for x, _ in steps(made, x, v, lambda t, x, v: np.sign(v), 20.0)]
     late = np.abs(np.array(reached[len(reached) // 2 :])).max(axis=0)
     assert late[0] < 10.0
@@ -784,7 +790,8 @@ def test_an_unknown_gain_of_the_input_needs_only_its_share_of_the_force():
     share = 1.0 - margins(made)["restoring"]
     for low, rests in ((1.02 * share, True), (0.9 * share, False)):
         weak = dataclasses.replace(loop, sigma=lambda s, low=low: low * loop.sigma(s))
-        x, v = np.array([1.5, 0.8, 3.0]), np.zeros(3)
+        x = np.array([1.5, 0.8, 3.0])
+        v = np.zeros(3)
         for _ in range(6_000):
             a = (weak.phi(x) - weak.D(x) * v - weak.sigma(v + weak.c * x)) / weak.M
             v = v + 1e-3 * a

@@ -42,7 +42,8 @@ def loop(law, terms, d0=0.0):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_maker_and_checker_have_the_same_force_of_a_law(law):
-    f, made = checker.feedback({"name": law, "gains": LAWS[law]}, 4.0), loop(law, {})
+    f = checker.feedback({"name": law, "gains": LAWS[law]}, 4.0)
+    made = loop(law, {})
     assert float(f.c) == pytest.approx(made.c)
     assert math.inf if f.a is None else float(f.a) == pytest.approx(made.steep)
     for s in (-3.1, -0.7, -0.05, 0.02, 0.3, 2.6):
@@ -55,7 +56,8 @@ def test_maker_and_checker_have_the_same_force_of_a_law(law):
 def test_gains_of_a_quadratic_law_solve_its_riccati_equation():
     its = Space(name="lqr", **LAWS["lqr"])
     k = np.array([loops.linear_gains(its)])
-    A, P = np.array([[0.0, 1.0], [its.a1, its.a2]]), np.zeros((2, 2))
+    A = np.array([[0.0, 1.0], [its.a1, its.a2]])
+    P = np.zeros((2, 2))
     P[1] = its.r * k / its.b  # k = b' P / r
     P[0, 1] = P[1, 0]
     P[0, 0] = k[0, 0] * its.r * k[0, 1] - its.a1 * P[1, 1] - its.a2 * P[0, 1]
@@ -65,7 +67,9 @@ def test_gains_of_a_quadratic_law_solve_its_riccati_equation():
 
 
 def test_margins_of_a_saturated_law_are_those_of_its_theorem():
-    A, B, C = 0.4, 0.3, -0.2
+    A = 0.4
+    B = 0.3
+    C = -0.2
     e, feeds = (
         Space(**vars(plant(A=A, B=B, C=cubic, E=0.9, kc=0.5)) | {"n": 2}) for cubic in (C, -C)
     )
@@ -122,7 +126,8 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
     [{"A": 0.8}, {"B": -0.7, "E": 0.3}, {"C": -0.9, "F": -0.4}, {"C": 0.5, "E": 2.9, "F": 0.8}],
 )
 def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
-    e, made = plant(**terms), loop("classical", terms)
+    e = plant(**terms)
+    made = loop("classical", terms)
     f = checker.feedback({"name": "classical", "gains": LAWS["classical"]}, 4.0)
     doc = {"disturbance": 0.35, "law": {"name": "classical"}}
 
@@ -141,7 +146,8 @@ def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
     x, s = np.meshgrid(*np.linspace(-1.0, 1.0, 201)[None].repeat(2, 0))
     exact = max(X for X in sizes if strongest(x * X, 0.5 * s * X).max() < 2.3)
     assert 0.85 * exact <= found <= exact
-    margins, least = accepted(found), 2.3 - strongest(x * found, 0.5 * s * found).max()
+    margins = accepted(found)
+    least = 2.3 - strongest(x * found, 0.5 * s * found).max()
     assert margins
     assert least - 0.1 < float(margins["reaching"][0]) <= least
     assert float(margins["actuator"][0]) == pytest.approx(1.7)
@@ -149,13 +155,15 @@ def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
 
 def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_strong_as_the_law():
     terms = {"B": -0.3, "E": 0.4, "F": 0.2}
-    e, made = plant(**terms), loop("classical", terms)
+    e = plant(**terms)
+    made = loop("classical", terms)
     gains = {"k": 2.3, "b": 0.9, "p": 0.7, "bound": 0.55}
     f = checker.feedback({"name": "terminal", "gains": gains}, 4.0)
     doc = {"disturbance": 0.2, "law": {"name": "terminal"}}
 
     def strongest(x):
-        v, vs = 0.9 * x**0.7, 0.9 * x**0.4
+        v = 0.9 * x**0.7
+        vs = 0.9 * x**0.4
         return (
             np.abs(
                 made.phi(x)
@@ -177,13 +185,25 @@ def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_stro
 
 
 def test_margins_of_super_twisting_are_those_of_its_form():
-    X, q, L, d0, slope = 0.4, 0.05, 1.1, 0.15, 0.25
-    B, C, E, F, M, c = -0.6, -0.5, 0.3, -0.2, 1.3, 1.7
-    p, w, r = 4.5, -1.0, 0.97
+    X = 0.4
+    q = 0.05
+    L = 1.1
+    d0 = 0.15
+    slope = 0.25
+    B = -0.6
+    C = -0.5
+    E = 0.3
+    F = -0.2
+    M = 1.3
+    c = 1.7
+    p = 4.5
+    w = -1.0
+    r = 0.97
     gains = {"k1": 3.0, "k2": 2.6, "c": c}
     f = checker.feedback({"name": "super_twisting", "gains": gains}, 4.0)
     det = p * r - w * w
-    z1, z2 = math.sqrt(q * r / det), math.sqrt(q * p / det)
+    z1 = math.sqrt(q * r / det)
+    z2 = math.sqrt(q * p / det)
     v = z1**2 + c * X
     lag = M * c - (E + F * X * X)  # the largest |M c - D|
     fastest = (
@@ -197,10 +217,8 @@ def test_margins_of_super_twisting_are_those_of_its_form():
         "slope": L - fastest - slope,
         "actuator": 4.0 - held - 3.0 * z1,
     }
-    doc, part = (
-        {"disturbance": d0, "slope": slope, "u_max": 4.0},
-        {"P": [p, w, r], "L": L, "q": q, "X": X},
-    )
+    doc = {"disturbance": d0, "slope": slope, "u_max": 4.0}
+    part = {"P": [p, w, r], "L": L, "q": q, "X": X}
     e = plant(B=B, C=C, E=E, F=F)
     margins = checker.super_twisting(doc, part, e, f)
     assert {name: float(value) for name, (value, _) in margins.items()} == pytest.approx(expected)
@@ -228,15 +246,16 @@ def test_margins_of_super_twisting_are_those_of_its_form():
 
 @pytest.mark.parametrize("law", ["observer_free", "boundary_layer", "classical"])
 def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(law):
-    terms, d0 = {"A": 0.4, "B": -0.3, "C": -0.2, "E": 0.6, "F": 0.3}, 0.25
-    e, made = plant(**terms), loop(law, terms, d0)
+    terms = {"A": 0.4, "B": -0.3, "C": -0.2, "E": 0.6, "F": 0.3}
+    d0 = 0.25
+    e = plant(**terms)
+    made = loop(law, terms, d0)
     f = checker.feedback({"name": law, "gains": LAWS[law]}, 4.0)
-    random, seen = np.random.default_rng(6), []
+    random = np.random.default_rng(6)
+    seen = []
     for _ in range(60):
-        x, s = (
-            np.cumsum(random.uniform(0.02, 0.15, 2)),
-            random.choice([-1.0, 1.0]) * random.uniform(0.05, 0.5),
-        )
+        x = np.cumsum(random.uniform(0.02, 0.15, 2))
+        s = random.choice([-1.0, 1.0]) * random.uniform(0.05, 0.5)
         if s > 0.0:
             edges = np.array([s, s + 0.1])
         else:
@@ -245,7 +264,8 @@ def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(l
         corners[3] = corners[1] + corners[2] - corners[0] + random.uniform(-0.01, 0.01)
         least, most = search.falls(made, x, edges, corners.reshape(4, 1, 1))
         a, b = np.meshgrid(np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 5), indexing="ij")
-        X, S = x[0] + a * np.diff(x), edges[0] + b * 0.1
+        X = x[0] + a * np.diff(x)
+        S = edges[0] + b * 0.1
         w00, w10, w01, w11 = corners
         Wx = ((1 - b) * (w10 - w00) + b * (w11 - w01)) / np.diff(x)
         Ws = ((1 - a) * (w01 - w00) + a * (w11 - w10)) / 0.1
@@ -261,9 +281,11 @@ def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(l
 
 def test_a_form_attracts_where_it_falls_on_a_dense_grid():
     terms = {"A": 0.7, "B": 0.2, "C": -0.3, "E": -0.4, "F": 0.5}
-    e, made = plant(**terms), loop("observer_free", terms)
+    e = plant(**terms)
+    made = loop("observer_free", terms)
     f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)
-    h, D0 = 1e-6, float(made.D(np.zeros(())))
+    h = 1e-6
+    D0 = float(made.D(np.zeros(())))
     A = np.array([[-1.7, 1.0], [(0.9 + D0 * 1.7) / 1.3 - 1.7**2, 1.7 - (D0 + 2.3) / 1.3]])
     np.testing.assert_allclose(
         A[1], [made.fall(h, 0.0, 0.0) / h, made.fall(0.0, h, 0.0) / h], rtol=1e-5
@@ -311,12 +333,14 @@ def test_w_is_the_time_to_the_target_along_the_loop():
     """
     terms = {"B": -0.3, "E": 0.6}
     made = loop("observer_free", terms)
-    x, s = search.axis(1.5, 0.01), search.axis(2.5, 0.015)
+    x = search.axis(1.5, 0.01)
+    s = search.axis(2.5, 0.015)
     X, S = np.meshgrid(x, s, indexing="ij")
     far = np.maximum(np.abs(X) / 0.1, np.abs(S) / 0.15) > 1.0
     W = search.times(made, x, s, far.astype(float))
     for i, j in ((150, 130), (180, 160), (165, 70), (60, 150)):
-        z, t = np.array([x[i], s[j]]), 0.0
+        z = np.array([x[i], s[j]])
+        t = 0.0
         while max(abs(z[0]) / 0.1, abs(z[1]) / 0.15) > 1.0:
             half = z + 5e-4 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], 0.0)])
             z, t = (
@@ -365,7 +389,9 @@ def test_the_set_of_a_bounded_disturbance_holds_the_linear_loops_worst_case():
     )
     P = search.form(made, 2.0, lambda P: True)
     assert P is not None
-    Q, z, far = np.linalg.inv(P), np.zeros(2), 0.0
+    Q = np.linalg.inv(P)
+    z = np.zeros(2)
+    far = 0.0
     for k in range(40_000):
         d = 0.5 if (k // 700) % 2 else -0.5
         z = z + 1e-3 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], d)])
@@ -491,11 +517,11 @@ def test_what_is_left_out_is_said_in_full():
 def test_a_window_is_the_widest_range_of_levels_that_no_cell_spoils_and_the_lowest_of_equals():
     its = object.__new__(search._Grid)
     its.x = np.array([0.0, 0.5, 2.0])
-    its.low, its.high = (
-        np.array([[0.25, 0.5], [0.625, 0.0]]),
-        np.array([[0.5, 0.5625], [0.75, 1.0]]),
-    )
-    its.bad, its.border, its.limit = np.array([[True, False], [True, False]]), 1.0, 1.0
+    its.low = np.array([[0.25, 0.5], [0.625, 0.0]])
+    its.high = np.array([[0.5, 0.5625], [0.75, 1.0]])
+    its.bad = np.array([[True, False], [True, False]])
+    its.border = 1.0
+    its.limit = 1.0
     assert its.window() == (0.0, 0.25)
     its.border = 1.125
     assert its.window() == (0.75, 1.125)

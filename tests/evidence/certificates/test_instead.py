@@ -73,7 +73,8 @@ def test_numbers_of_the_page_are_those_of_certificates():
 
 def test_comparisons_of_sentences_hold_with_the_tuned_gains():
     def loop(plant, law):
-        component, found = gain_sets.law(plant, law), smc.plant(plant)
+        component = gain_sets.law(plant, law)
+        found = smc.plant(plant)
         return ONE_JOINT_TERMS[plant](SimpleNamespace(**found.parameters)), SimpleNamespace(
             **component.gains
         )

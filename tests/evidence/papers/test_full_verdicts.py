@@ -66,7 +66,8 @@ def test_readme_counts_the_claims_of_gaber_s_paper():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAPERS)
 def test_full_verdicts_are_those_of_the_page(name):
-    found, shown = full(name), known(name)
+    found = full(name)
+    shown = known(name)
     assert [*found] == [*shown]
     for id, (verdict, words) in found.items():
         told, said = shown[id]

@@ -30,8 +30,12 @@ from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.studies.run_key import description
 
 GABER = paper("gaber")
-OURS, CLASSICAL, ADAPTIVE, HOSMC = "observer_free", "classical", "adaptive", "super_twisting"
-CONDITIONED, UNCLAMPED = "conditioned_super_twisting", "super_twisting_unclamped"
+OURS = "observer_free"
+CLASSICAL = "classical"
+ADAPTIVE = "adaptive"
+HOSMC = "super_twisting"
+CONDITIONED = "conditioned_super_twisting"
+UNCLAMPED = "super_twisting_unclamped"
 T = np.arange(10_001) * 1e-3
 
 Told = Callable[[Scenario], dict[str, float]]
@@ -43,7 +47,8 @@ class Stub(Runs):
 
     def __init__(self, told: Told | None = None, drawn: Drawn | None = None, **about):
         super().__init__(GABER, "study", **about)
-        self.told, self.drawn = told, drawn
+        self.told = told
+        self.drawn = drawn
 
     def scores(self, scenarios):
         assert self.told is not None
@@ -693,7 +698,8 @@ def test_a_broken_law_loses_its_claims():
 
 def test_the_timed_loop_calls_a_law_with_each_state_and_its_four_arrays(monkeypatch):
     monkeypatch.setattr("numba.njit", lambda loop: loop)
-    seen, calls = np.zeros(len(measured.FIELD_INDEX)), []
+    seen = np.zeros(len(measured.FIELD_INDEX))
+    calls = []
     monkeypatch.setattr(measured, "call", lambda *given: calls.append([*given, *seen[[e, de]]]))
     e, de = (measured.FIELD_INDEX[name] for name in ("e", "de"))
     measured._loop.__wrapped__()(
@@ -704,7 +710,8 @@ def test_the_timed_loop_calls_a_law_with_each_state_and_its_four_arrays(monkeypa
 
 def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkeypatch):
     """A clock that ticks 3 s in the first round and 1 s from then on, and a law that is not called."""
-    ticks, seen = itertools.accumulate([0.0, *[3.0] * 3, *[1.0] * 999]), []
+    ticks = itertools.accumulate([0.0, *[3.0] * 3, *[1.0] * 999])
+    seen = []
     monkeypatch.setattr(measured, "perf_counter", lambda: next(ticks))
     monkeypatch.setattr(
         measured, "_loop", lambda: lambda *given: seen.append([np.copy(one) for one in given[1:3]])

@@ -101,7 +101,8 @@ def check_golden(found: dict[str, Record], known: dict[str, Record]) -> None:
 
 def check_runs(name: str, id: str, scenarios: list[Scenario]) -> None:
     """Runs are of the plants and laws that the claim names."""
-    about, entry = paper(name), paper(name).claims[id]
+    about = paper(name)
+    entry = paper(name).claims[id]
     plants = {about.plant(one).name for one in entry.plants}
     laws = {*entry.laws, *(law + variant for law in entry.laws for variant in VARIANTS)}
     assert {scenario.plant.name for scenario in scenarios} <= plants, id
@@ -111,7 +112,8 @@ def check_runs(name: str, id: str, scenarios: list[Scenario]) -> None:
 @contextlib.contextmanager
 def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
     """Simulate each run once, as claims share a third of all steps; move its start by a little."""
-    made, stream = {}, runs.stream
+    made = {}
+    stream = runs.stream
 
     def kept(scenarios, threads):
         keys = [key(scenario.named(None)) for scenario in scenarios]
@@ -162,7 +164,9 @@ def spread(values: list[float]) -> float | list[float]:
     """Return a number to four digits, or seven times the range of what starts moved a little make
     of it.
     """
-    first, low, high = values[0], min(values), max(values)
+    first = values[0]
+    low = min(values)
+    high = max(values)
     if (
         math.isnan(first)
         or low == high

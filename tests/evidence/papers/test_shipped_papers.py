@@ -126,7 +126,9 @@ def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
     """
     from scipy.integrate import quad
 
-    k1, k2, lag = 1.5, 1.1, 5e-3
+    k1 = 1.5
+    k2 = 1.1
+    lag = 5e-3
     amplitude, frequency = predicted(k1, k2, lag)
     omega = math.tau * frequency
     half, _ = quad(lambda angle: math.sin(angle) ** 1.5, 0.0, math.pi)
@@ -144,7 +146,8 @@ FREE = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a m
 
 
 def test_implicit_twisting_has_both_signs_at_the_end_of_the_period():
-    h, rng = 0.05, np.random.default_rng(1)
+    h = 0.05
+    rng = np.random.default_rng(1)
     starts = rng.uniform((-0.2, -1.0), (0.2, 1.0), (40, 2))
     fields = {"plant": smc.plant("duffing", **FREE), "law": implicit_twisting, "u_max": math.inf}
     runs = [
@@ -183,7 +186,8 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
     for x, u, shown in zip(trace.x[:-1, 0], trace.u[:-1, 0], trace.s[:-1, 0], strict=True):
         b = x - position
         assert shown == pytest.approx(b, abs=1e-9)
-        sign, error = b / (h * h * k3), 0.0
+        sign = b / (h * h * k3)
+        error = 0.0
         if abs(sign) > 1.0:
             sign = math.copysign(1.0, b)
             left = lambda z, b=b: (
@@ -214,7 +218,8 @@ def test_a_paper_s_own_laws_are_those_recorded(snapshot):
 
 def test_random_slopes_are_of_one_size_and_keep_within_the_bound():
     d = slopes(0.125, 40.0, 3)
-    t, values = np.array(d.times), np.array(d.values)
+    t = np.array(d.times)
+    values = np.array(d.values)
     assert (t[0], t[-1], values[0], len(t)) == (0.0, 40.0, 0.0, 321)
     assert set(np.round(np.diff(values) / np.diff(t), 9)) == {-1.0, 1.0}
     assert np.abs(values).max() == 1.0
@@ -224,7 +229,8 @@ def test_random_slopes_are_of_one_size_and_keep_within_the_bound():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_triangle_has_mean_0_over_every_period_and_then_goes_on(sign):
     d = flip(0.1, sign)
-    t, values = np.array(d.times), sign * np.array(d.values)
+    t = np.array(d.times)
+    values = sign * np.array(d.values)
     assert (len(t), t[-1]) == (42, pytest.approx(4.1))
     np.testing.assert_allclose(np.diff(values) / 0.1, [*[-1.0, 1.0] * 20, 1.0])
     np.testing.assert_allclose(values[1:-1] + values[:-2], 0.0, atol=1e-12)

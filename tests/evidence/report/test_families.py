@@ -44,7 +44,8 @@ def test_every_law_that_is_compared_is_in_one_family():
 
 def test_a_law_is_scored_in_the_half_of_the_runs_that_did_not_choose_it():
     even = np.arange(RUNS) % 2 == 0
-    own, other = np.where(even, 1.0, 100.0), np.where(even, 100.0, 1.0)
+    own = np.where(even, 1.0, 100.0)
+    other = np.where(even, 100.0, 1.0)
     scores, best = families.told(np.array([own, other]))
     assert best == [1, 0]  # the odd runs choose the second law, for the even ones
     assert (scores == 100.0).all()
@@ -63,10 +64,8 @@ def test_the_lead_is_the_ratio_to_the_next_family_and_sure_where_its_interval_is
 def test_runs_that_share_gains_count_once():
     sets = np.arange(RUNS) % 6  # a run and the sixth after it
     values = np.exp(np.linspace(0.1, 1.2, RUNS))
-    found, by_set = (
-        lead(sets, classical=values, adrc=1.0),
-        np.log(values).reshape(2, 6).mean(axis=0),
-    )
+    found = lead(sets, classical=values, adrc=1.0)
+    by_set = np.log(values).reshape(2, 6).mean(axis=0)
     assert math.log(found.low) == pytest.approx(by_set.min())
     assert math.log(found.high) == pytest.approx(by_set.max())
 

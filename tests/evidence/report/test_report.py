@@ -109,7 +109,11 @@ class Reader(html.parser.HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.ids, self.targets, self.rows, self.table, self.cell = [], [], {}, "", None
+        self.ids = []
+        self.targets = []
+        self.rows = {}
+        self.table = ""
+        self.cell = None
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
@@ -223,11 +227,9 @@ def test_a_score_counts_its_law_s_failed_runs(made, folder):
 
 def test_the_first_line_counts_what_was_run(text, findings):
     (line,) = re.findall(r'<p class="sub">(\d+) runs .*?>(\w+) failed</a>(.*?) seeds each', text)
-    runs, failed, factors = (
-        int(line[0]),
-        line[1],
-        [int(number) for number in re.findall(r"\d+", line[2])],
-    )
+    runs = int(line[0])
+    failed = line[1]
+    factors = [int(number) for number in re.findall(r"\d+", line[2])]
     assert (runs, failed, factors) == (12, "none", [1, 3, 2, 2])  # plants, laws, conditions, seeds
     assert math.prod(factors) == runs == findings.about.runs
 
@@ -460,7 +462,8 @@ def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
     def settling(law, share):
         return Place(law, metric="settles", median=share)
 
-    calm, other = Place("idle"), Place("pid", 3)
+    calm = Place("idle")
+    other = Place("pid", 3)
     assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
     calm = Place("idle", wins=1)
     assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
@@ -603,7 +606,8 @@ class Seen:
     """A page in the browser, with all that it said and asked for."""
 
     def __init__(self, browser, url, width=1400, scheme="light"):
-        self.said, self.asked = [], []
+        self.said = []
+        self.asked = []
         self.page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
         self.page.on(
             "console",

@@ -31,7 +31,8 @@ from smc_mujoco.evidence.rigs.rig import Fall
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.worst_case import WorstCase
 
-NEVER, NONE = math.inf, math.nan
+NEVER = math.inf
+NONE = math.nan
 PLANTS = "duffing", "van_der_pol", "no_plant", "pendulum_network"
 LAWS = "observer_free", "classical", "super_twisting"
 CONDITIONS = "nominal", "noise"
@@ -63,7 +64,8 @@ def scores():
                         width = 0.1 * median if m else 0.0
                     else:
                         width = NONE
-                    wins, level = law == best and (i, j) != (1, 1), (i, j, m) == (1, 1, 1)
+                    wins = law == best and (i, j) != (1, 1)
+                    level = (i, j, m) == (1, 1, 1)
                     yield Score(
                         plant=plant,
                         condition=condition,
@@ -260,7 +262,8 @@ def worst_cases():
 
 def fields():
     for plant in PLANTS:
-        x, v = np.linspace(-2.0, 2.0, 5), np.linspace(-3.0, 3.0, 9)
+        x = np.linspace(-2.0, 2.0, 5)
+        v = np.linspace(-3.0, 3.0, 9)
         s = v[:, None] + 1.5 * x
         yield Field(plant=plant, x=x, v=v, vdot=s * (0.5 - x**2), s=s)
 

@@ -44,7 +44,8 @@ def test_records_find_the_twin_of_their_columns(shown):
         ("run.npz", "emps"),
         ("slow.npz", "emps"),
     ]
-    own, nothing = shown[0].fits["the twin’s"], shown[0].fits["do nothing"]
+    own = shown[0].fits["the twin’s"]
+    nothing = shown[0].fits["do nothing"]
     assert min(own.values()) > 90.0  # the velocity at the start is read off the positions
     assert nothing["u"] == pytest.approx(0.0, abs=1.0)
     assert own["x"] > nothing["x"]

@@ -178,7 +178,8 @@ def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(
 
 
 def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch, snapshot):
-    done, bars = [], Bars(False)
+    done = []
+    bars = Bars(False)
     names = (
         "rigs.repeated grid judged_claims worst_cases all_margins margins_by_set all_basins all_scenes rigs.machines "
         "flight.flight oscillation.oscillations accuracies leaderboard families.leads films.medians scores.scores "
@@ -267,11 +268,10 @@ def test_accuracy_is_of_each_condition_with_the_plan_s_periods(tmp_path, monkeyp
 
 
 def test_v_rises_where_its_rate_is_positive_off_the_surface():
-    x, v = np.array([0.0, 1.0]), np.array([-1.0, 0.0, 2.0])
-    rate, s = (
-        np.array([[1.0, -1.0], [0.0, 2.0], [3.0, 1e-9]]),
-        np.array([[1.0, 1.0], [1.0, -1.0], [1e-6, 1.0]]),
-    )
+    x = np.array([0.0, 1.0])
+    v = np.array([-1.0, 0.0, 2.0])
+    rate = np.array([[1.0, -1.0], [0.0, 2.0], [3.0, 1e-9]])
+    s = np.array([[1.0, 1.0], [1.0, -1.0], [1e-6, 1.0]])
     field = Field(plant="duffing", x=x, v=v, vdot=rate, s=s)
     assert field.rises.tolist() == [[True, False], [False, True], [False, True]]
     assert field.share == 0.5
@@ -286,7 +286,9 @@ def test_v_rises_where_its_rate_is_positive_off_the_surface():
 
 
 def test_a_film_has_every_frame(tmp_path, monkeypatch):
-    written, reached, count = [], [], 30
+    written = []
+    reached = []
+    count = 30
 
     @contextlib.contextmanager
     def encoder(path, shape, fps):
@@ -327,10 +329,8 @@ def test_limit_cycles_are_of_laws_behind_a_lag_and_a_law_without_prediction_is_l
     changes = noted(monkeypatch, "evidence.report.oscillation.step_halving", halved)
     monkeypatch.setattr(oscillation, "chattering", predicted)
     monkeypatch.setattr(oscillation, "channel_cycle", lambda trace: (0.25, 8.0))
-    plan, reached = (
-        dataclasses.replace(SMALL, plants=("duffing",), laws=("pid", "lqr", "classical")),
-        [],
-    )
+    plan = dataclasses.replace(SMALL, plants=("duffing",), laws=("pid", "lqr", "classical"))
+    reached = []
     found = oscillation._on(
         "duffing", plan.laws, 3, lambda done, whole: reached.append((done, whole))
     )
@@ -361,7 +361,8 @@ def test_gains_of_an_audit_are_listed_once_with_their_plants():
     def used(law, plant):
         return type("Used", (), {"scenario": smc.Scenario(plant=plant, law=law)})
 
-    pid, classical = smc.law("pid", kp=3.0), smc.law("classical", k=2.0, c=1.5)
+    pid = smc.law("pid", kp=3.0)
+    classical = smc.law("classical", k=2.0, c=1.5)
     first = {
         "slow": {
             "a": used(pid, "duffing"),

@@ -8,7 +8,8 @@ from smc_mujoco.evidence.rigs.machines import emps
 from smc_mujoco.simulation.time_series import TimeSeries
 
 RECORDED = 0.5814e-3, 0.8522e-3  # m, rms and largest, of the public record
-RIG, PROGRAM = smc.rig("emps"), emps.program()
+RIG = smc.rig("emps")
+PROGRAM = emps.program()
 
 
 def test_the_program_is_periodic_and_as_fast_as_recorded():
@@ -37,7 +38,8 @@ def test_the_error_at_constant_speed_is_that_of_the_formula():
     """v / kp + F / (kv kp force_per_volt), with F the friction at that speed, late on the longest
     plateau.
     """
-    q, gains = RIG.values, RIG.scenario().law.gains
+    q = RIG.values
+    gains = RIG.scenario().law.gains
     trace = smc.run(
         RIG.scenario(reference=PROGRAM, duration=2.4, x0=emps.START[0], v0=emps.START[1])
     )

@@ -82,9 +82,13 @@ def test_the_laws_of_a_rotary_pendulum_slide_on_its_own_surface_of_least_cost(na
         rig = smc.rig(name)
     else:
         rig = smc.rig(name, pendulum_inertia=1.0215e-4)
-    p, q = rig.scenario("none").plant.values({}), rig.values
-    Jp, lever, weight = p.Jc + p.m * p.l**2, p.m * p.L * p.l, p.m * p.grav * p.l
-    A, b = np.zeros((4, 4)), np.zeros((4, 1))
+    p = rig.scenario("none").plant.values({})
+    q = rig.values
+    Jp = p.Jc + p.m * p.l**2
+    lever = p.m * p.L * p.l
+    weight = p.m * p.grav * p.l
+    A = np.zeros((4, 4))
+    b = np.zeros((4, 1))
     A[0, 2] = A[1, 3] = 1.0
     if drag:  # a motor on a voltage turns the arm
         inverse = np.linalg.inv([[p.J + p.m * p.L**2, lever], [lever, Jp]])

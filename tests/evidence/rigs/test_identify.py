@@ -33,7 +33,8 @@ def carriage(x, v, force, time, m, b, dry, constant):
         if v == 0.0 and abs(net) <= dry:
             break
         sign = math.copysign(1.0, v or net)
-        final, lag = (net - dry * sign) / b, m / b
+        final = (net - dry * sign) / b
+        lag = m / b
         if v and final * sign < 0.0:
             stop = lag * math.log((v - final) / -final)
         else:
@@ -49,11 +50,13 @@ def axis_record(seconds, begin=0.0, speed=4.0):
     """Columns of the real axis on a sine from rest, as its encoder, cascade and amplifier would
     write them.
     """
-    quantum, gains = AXIS.values["count"], AXIS.scenario().law.gains
+    quantum = AXIS.values["count"]
+    gains = AXIS.scenario().law.gains
     t = 1e-3 * np.arange(round(seconds / 1e-3) + 1)
     r = 0.05 * np.sin(speed * t)
     y, u = np.zeros((2, len(t)))
-    x, v = 0.0, 0.0
+    x = 0.0
+    v = 0.0
     for k in range(len(t)):
         y[k] = quantum * math.floor(x / quantum + 0.5)
         rate = (y[k] - y[k - 1]) / 1e-3 if k else 0.0
@@ -161,7 +164,8 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
 
 
 def test_noise_is_read_off_a_moving_record():
-    t, rng = 1e-3 * np.arange(4000), np.random.default_rng(5)
+    t = 1e-3 * np.arange(4000)
+    rng = np.random.default_rng(5)
     record = {"x": 0.3 * np.sin(20.0 * t) + rng.normal(0.0, 2e-4, len(t))}
     record["x"][2000:] += 0.1  # a jump
     assert records.noise(record, records.Columns()) == pytest.approx(2e-4, rel=0.05)
@@ -179,7 +183,8 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
     assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(
         error.value
     )
-    known, errors = {"coulomb": 1.0, "offset": -1.0}, {"coulomb": 2.0, "offset": 3.0}
+    known = {"coulomb": 1.0, "offset": -1.0}
+    errors = {"coulomb": 2.0, "offset": 3.0}
     with pytest.raises(
         smc.ScenarioError, match=r"tell coulomb \(1 ± 2\) and offset \(-1 ± 3\) apart: leave"
     ):
@@ -304,7 +309,8 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     standard errors but for 1 in 16,000. The square of a jackknife's error, of n blocks, is the true
     one times chi squared / (n - 1), and what the steps add is at most half of it.
     """
-    record, rare = pushed(2026, seconds), math.erfc(4.0 / math.sqrt(2.0))
+    record = pushed(2026, seconds)
+    rare = math.erfc(4.0 / math.sqrt(2.0))
     found = smc.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
     assert min(found.fits[0].values()) >= min(found.fits_before[0].values())
     free = uncertainty.BLOCKS[0] - 1
@@ -455,7 +461,8 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
 def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
-    t, measured = np.arange(3.0), {"x": np.array([1.0, 2.0, 6.0]), "u": np.array([0.5, 0.0, 4.0])}
+    t = np.arange(3.0)
+    measured = {"x": np.array([1.0, 2.0, 6.0]), "u": np.array([0.5, 0.0, 4.0])}
     twins = {
         "twin": {name: 2.0 * values for name, values in measured.items()},
         "driver": dict.fromkeys(measured, t),

@@ -46,17 +46,22 @@ class Curve(Replays):
         self.pieces = [
             Piece(0, None, 0, {"y": y[part]}, {"y": spread}, np.ones(1)) for part in self.parts
         ]
-        self.names, self.free, self.data, self.evaluations = ["a", "b"], np.arange(1), [None], 0
-        self.low, self.high, self.first, self.tried = (
-            np.array([0.0, -50.0]),
-            np.array([80.0, 50.0]),
-            start,
-            [],
-        )
+        self.names = ["a", "b"]
+        self.free = np.arange(1)
+        self.data = [None]
+        self.evaluations = 0
+        self.low = np.array([0.0, -50.0])
+        self.high = np.array([80.0, 50.0])
+        self.first = start
+        self.tried = []
 
-        self.steps, self.corrections, self.closed, self.report = {}, None, False, lambda count: None
+        self.steps = {}
+        self.corrections = None
+        self.closed = False
+        self.report = lambda count: None
         self.twin = SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=(), x=("y",)))
-        self.replayed, self.lag = [], 0.0
+        self.replayed = []
+        self.lag = 0.0
 
     @property
     def start(self):
@@ -217,13 +222,12 @@ def test_a_jackknife_leaves_out_one_block_after_the_other():
 
 def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_are_too_short():
     """Of 40 lines through 400 samples, whose errors last 50 samples, or are independent."""
-    random, J = (
-        np.random.default_rng(3),
-        np.column_stack([np.ones(400), np.linspace(-1.0, 1.0, 400)]),
-    )
+    random = np.random.default_rng(3)
+    J = np.column_stack([np.ones(400), np.linspace(-1.0, 1.0, 400)])
     inverse_normal = np.linalg.inv(J.T @ J)
     for memory, low, high in ((0.96, 0.7, 1.7), (0.0, 0.7, 1.3)):
-        shares, blocks = [], []
+        shares = []
+        blocks = []
         for _ in range(40):
             noise = random.normal(size=400)
             for k in range(1, 400):
@@ -244,7 +248,8 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
 @pytest.mark.parametrize(("memory", "count"), [(0.0, 400), (0.9, 105), (0.995, 60)])
 def test_blocks_are_as_long_as_residuals_depend_on_each_other(memory, count):
     """Of a residual whose correlation falls by `memory` from sample to sample, in two columns."""
-    random, r = np.random.default_rng(2), np.zeros((20_000, 2))
+    random = np.random.default_rng(2)
+    r = np.zeros((20_000, 2))
     for k in range(1, len(r)):
         r[k] = memory * r[k - 1] + random.normal(size=2)
     slopes = Slopes(Point(np.zeros(0), np.zeros(0)), [r.ravel()], [], [], 2, 1)

@@ -89,7 +89,8 @@ def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_d
 
     Wrong is off by over a sixteenth of a pitch.
     """
-    values, off = Values(**RIG.values), []
+    values = Values(**RIG.values)
+    off = []
     for record, whole in brushes:
         ends = np.linspace(round(START_TIME / PERIOD), len(record["t"]), parts + 1).astype(int)
         for first, last in itertools.pairwise(ends):

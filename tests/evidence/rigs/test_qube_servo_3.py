@@ -44,10 +44,8 @@ def test_the_cable_takes_energy_from_a_turn_and_hardly_any_from_a_fall():
     loss.
     """
     rig = smc.rig("qube_servo_3")
-    stiff, none = (
-        rig.with_values({"cable_stiffness": 10.0}),
-        rig.with_values({"cable_friction": 0.0}),
-    )
+    stiff = rig.with_values({"cable_stiffness": 10.0})
+    none = rig.with_values({"cable_friction": 0.0})
     assert falls(stiff)[1] > 3.0 * DAMPING
     assert step_error(none) > 0.1
 
@@ -74,10 +72,8 @@ def test_its_laws_have_the_surface_of_least_quadratic_cost_of_its_arm_pendulum_a
 
     rig = smc.rig("qube_servo_3")
     q = SimpleNamespace(**rig.values)
-    per_volt, pull = (
-        q.torque_constant / q.resistance,
-        q.pendulum_mass * q.arm_length * q.pendulum_centre,
-    )
+    per_volt = q.torque_constant / q.resistance
+    pull = q.pendulum_mass * q.arm_length * q.pendulum_centre
     around = q.arm_inertia + q.rotor_inertia + q.pendulum_mass * q.arm_length**2
     swinging = q.pendulum_inertia + q.pendulum_mass * q.pendulum_centre**2
     inverse = np.linalg.inv([[around, pull], [pull, swinging]])
@@ -87,10 +83,8 @@ def test_its_laws_have_the_surface_of_least_quadratic_cost_of_its_arm_pendulum_a
             [0.0, q.pendulum_mass * q.gravity * q.pendulum_centre, 0.0, 0.0],
         ]
     )
-    A, b = (
-        np.vstack([np.eye(4)[2:], inverse @ forces]),
-        np.concatenate([np.zeros(2), inverse[:, 0]])[:, np.newaxis],
-    )
+    A = np.vstack([np.eye(4)[2:], inverse @ forces])
+    b = np.concatenate([np.zeros(2), inverse[:, 0]])[:, np.newaxis]
     P = solve_continuous_are(A, b, np.diag([1.0, 10.0, 0.05, 0.05]), [[2000.0]])
     surface = (b.T @ P).ravel() / 2000.0 / per_volt
     for law in rig.laws:

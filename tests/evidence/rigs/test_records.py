@@ -129,8 +129,10 @@ def test_a_run_becomes_the_record_that_the_machine_would_write():
         sensor=smc.Encoder(500, bias=0.1),
         feedforward=smc.Sine(0.3, 9.0),
     )
-    trace, names = made(plain), dataclasses.replace(NAMES, state=("px", "pq", "vx", "vq"))
-    quantum, noisy = math.tau / 500, dataclasses.replace(plain, noise=smc.Noise(0.05), seed=4)
+    trace = made(plain)
+    names = dataclasses.replace(NAMES, state=("px", "pq", "vx", "vq"))
+    quantum = math.tau / 500
+    noisy = dataclasses.replace(plain, noise=smc.Noise(0.05), seed=4)
     found, other = (
         records.of_trace(dataclasses.replace(trace, scenario=one), names) for one in (plain, noisy)
     )

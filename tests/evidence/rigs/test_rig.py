@@ -20,7 +20,8 @@ QUBE = smc.rig("qube_servo")
 
 def recorded(trace, **changes):
     """The record that a QUBE-Servo would have written of a run."""
-    t, bias = trace.t, trace.scenario.sensor.bias
+    t = trace.t
+    bias = trace.scenario.sensor.bias
     zero = np.zeros(len(t))
     record = {
         "t": t,
@@ -159,7 +160,8 @@ def test_the_replay_is_the_controllers_own_command(record):
     rng = np.random.default_rng(3)
     theta, alpha, feedforward = rng.normal(0.0, 0.01, (3, len(target)))
     e = np.column_stack([theta - record["target_theta"], alpha - target])
-    d, u = np.zeros(2), np.zeros(len(target))
+    d = np.zeros(2)
+    u = np.zeros(len(target))
     for k in range(len(target)):
         if k:
             d = (50.0 * (e[k] - e[k - 1]) + d) / (1.0 + 50.0 * 2e-3)
@@ -171,7 +173,8 @@ def test_the_replay_is_the_controllers_own_command(record):
         "feedforward": feedforward,
     }
     scenario = QUBE.replay(changed, start=start)
-    memory, first = np.zeros(5), round(start / 2e-3)
+    memory = np.zeros(5)
+    first = round(start / 2e-3)
     gains = python_controller.Values(**scenario.law.gains)
     for k in range(400):
         r = python_controller.evaluate(scenario.reference, k * 2e-3)[0]
@@ -211,7 +214,8 @@ def test_a_part_outside_of_the_record_gets_one_sentence(part, sentence, record):
 def test_a_replay_is_an_ordinary_scenario(record, tmp_path):
     """Both loops run it, and a file brings it back with its controller."""
     scenario = QUBE.replay(record, duration=0.2)
-    trace, other = smc.run(scenario), reference.run(scenario)
+    trace = smc.run(scenario)
+    other = reference.run(scenario)
     for name in ARRAYS:
         np.testing.assert_allclose(
             getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name
@@ -317,7 +321,8 @@ def test_the_delay_is_a_whole_number_of_steps():
 def test_a_record_is_a_trace_of_what_was_measured(record):
     """Shifted by the encoder's offset, so that a film shows the machine where its twin counts from."""
     trace = QUBE.measured(record, start=3.0, duration=1.0)
-    part, bias = slice(1500, 2001), QUBE.values["encoder_offset"]
+    part = slice(1500, 2001)
+    bias = QUBE.values["encoder_offset"]
     np.testing.assert_allclose(trace.t, record["t"][part] - 3.0, atol=1e-12)
     np.testing.assert_allclose(trace.x[:, 1], record["alpha"][part] - bias, atol=1e-12)
     np.testing.assert_array_equal(trace.u[:, 0], record["plant_input"][part])

@@ -40,7 +40,8 @@ LAYER = {
 
 @pytest.mark.parametrize("kind", LAYER)
 def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
-    at, h = {"ALPHA": 0.6, "ALPHA_RATE": 2.0, "THETA": 1.0, "THETA_RATE": -3.0}, 1e-3
+    at = {"ALPHA": 0.6, "ALPHA_RATE": 2.0, "THETA": 1.0, "THETA_RATE": -3.0}
+    h = 1e-3
 
     def of(**moved):
         return firmware.acceleration(kind, moved["ALPHA"], memory(**moved), 1.0, 0.0)[0] / STEPS
@@ -82,7 +83,8 @@ def test_rates_are_tustins_filter_with_the_nominal_period():
 
 
 def test_a_move_is_a_trapezoid_that_ends_at_its_target():
-    m, rates = memory(), []
+    m = memory()
+    rates = []
     for k in range(600):
         target = 20.0 if k < 400 else 19.0
         firmware.move(target, m, TICK)
@@ -120,7 +122,8 @@ def record(
     alpha=lambda t: 0.0 * t, theta=lambda t: 0.0 * t, speed=lambda t: 0.0 * t, duration=60.0
 ):
     """A record of known signals, degrees and steps/s, in rows of 20 ms."""
-    t, h = 0.02 * np.arange(round(duration / 0.02)), 1e-6
+    t = 0.02 * np.arange(round(duration / 0.02))
+    h = 1e-6
     rates = ((f(t + h) - f(t - h)) / (2.0 * h) for f in (alpha, theta))
     measured = (alpha(t), next(rates), theta(t), next(rates))
     columns = (1e3 * t, *measured, 10.0 + 0.0 * t, speed(t), STEPS * theta(t), 0.0 * t)
@@ -201,7 +204,8 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
 
 
 def test_a_recording_is_loaded_and_a_bad_one_refused(tmp_path):
-    rows, path = record(np.sin), tmp_path / "hold.csv"
+    rows = record(np.sin)
+    path = tmp_path / "hold.csv"
 
     def write(names):
         with path.open("w", newline="") as file:

@@ -60,10 +60,8 @@ def test_the_rows_of_emps_are_those_of_its_program():
 
 @pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
 def test_rows_are_those_of_the_records():
-    record, twin = (
-        dict(np.load(DATA / "double_pendulum-acrobot-mcpilco-01.npz")),
-        smc.rig("realaigym_acrobot"),
-    )
+    record = dict(np.load(DATA / "double_pendulum-acrobot-mcpilco-01.npz"))
+    twin = smc.rig("realaigym_acrobot")
     told = row("realaigym_acrobot", "acrobot 2", "tau_meas2 rms")
     ((predicted, measured, _),) = twin.predictions([record])
     assert told.machine == pytest.approx(np.std(measured["tau_meas2"]), rel=1e-3)
@@ -186,9 +184,11 @@ def test_the_command_tells_all_machines_or_one(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
 def test_rows_of_the_qube_servo_are_those_of_its_records():
-    twin, record = smc.rig("qube_servo"), dict(np.load(DATA / "qube-11.npz"))
+    twin = smc.rig("qube_servo")
+    record = dict(np.load(DATA / "qube-11.npz"))
     ((predicted, measured, _),) = twin.predictions([record])
-    fit, driver = twin.fit(record), twin.set("driver").predictions([record])[0][0]
+    fit = twin.fit(record)
+    driver = twin.set("driver").predictions([record])[0][0]
     for column, name in zip(measured, fit, strict=True):
         told = row("qube_servo", "11", f"{column} rms")
         values = np.std(measured[column]), np.std(predicted[column]), np.std(driver[column])

@@ -76,7 +76,8 @@ def compiled(folder):
 @pytest.fixture(scope="module")
 def traces(compiled):
     """(law, way) -> its trace, and that of its C, on one plant after the other."""
-    pairs, given = {}, itertools.cycle(PLANTS)
+    pairs = {}
+    given = itertools.cycle(PLANTS)
     for name, template in LAWS.items():
         for way, more in enumerate(WAYS):
             if "surface" in more and (template.relative_degree != 1 or template.plants):
@@ -129,10 +130,8 @@ def back(folder: Path, law, numbers="double", **more) -> CLaw:
 
 def measured(k: int, rng) -> list[float]:
     """Some measurement, with model and surface now and then."""
-    e, de = (
-        0.5 * math.cos(0.02 * k) + 0.01 * rng.normal(),
-        0.05 * rng.normal() - 0.3 * math.sin(0.02 * k),
-    )
+    e = 0.5 * math.cos(0.02 * k) + 0.01 * rng.normal()
+    de = 0.05 * rng.normal() - 0.3 * math.sin(0.02 * k)
     given = [
         1e-3 * k,
         1e-3,
@@ -172,17 +171,14 @@ def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(tra
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SINGLE)
 def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
-    law, f = LAWS[name](), np.float32
-    ours, theirs = (
-        back(folder, law, "float", flags=["-Wdouble-promotion"]),
-        rebuild(law.function, lambda g: g),
-    )
+    law = LAWS[name]()
+    f = np.float32
+    ours = back(folder, law, "float", flags=["-Wdouble-promotion"])
+    theirs = rebuild(law.function, lambda g: g)
     read = gains_of(law)
-    gains, memory, rng = (
-        type(read)(*map(f, read)),
-        np.zeros(law.memory, f),
-        np.random.default_rng(0),
-    )
+    gains = type(read)(*map(f, read))
+    memory = np.zeros(law.memory, f)
+    rng = np.random.default_rng(0)
     for k in range(200):
         y = Measurement(*map(f, measured(k, rng)))
         before = memory.astype(float)
@@ -218,10 +214,8 @@ def test_fixed_point_is_the_library_s_to_the_last_bit(folder, plant):
     (folder / "q15.c").write_text(
         smc.exchange.law_to_c(smc.law("observer_free", lam=5.0, k1=1.7), "q15")
     )
-    mine, theirs = (
-        smc.exchange.law_from_c(folder / "q15.c", flags=STRICT),
-        smc.law("observer_free_q15", lam=5.0, k1=1.7),
-    )
+    mine = smc.exchange.law_from_c(folder / "q15.c", flags=STRICT)
+    theirs = smc.law("observer_free_q15", lam=5.0, k1=1.7)
     for more in WAYS:
         first, second = smc.run([scenario(law, plant, **more) for law in (mine, theirs)])
         assert first.failure is None
@@ -240,12 +234,14 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
         "LAM": 24576,
     }  # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
     core = back(folder, smc.law("observer_free"), "q15").library.smc_q15_u
-    core.restype, core.argtypes = ctypes.c_int16, [ctypes.c_int16] * 2
+    core.restype = ctypes.c_int16
+    core.argtypes = [ctypes.c_int16] * 2
     assert core(-32768, 24576) == core(
         -32767, 24576
     )  # which the sliding variable's function never gives
     s = np.arange(-32767, 32768)
-    i, part = np.abs(s) >> 7, np.abs(s) & 127
+    i = np.abs(s) >> 7
+    part = np.abs(s) & 127
     T = q15.TABLE[i] + ((np.diff(q15.TABLE, append=0)[i] * part + 64) >> 7)
     assert [core(int(n), 24576) for n in s] == (-np.sign(s) * ((24576 * T + 2**14) >> 15)).tolist()
 
@@ -253,13 +249,16 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
 # users' laws
 
 
-WIDTH, QUARTERS, NOUGHT = 0.5, (1, 2, 3), -0.0
+WIDTH = 0.5
+QUARTERS = (1, 2, 3)
+NOUGHT = -0.0
 
 
 @smc.law_function(gains={"k": 2.0, "out": 3.0, "if_": 1.5}, memory=4)
 def turns(z, K, state):
     """Every turn of Python that there is: */ and /* too."""
-    a, b = z.e, z.de
+    a = z.e
+    b = z.de
     a, b = b, a  # at once
     count: int = 0
     double = 0
@@ -291,18 +290,24 @@ def turns(z, K, state):
     s, _ = sliding(z, K.k)
     state[0], state[1] = state[1], state[0] + s
     if state[0] > state[1]:
-        high, low = (0.75, 0.25)
+        high = 0.75
+        low = 0.25
     else:
-        high, low = (a, b)
+        high = a
+        low = b
     memory = high - (low - (a - b)) / (2.0 / (b * b + 1.0))
     u = -K.out * math.tanh(s) - -NOUGHT * a - K.if_ * double + late * abs(count) + memory
     return u, s + state[2] + (1 if a > b else 0.5) + state[3]
 
 
 def test_a_law_with_every_turn_of_python_gives_what_it_gives(folder):
-    law, rng = turns(), np.random.default_rng(1)
-    ours, theirs = back(folder, law), rebuild(law.function, lambda g: g)
-    mine, its, gains = np.zeros(4), np.zeros(4), gains_of(law)
+    law = turns()
+    rng = np.random.default_rng(1)
+    ours = back(folder, law)
+    theirs = rebuild(law.function, lambda g: g)
+    mine = np.zeros(4)
+    its = np.zeros(4)
+    gains = gains_of(law)
     for k in range(300):
         y = Measurement(*measured(k, rng))
         assert ours(y, gains, mine) == pytest.approx(theirs(y, gains, its), rel=1e-14, abs=1e-14)
@@ -323,16 +328,17 @@ def main(a):
 @smc.law_function
 def taken(y, gains, memory):
     """Names that C has for something else."""
-    bool, nan, linux, isnan = 1.0, y.de, 2.0, erf(y.e)
+    bool = 1.0
+    nan = y.de
+    linux = 2.0
+    isnan = erf(y.e)
     return main(bool) + y0[1] * nan + linux, isnan
 
 
 @pytest.mark.parametrize("dialect", ["-std=c99", "-std=gnu17"])
 def test_names_that_c_has_for_something_else_are_other_names_in_it(folder, dialect):
-    function, y = (
-        back(folder, taken(), flags=[dialect]),
-        Measurement(*measured(7, np.random.default_rng(2))),
-    )
+    function = back(folder, taken(), flags=[dialect])
+    y = Measurement(*measured(7, np.random.default_rng(2)))
     assert function(y, (), np.zeros(1)) == taken.function(y, (), np.zeros(1))
 
 
@@ -349,7 +355,8 @@ def numpy_signs(a):
 @pytest.mark.parametrize("e", [math.nan, 0.0, -0.0, 1.0, -1.0])
 def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
     y = Measurement(*[0.0] * 11)._replace(e=e, de=-e)
-    found, wanted = back(folder, signs())(y, (), np.zeros(1)), numpy_signs(e)
+    found = back(folder, signs())(y, (), np.zeros(1))
+    wanted = numpy_signs(e)
     np.testing.assert_array_equal(found, wanted)
     if not math.isnan(e):  # whose sign no operation promises
         np.testing.assert_array_equal(np.signbit(found), np.signbit(wanted))
@@ -416,7 +423,8 @@ def test_the_file_says_formula_source_gains_and_sizes(tmp_path):
     assert not end.value.code
     head, _, rest = text.partition("*/")
     assert head.startswith("/* super_twisting: a control law in C99, written out by smc_mujoco ")
-    gains, state = "k1 = 5, k2 = 4.4, c = 1.5, w_max = inf", "4 bytes a channel, memory[1]"
+    gains = "k1 = 5, k2 = 4.4, c = 1.5, w_max = inf"
+    state = "4 bytes a channel, memory[1]"
     for words in ("u = -k1 [s]^(1/2) + w", "A. Levant", gains, state):
         assert words in head
     assert re.search(r"code     [1-9]\d\d bytes, and \d+ of constants", head)

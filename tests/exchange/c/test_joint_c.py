@@ -62,7 +62,8 @@ def inside(a, b):
 
 @njit
 def neighbours(a, order):
-    w, signs = np.zeros(len(a)), np.array([1, -1, 2])
+    w = np.zeros(len(a))
+    signs = np.array([1, -1, 2])
     for i in range(len(a)):  # the first reads the last element, as a[-1]
         w[i] = a[order[i]] - signs[order[i] - 1] * a[i - 1]
     return w
@@ -72,7 +73,8 @@ def neighbours(a, order):
 def turns(y, gains, memory):
     """Every turn of Python with arrays that there is."""
     n = len(y.x)
-    s, twice = y.de + gains.c * y.e, np.zeros(n)
+    s = y.de + gains.c * y.e
+    twice = np.zeros(n)
     s = s + 0.1 * product(y.M, s)
     s = s - s[0] * y.e  # reads an element that it changes
     s = s + 0.01 * neighbours(s, ORDER)
@@ -91,7 +93,8 @@ def turns(y, gains, memory):
             memory[i, 2] = memory[i, 1]
         else:
             memory[i, 2] = math.tanh(y.a[i] / y.limit[i])
-    table, column = np.ones((2, n)), np.empty((n, n))
+    table = np.ones((2, n))
+    column = np.empty((n, n))
     table[1] = s * EACH
     column[:, 0] = table[1]
     for i in range(1, n):
@@ -170,7 +173,10 @@ def sum_and_difference(a, b):
 def parts(y, gains, memory):
     """Every turn of Python with parts of arrays and tuples that there is."""
     n = len(y.x)
-    s, u, kept, table = y.de + gains.c * y.e, np.zeros(n), memory[:, 0], np.zeros((3, n))
+    s = y.de + gains.c * y.e
+    u = np.zeros(n)
+    kept = memory[:, 0]
+    table = np.zeros((3, n))
     q = s[0], 0.5, -s[2]
     q = q[1], q[2], q[0] + len(q)
     if y.t > 0.05:
@@ -314,15 +320,20 @@ def test_the_reference_loop_calls_it_alike(compiled, name):
 def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(folder, name):
     (path := folder / f"{name}-single.c").write_text(smc.exchange.law_to_c(name, "float", joints=3))
     flags = (*STRICT, "-Wdouble-promotion")
-    single, law = smc.exchange.law_from_c(path, flags=flags, timeout=60.0).function, LAWS[name]()
-    rng, memory = np.random.default_rng(3), np.zeros((3, law.memory))
+    single = smc.exchange.law_from_c(path, flags=flags, timeout=60.0).function
+    law = LAWS[name]()
+    rng = np.random.default_rng(3)
+    memory = np.zeros((3, law.memory))
     theirs = python_controller.PythonComponent(law, 3)
     for k in range(20):
         vectors = rng.normal(size=(9, 3)).astype(np.float32).astype(float)
-        M, h, g = np.eye(3) + 0.1, rng.normal(size=3), rng.normal(size=3)
+        M = np.eye(3) + 0.1
+        h = rng.normal(size=3)
+        g = rng.normal(size=3)
         y = JointMeasurement(1e-3 * k, 1e-3, 1.0, Nothing(), *vectors, M, h, g)
         theirs.memory[:] = memory[:, : law.memory]
-        expected, found = theirs.call_joint(y), single(y, gains_of(law, 3), memory)
+        expected = theirs.call_joint(y)
+        found = single(y, gains_of(law, 3), memory)
         for ours, wanted in zip(found, expected, strict=True):
             # it divides a difference of velocities by dt
             if name == "time_delay_sliding":
@@ -337,7 +348,9 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
 @smc.law_function(joint=True)
 def edges(y, gains, memory):
     """What numpy's functions make of zeros and NaN."""
-    low, high, sign = np.minimum(y.x, y.v), np.maximum(y.x, y.v), np.sign(y.x)
+    low = np.minimum(y.x, y.v)
+    high = np.maximum(y.x, y.v)
+    sign = np.sign(y.x)
     return np.array([low[0], high[1], sign[2]]), np.where(y.x > y.v, low, high)
 
 
@@ -348,9 +361,11 @@ def edges(y, gains, memory):
 )
 def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
     (path := folder / "edges.c").write_text(smc.exchange.law_to_c(edges, joints=3))
-    c, zero = smc.exchange.law_from_c(path, flags=STRICT).function, np.zeros(3)
+    c = smc.exchange.law_from_c(path, flags=STRICT).function
+    zero = np.zeros(3)
     for v in ((0.0, 0.0, 0.0), (-0.0, -0.0, 1.0), (2.0, math.nan, math.nan)):
-        x_, v_ = np.array(x), np.array(v)
+        x_ = np.array(x)
+        v_ = np.array(v)
         y = JointMeasurement(0.0, 1e-3, 0.0, Nothing(), x_, v_, *[zero] * 7, np.eye(3), zero, zero)
         numbers = extremes(x_, v_)
         found, _ = c(y, (), np.zeros((3, 8)))

@@ -209,7 +209,8 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
 
 
 def test_two_laws_of_one_library_are_two(file, tmp_path):
-    target, text = tmp_path / "laws.so", law("out[0] = -y->e;")
+    target = tmp_path / "laws.so"
+    text = law("out[0] = -y->e;")
     second = text.partition("int ")[2].replace("smc_law(", "other(").replace("-y->e", "-2 * y->e")
     source = file(text + "int " + second)
     line = [
@@ -243,10 +244,8 @@ def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
     assert all(
         each == first and hash(each.law.function) == hash(first.law.function) for each in copies
     )
-    wider, renamed = (
-        smc.exchange.law_from_c(path, memory=20),
-        smc.exchange.law_from_c(path, name="other"),
-    )
+    wider = smc.exchange.law_from_c(path, memory=20)
+    renamed = smc.exchange.law_from_c(path, name="other")
     edited = smc.exchange.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
     functions = {each.function for each in (first.law, wider(), renamed(), edited())}
     assert len(functions) == 4
@@ -314,7 +313,8 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
         )(k=4.0),
         noise=None,
     )
-    kept, trace = pickle.dumps([first, first]), smc.run(first)
+    kept = pickle.dumps([first, first])
+    trace = smc.run(first)
     file(law("out[0] = y->e;"))
     one, two = pickle.loads(kept)
     assert str(one.law) == "mine(k=4)"
@@ -611,7 +611,8 @@ def test_a_library_that_changes_the_rounding_is_found_too(file, tmp_path):
     subprocess.run(line, check=True)
     with pytest.raises(smc.ScenarioError, match=re.escape(f"a.so: smc_law {ALTERS}")):
         smc.exchange.law_from_c(tmp_path / "a.so", isolate=True)
-    ours, theirs = scenario("super_twisting"), scenario(smc.exchange.law_from_c(tmp_path / "a.so"))
+    ours = scenario("super_twisting")
+    theirs = scenario(smc.exchange.law_from_c(tmp_path / "a.so"))
     alone = smc.run(ours)
     for trace, beside in (
         smc.run([theirs, ours], threads=1),

@@ -211,7 +211,8 @@ def test_every_law_is_a_valid_fmu(folder):
 def test_instances_in_one_process_do_not_share_their_memory(twisting):
     alone = Importer(*twisting)
     expected = [alone.step(1e-3 * k, **wave(k)) for k in range(60)]
-    first, second = Importer(*twisting), Importer(*twisting)
+    first = Importer(*twisting)
+    second = Importer(*twisting)
     found = []
     for k in range(60):
         found.append(first.step(1e-3 * k, **wave(k)))
@@ -333,10 +334,8 @@ def test_a_long_step_is_its_samples_and_a_short_one_holds(twisting):
 
 def test_samples_are_counted_from_the_start_time(folder, combined):
     path, _ = combined["prescribed_time", None, "kalman"]
-    early, late = (
-        Importer(path, folder / path.stem),
-        Importer(path, folder / path.stem, start=100.0),
-    )
+    early = Importer(path, folder / path.stem)
+    late = Importer(path, folder / path.stem, start=100.0)
     for k in range(5):
         assert early.step(1e-3 * k, x=0.4) == late.step(100.0 + 1e-3 * k, x=0.4)
     assert late.get("time") == [pytest.approx(100.005)]
@@ -346,7 +345,8 @@ def test_with_event_mode_u_follows_x_without_a_step_between(twisting):
     """At each sample it has the bits of an instance without events after its step; stays held in
     between.
     """
-    plain, events = Importer(*twisting), Importer(*twisting, events=True)
+    plain = Importer(*twisting)
+    events = Importer(*twisting, events=True)
     expected = [plain.step(1e-3 * k, **wave(k)) for k in range(30)]
     for k in range(30):
         events.set(**wave(k))
@@ -458,7 +458,10 @@ def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
     )
     block = ctypes.CDLL(str(library))
     block.controller.argtypes = [ctypes.c_double] * 5 + [ctypes.POINTER(ctypes.c_double)] * 2
-    trace, u, s, found = smc.run(scenario(law, u_max=6.0)), ctypes.c_double(), ctypes.c_double(), []
+    trace = smc.run(scenario(law, u_max=6.0))
+    u = ctypes.c_double()
+    s = ctypes.c_double()
+    found = []
     for _ in range(2):
         block.controller_start()
         for k, t in enumerate(trace.t):

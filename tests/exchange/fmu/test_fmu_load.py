@@ -143,11 +143,9 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
         smc.exchange.law_to_fmu("super_twisting", folder / "written_again.fmu"), isolate=False
     )()
     assert law.function is not None
-    y, gains, memory = (
-        Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0),
-        gains_of(law),
-        np.zeros(1),
-    )
+    y = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0)
+    gains = gains_of(law)
+    memory = np.zeros(1)
     first, second = [law.function(y._replace(t=t), gains, memory) for t in (0.0, 1e-3)]
     assert first != second
     memory = np.zeros(1)
@@ -177,7 +175,9 @@ def test_another_process_takes_the_law_from_the_file(folder):
 
 def expected(trace: smc.Trace, k: float = 8.0) -> np.ndarray:
     """The commands of fmi2.c, from its equation, every tenth sample; `trace` has no noise."""
-    u, total, held = [], 0.0, 0.0
+    u = []
+    total = 0.0
+    held = 0.0
     for i in range(len(trace.t)):
         if i % 10 == 0:
             e = trace.x[i, 0] - trace.r[i, 0]
@@ -210,7 +210,8 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
     trace = smc.run(
         scenario(law, noise=None, u_max=100.0, control_period=0.02, physics_step=1e-3, duration=0.2)
     )
-    u, total = [], 0.0
+    u = []
+    total = 0.0
     for i in range(len(trace.t)):
         e = trace.x[i, 0] - trace.r[i, 0]
         u.append(-8.0 * e - 2.0 * trace.v[i, 0] - (total + 0.01 * e))  # the second of two steps
@@ -221,7 +222,8 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
 @pytest.mark.slow
 def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
-    path, names = helper.fmi3(folder), {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
+    path = helper.fmi3(folder)
+    names = {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
     for held, said, first in (({}, "enable, mode", "enable"), ({"enable": 1}, "mode", "mode")):
         with pytest.raises(smc.ScenarioError) as error:
             smc.exchange.law_from_fmu(path, variables=names, constants=held)
@@ -319,7 +321,8 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
 
 
 def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(foreign):
-    one, alone = 1.0, smc.run(scenario("pid"))
+    one = 1.0
+    alone = smc.run(scenario("pid"))
     law = smc.exchange.law_from_fmu(
         foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False
     )()

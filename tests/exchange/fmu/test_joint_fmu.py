@@ -88,7 +88,8 @@ def outputs(fmu: Importer) -> list[float]:
 
 def stepped(fmu: Importer, trace: smc.Trace, samples: int) -> np.ndarray:
     """u and s after each step, (samples, 6)."""
-    found, controller = [], Controller(trace.scenario)
+    found = []
+    controller = Controller(trace.scenario)
     for k in range(samples):
         fmu.set(**seen(fmu.at, controller, trace, k))
         fmu.fmu.doStep(trace.t[k], 1e-3)
@@ -105,7 +106,8 @@ def test_an_fmu_gives_what_a_run_gives(made, folder, name):
     assert trace.failure is None
     assert validate_fmu(str(path)) == []
     fmu = Importer(path, folder / name)
-    found, expected = stepped(fmu, trace, len(trace.t)), np.hstack([trace.u, trace.s])
+    found = stepped(fmu, trace, len(trace.t))
+    expected = np.hstack([trace.u, trace.s])
     assert fmu.said == []
     assert len(np.unique(found, axis=0)) > 50
     if name == "passivity_based":
@@ -189,7 +191,8 @@ def test_an_fmu_of_a_free_body_gives_the_actuators_their_controls(tmp_path):
     trace, read = recorded(of_run, tmp_path)
     path = smc.exchange.law_to_fmu(of_run, tmp_path / "flight.fmu")
     assert validate_fmu(str(path)) == []
-    fmu, axes = Importer(path, tmp_path / "flight"), range(1, 7)
+    fmu = Importer(path, tmp_path / "flight")
+    axes = range(1, 7)
     inputs = {}
     for name in ("x", "v", "r", "dr", "ddr", "h"):
         for i in axes:

@@ -92,7 +92,8 @@ def ran(name):
 @FOREIGN
 @pytest.mark.parametrize("name", ROAD)
 def test_laws_run_on_a_foreign_model_and_its_columns_are_its_joints(name):
-    traces, joints = ran(name), list(ROAD[name][2])
+    traces = ran(name)
+    joints = list(ROAD[name][2])
     if len(joints) > 1:
         assert list(traces[0].columns())[1 : 1 + len(joints)] == [f"x_{joint}" for joint in joints]
 
@@ -102,8 +103,10 @@ def test_laws_run_on_a_foreign_model_and_its_columns_are_its_joints(name):
     "name", ["menagerie-like", pytest.param("gym cheetah", marks=pytest.mark.slow)]
 )
 def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
-    traces, joints = ran(name), list(ROAD[name][2])
-    plant, start = traces[0].scenario.plant, traces[0].scenario.x0
+    traces = ran(name)
+    joints = list(ROAD[name][2])
+    plant = traces[0].scenario.plant
+    start = traces[0].scenario.x0
     labels = [ax.get_ylabel() for ax in smc.figure(traces, tmp_path / "a.png").axes]
     for joint in joints:
         assert any(label.startswith(f"{joint} e") for label in labels), labels

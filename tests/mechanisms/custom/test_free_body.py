@@ -26,7 +26,12 @@ from smc_mujoco.simulation.conditions import applicable, find_condition
 from smc_mujoco.simulation.python_controller import Controller
 
 TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
-MASS, LEVER, YAW, LAG, MOST, G = 0.0319, 0.03253, 0.00705, 0.0625, 0.12, 9.81
+MASS = 0.0319
+LEVER = 0.03253
+YAW = 0.00705
+LAG = 0.0625
+MOST = 0.12
+G = 9.81
 J = np.diag([16.8e-6, 16.8e-6, 29.8e-6])
 
 
@@ -63,11 +68,9 @@ def newton_euler(duration, period):
     for k in range(round(duration / period)):
         t = k * period
         F = 0.3 + 0.05 * math.sin(9.0 * t)
-        Mx, My, Mz = (
-            6e-4 * math.sin(5.0 * t),
-            3e-4 * math.cos(7.0 * t),
-            2e-4 * math.sin(3.0 * t + 1.0),
-        )
+        Mx = 6e-4 * math.sin(5.0 * t)
+        My = 3e-4 * math.cos(7.0 * t)
+        Mz = 2e-4 * math.sin(3.0 * t + 1.0)
         signs = np.array(
             [(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)]
         )  # as in the firmware's power distribution
@@ -75,7 +78,10 @@ def newton_euler(duration, period):
         asked = np.clip(asked - max(0.0, asked.max() - MOST), 0.0, MOST)
 
         def rates(t, y, asked=asked):
-            q, v, w, f = y[3:7] / np.linalg.norm(y[3:7]), y[7:10], y[10:13], y[13:]
+            q = y[3:7] / np.linalg.norm(y[3:7])
+            v = y[7:10]
+            w = y[10:13]
+            f = y[13:]
             turn = Rotation.from_quat(q, scalar_first=True)
             places = LEVER * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
             torque = np.array(
@@ -128,9 +134,11 @@ def test_a_tumbling_body_keeps_its_angular_momentum_and_energy_and_falls_on_a_pa
             plant=body, law=nothing, duration=5.0, integrator="RK4", physics_step=1e-3, **start
         )
     )
-    inertia, w = np.diag([16.8e-6, 20e-6, 29.8e-6]), trace.v[:, 3:]
+    inertia = np.diag([16.8e-6, 20e-6, 29.8e-6])
+    w = trace.v[:, 3:]
     momentum = Rotation.from_rotvec(trace.x[:, 3:].copy()).apply(w @ inertia)
-    size, energy = np.linalg.norm(momentum, axis=1), np.einsum("ki,ij,kj->k", w, inertia, w)
+    size = np.linalg.norm(momentum, axis=1)
+    energy = np.einsum("ki,ij,kj->k", w, inertia, w)
     assert np.ptp(size) < 1e-10 * size[0]
     assert np.ptp(energy) < 1e-10 * energy[0]
     assert np.abs(momentum - momentum[0]).max() < 1e-4 * size[0]
@@ -161,7 +169,8 @@ def test_rotation_vectors_and_quaternions_are_those_of_scipy():
         Rotation.identity(),
         Rotation.from_rotvec([3.1, 0.5, 0.0]),
     ]:
-        q, other = turn.as_quat(scalar_first=True), Rotation.random(rng=random)
+        q = turn.as_quat(scalar_first=True)
+        other = Rotation.random(rng=random)
         np.testing.assert_allclose(rotation.rotation_vector(*q), turn.as_rotvec(), atol=1e-14)
         assert rotation.rotation_vector(*-q) == pytest.approx(
             rotation.rotation_vector(*q), abs=1e-14
@@ -173,7 +182,9 @@ def test_rotation_vectors_and_quaternions_are_those_of_scipy():
         np.testing.assert_allclose(
             rotation.turned(tuple(q), 1.0, 2.0, 3.0), turn.apply([1.0, 2.0, 3.0]), atol=1e-14
         )
-        r, dr, h = turn.as_rotvec(), random.normal(size=3), 1e-6
+        r = turn.as_rotvec()
+        dr = random.normal(size=3)
+        h = 1e-6
         ends = [Rotation.from_rotvec(r + sign * h * dr) for sign in (-0.5, 0.5)]
         np.testing.assert_allclose(
             rotation.rate(*r, *dr), (ends[0].inv() * ends[1]).as_rotvec() / h, atol=1e-8
@@ -182,7 +193,8 @@ def test_rotation_vectors_and_quaternions_are_those_of_scipy():
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-5, 9e-5, 2e-4, 5e-3, 2e-2], ids=str)
 def test_the_rate_of_a_small_rotation_vector_is_its_series(size):
-    r, dr = size * np.array([0.6, -0.8, 0.0]), np.array([0.3, 0.7, -1.1])
+    r = size * np.array([0.6, -0.8, 0.0])
+    dr = np.array([0.3, 0.7, -1.1])
     expected = dr - np.cross(r, dr) / 2 + np.cross(r, np.cross(r, dr)) / 6
     np.testing.assert_allclose(rotation.rate(*r, *dr), expected, atol=1e-13 + size**3 / 12)
 
@@ -422,7 +434,8 @@ def test_disturbances_are_forces_on_the_centre_of_mass_and_turn_nothing():
         "x0": (0.0, 0.0, 3.0, 0.4, -0.3, 0.2),
     }
     trace = smc.run(smc.Scenario(**fall, disturbance=smc.Constant(0.02)))
-    t, a = trace.t[:, None], 0.02 / MASS
+    t = trace.t[:, None]
+    a = 0.02 / MASS
     np.testing.assert_allclose(
         trace.e[:, :3] - [0.0, 0.0, 2.0], 0.5 * t**2 * [a, a, a - G], atol=1e-12
     )
@@ -482,7 +495,9 @@ def test_scores_are_of_the_position_the_heading_and_the_actuators(drone):
     trace = smc.run(
         smc.Scenario(plant=drone, law="geometric", x0=(0.1, -0.2, 1.1, 0.0, 0.0, 0.3), duration=6.0)
     )
-    found, e, t = smc.score(trace), trace.e, trace.t
+    found = smc.score(trace)
+    e = trace.e
+    t = trace.t
     assert found["itae"] == pytest.approx(np.trapezoid(t * np.abs(e[:, :3]).sum(axis=1), t))
     assert found["tv"] == pytest.approx(np.abs(np.diff(trace.applied, axis=0)).sum(axis=0).max())
     last = []
@@ -500,7 +515,8 @@ def test_position_and_attitude_have_scales_of_their_own(drone):
     scales = search_space.scales(drone, 0.48, 0.5)
     assert (scales["X"], scales["F"], scales["M"]) == pytest.approx((0.5, 0.48, MASS))
     assert scales["T"] == pytest.approx(math.sqrt(0.5 * MASS / 0.48))
-    torque, inertia = drone.limits[5], 29.8e-6
+    torque = drone.limits[5]
+    inertia = 29.8e-6
     assert scales["T of turns"] == pytest.approx(math.sqrt(inertia / torque))
     box = search_space.box(smc.law("geometric"), scales)
     assert math.sqrt(math.prod(box["kx"])) == pytest.approx(scales["T"] ** -2)

@@ -64,7 +64,8 @@ def test_laws_of_many_joints_track_on_every_joint(jaco):
 
 def test_its_run_is_that_of_the_reference_loop(jaco):
     scenario = moving(jaco, "computed_torque_sliding", duration=0.1)
-    fast, slow = smc.run(scenario), reference.run(scenario)
+    fast = smc.run(scenario)
+    slow = reference.run(scenario)
     np.testing.assert_allclose(fast.x, slow.x, rtol=0, atol=1e-12)
     np.testing.assert_allclose(fast.u, slow.u, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(fast.x, smc.run([scenario] * 3, threads=2)[2].x)

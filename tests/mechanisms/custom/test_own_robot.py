@@ -150,7 +150,8 @@ def test_what_is_nearly_right_names_its_cure(folder):
 
 def test_files_of_a_text_are_bytes_of_any_kind_or_text():
     whole = smc.plant_from(MODEL, {"tilt": smc.Channel(motor=True)})
-    start, end = MODEL.index("<body"), MODEL.index("</worldbody>")
+    start = MODEL.index("<body")
+    end = MODEL.index("</worldbody>")
     outer = f'{MODEL[:start]}<include file="part.xml"/>{MODEL[end:]}'
     part = f"<mujoco>{MODEL[start:end]}</mujoco>"
     for content in (part, part.encode(), bytearray(part.encode())):
@@ -162,7 +163,8 @@ def test_files_of_a_text_are_bytes_of_any_kind_or_text():
 
 def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
     plant = as_plant("arm.urdf:j1(motor)+j2(motor)")
-    model, plain = plant.build(2).compile(), mujoco.MjSpec.from_file("arm.urdf").compile()
+    model = plant.build(2).compile()
+    plain = mujoco.MjSpec.from_file("arm.urdf").compile()
     assert (plain.ngeom, model.ngeom) == (1, 3)
     assert sorted(model.geom_group.tolist()) == [
         1,
@@ -175,7 +177,8 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
 
 @pytest.mark.skipif(bool(gl.missing()), reason="no OpenGL")
 def test_machines_on_a_fused_base_have_the_colours_of_their_own_laws(folder, monkeypatch):
-    plant, seen = as_plant("arm.urdf:j1(motor)+j2(motor)"), []
+    plant = as_plant("arm.urdf:j1(motor)+j2(motor)")
+    seen = []
     plain = stage.Stage.render
     monkeypatch.setattr(
         stage.Stage, "render", lambda self, drawn=(): seen.append(self) or plain(self, drawn)

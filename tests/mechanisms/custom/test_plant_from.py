@@ -163,7 +163,8 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
     data.qpos[places], data.ctrl[:] = 0.3, CTRL[name]
     energies, built = [], plant.load()  # our model's energy at our state, the file's at its own
     built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
-    ours, dofs = mujoco.MjData(built), [j.dofadr[0] for j in joints]
+    ours = mujoco.MjData(built)
+    dofs = [j.dofadr[0] for j in joints]
     for k in range(scenario.samples + 1):
         np.testing.assert_allclose(trace.x[k], data.qpos[places], atol=1e-11)
         np.testing.assert_allclose(trace.v[k], data.qvel[dofs], atol=1e-10)
@@ -183,7 +184,9 @@ def test_f_and_g_are_the_accelerations_of_the_file(name):
     plant = (FOREIGN | {"pusher": pusher})[name]()
     raw = read(plant)
     raw.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
-    data, values, rng = mujoco.MjData(raw), plant.values({}), np.random.default_rng(0)
+    data = mujoco.MjData(raw)
+    values = plant.values({})
+    rng = np.random.default_rng(0)
     joints = joints_of(plant, raw)
     dofs = [j.dofadr[0] for j in joints]
     for _ in range(20):
@@ -213,7 +216,8 @@ TRACKING = {
 @pytest.mark.parametrize("name", TRACKING)
 def test_computed_torque_tracks_within_a_thousandth(name):
     make, u_max, x0 = TRACKING[name]
-    plant, rate = make(), 0.2
+    plant = make()
+    rate = 0.2
     scenario = smc.Scenario(
         plant=plant,
         law=TORQUE,
@@ -234,7 +238,8 @@ def test_computed_torque_tracks_within_a_thousandth(name):
 def test_seven_coupled_joints_settle_as_the_error_equation_says():
     """e'' + 20 e' + 100 e = 0: critically damped, e = (1 + 10 t) e0 exp(-10 t)."""
     plant = pusher()
-    reference, e0 = smc.Constant(-0.3), 0.1
+    reference = smc.Constant(-0.3)
+    e0 = 0.1
     trace = smc.run(
         smc.Scenario(
             plant=plant,
@@ -259,9 +264,11 @@ PUSHED = {"disturbance": smc.Sine(amplitude=1.0, omega=3.0), "friction": smc.Cou
 )
 def test_the_plain_loop_gives_the_same_bits(arm, channels, fields):
     """Also where channels have another order than the joints in the file."""
-    law, common = smc.law("super_twisting"), {"duration": 0.2, "x0": (0.4, -0.3), "u_max": 20.0}
+    law = smc.law("super_twisting")
+    common = {"duration": 0.2, "x0": (0.4, -0.3), "u_max": 20.0}
     scenario = smc.Scenario(plant=arm(channels), law=law, model="nominal", **common, **fields)
-    fast, slow = smc.run(scenario), plain.run(scenario)
+    fast = smc.run(scenario)
+    slow = plain.run(scenario)
     assert fast.failure is None
     assert [
         name for name in ARRAYS if not np.array_equal(getattr(fast, name), getattr(slow, name))
@@ -289,7 +296,10 @@ def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
         plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1)
     )
     many = [dataclasses.replace(base, x0=(0.1 * i, 0.2), v0=0.5) for i in range(7)]
-    first, _, _, again = smc.run(base), smc.run(many), smc.run(many), smc.run(base)
+    first = smc.run(base)
+    _ = smc.run(many)
+    _ = smc.run(many)
+    again = smc.run(base)
     np.testing.assert_array_equal(again.x, first.x)
     gc.collect()
     assert isinstance(plant.nominal, NominalModel)
@@ -303,7 +313,9 @@ def test_data_of_a_nominal_model_are_reused_after_a_failed_run(arm):
         plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1)
     )
     bad = dataclasses.replace(good, law=smc.law("computed_torque", kp=1e9, kd=1e9), u_max=math.inf)
-    first, astray, again = smc.run(good), smc.run(bad), smc.run(good)
+    first = smc.run(good)
+    astray = smc.run(bad)
+    again = smc.run(good)
     assert astray.failure is not None
     np.testing.assert_array_equal(again.x, first.x)
     gc.collect()
@@ -573,10 +585,8 @@ def test_the_file_s_own_sensors_are_no_channels(arm):
     sensors = '<sensor><jointpos joint="elbow"/><jointvel joint="elbow" delay="0.01" nsample="20"/></sensor>'
     plant = arm(["shoulder"], ACTUATED + sensors)
     scenario = smc.Scenario(plant=plant, law="classical", duration=0.1, x0=0.3)
-    trace, plainly = (
-        smc.run(scenario),
-        smc.run(dataclasses.replace(scenario, plant=arm(["shoulder"]))),
-    )
+    trace = smc.run(scenario)
+    plainly = smc.run(dataclasses.replace(scenario, plant=arm(["shoulder"])))
     assert trace.x.shape == (101, 1)
     np.testing.assert_array_equal(trace.x, plainly.x)
 
@@ -639,13 +649,12 @@ def test_copies_in_one_batch_touch_the_floor_as_the_single_environment_does(tmp_
         <geom type="capsule" size=".03" fromto="0 0 0 .7 0 0" mass="1"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
     plant = smc.plant_from(tmp_path / "falls.xml", {"j": smc.Channel(x0=0.1)})
-    single, many = (
-        gym.PlantEnv(plant, changes={"x0": 0.1}),
-        vector_env.BatchEnv(plant, 2, changes={"x0": 0.1}),
-    )
+    single = gym.PlantEnv(plant, changes={"x0": 0.1})
+    many = vector_env.BatchEnv(plant, 2, changes={"x0": 0.1})
     single.reset(seed=0)
     many.reset(seed=0)
-    alone, both = np.empty(2), np.empty((2, 2))
+    alone = np.empty(2)
+    both = np.empty((2, 2))
     for _ in range(1000):
         alone, *_ = single.step(np.zeros(1))
         both, *_ = many.step(np.zeros((2, 1)))
@@ -794,7 +803,8 @@ def test_environments_start_where_runs_may(bounded):
         assert found.high.tolist() == list(highest)
         for random in map(np.random.default_rng, range(20)):
             smc.Scenario(plant=plant, law="none", x0=found.draw_start(random)[0])
-    found, random = episode.Setting(plant), np.random.default_rng(0)
+    found = episode.Setting(plant)
+    random = np.random.default_rng(0)
     with pytest.raises(smc.ScenarioError, match=REFUSED):
         found.draw_start(random, {"x0": (0.0, 1.2)})
     assert found.draw_start(random, {"x0": (9.0, 1.0)})[0].tolist() == [9.0, 1.0]
@@ -1092,7 +1102,8 @@ def test_a_model_that_would_harm_this_process_is_one_sentence(arm, tmp_path, mon
 
 
 def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
-    ran, timed = [], process.timed
+    ran = []
+    timed = process.timed
     monkeypatch.setattr(
         process, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k)
     )
@@ -1196,10 +1207,8 @@ def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run
     path, content = meshed
     model, assets = FORMS[form](path, content)
     channels = {"j": smc.Channel(x0=0.3)}
-    plant, from_file = (
-        smc.plant_from(model, channels, assets=assets),
-        smc.plant_from(path, channels),
-    )
+    plant = smc.plant_from(model, channels, assets=assets)
+    from_file = smc.plant_from(path, channels)
     assert plant.name == "meshed"
     assert pickle.loads(pickle.dumps(plant)) == plant
     fields = {
@@ -1209,7 +1218,8 @@ def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run
         "model": "nominal",
     }
     scenario = smc.Scenario(plant=plant, **fields)
-    trace, same = smc.run(scenario), smc.run(smc.Scenario(plant=from_file, **fields))
+    trace = smc.run(scenario)
+    same = smc.run(smc.Scenario(plant=from_file, **fields))
     np.testing.assert_allclose(trace.x, same.x, atol=1e-9)
     assert np.ptp(trace.x) > 0.01
     path.unlink()

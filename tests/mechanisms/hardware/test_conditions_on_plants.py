@@ -23,7 +23,8 @@ def test_every_condition_fits_a_plant_or_is_refused(name):
         machine = smc.plant_from(WHEEL, ["hinge"], name=name)
     else:
         machine = name
-    compiled, starts = 0, smc.starts(x0=0.1) if wheel else None
+    compiled = 0
+    starts = smc.starts(x0=0.1) if wheel else None
     for condition in NAMED:
         with contextlib.suppress(smc.ScenarioError):
             (scenario,) = smc.grid(

@@ -63,7 +63,8 @@ def undamped(name):
 
 
 def built(p, contact, mechanism="equation"):
-    spec, fields = p.spec(), p.fields
+    spec = p.spec()
+    fields = p.fields
     if mechanism != "equation":
         p.mechanisms[mechanism].edit(spec)
         fields = p.mechanisms[mechanism].fields
@@ -232,8 +233,10 @@ def test_a_body_that_leans_on_an_obstacle_rests_and_hardly_sinks_in(name, kind):
 def test_the_damping_ratio_gives_the_restitution_of_a_spring_and_dashpot_that_never_pull():
     """Schwager and Poeschel's case released at zero force, integrated here."""
     for e in (0.05, math.exp(-2.0), 0.3, 0.7, 0.95):  # the second has the damping ratio 1
-        zeta, h = damping_ratio(e), 1e-4
-        x, v = 0.0, 1.0
+        zeta = damping_ratio(e)
+        h = 1e-4
+        x = 0.0
+        v = 1.0
         while x + 2 * zeta * v > 0.0:
             half = v - h / 2 * (x + 2 * zeta * v)
             x, v = x + h * half, v - h * (x + h / 2 * v + 2 * zeta * half)
@@ -299,7 +302,8 @@ def test_a_passive_run_never_gains_energy(name, kind, mechanism, restitution):
     data.qvel[: p.n] = rng.uniform(-2.0, 2.0, p.n) * (1.0 if p.n == 1 else 0.2)
     mujoco.mj_forward(model, data)
     energy = data.energy  # potential and kinetic, now and after each step
-    start, lowest = energy.sum(), energy[0]
+    start = energy.sum()
+    lowest = energy[0]
     for _ in steps(model, data, 3.0):
         potential, kinetic = energy
         lowest = min(lowest, potential)

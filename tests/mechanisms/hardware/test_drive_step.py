@@ -162,22 +162,29 @@ def test_a_rate_limit_follows_the_lag():
 @pytest.mark.parametrize(("tau", "rate"), [(1e-4, 1e3), (1e-3, 100.0), (1e-3, 2e3), (0.01, 20.0)])
 def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau, rate):
     """It is exact where the force is limited, or follows the lag, all the step."""
-    step, parts = 1e-3, 2000
+    step = 1e-3
+    parts = 2000
     u, first, gap = np.random.default_rng(0).normal(size=(3, 500))
     second = first + gap * np.repeat([0.0, 0.01, 0.1, 1.0, 3.0], 100)
     advance = drive_step((smc.Lag(tau), smc.hardware.RateLimit(rate)), step, True)
     assert advance is not None
     mean, last, _ = advance(u, first, second, np.zeros(500))
-    lagged, force, total, above, below = first, second, 0.0, 0, 0
+    lagged = first
+    force = second
+    total = 0.0
+    above = 0
+    below = 0
     for t in step * np.arange(1, parts + 1) / parts:
-        lagged, before = u + (first - u) * np.exp(-t / tau), force
+        lagged = u + (first - u) * np.exp(-t / tau)
+        before = force
         force = np.clip(lagged, before - rate * step / parts, before + rate * step / parts)
         total, above, below = (
             total + 0.5 * (before + force) / parts,
             above + (lagged > force),
             below + (lagged < force),
         )
-    error, whole = np.abs(mean - total), (above + below == 0) | (above == parts) | (below == parts)
+    error = np.abs(mean - total)
+    whole = (above + below == 0) | (above == parts) | (below == parts)
     np.testing.assert_allclose(last, lagged, rtol=1e-12)
     assert 100 < whole.sum() < 500
     assert error[whole].max() < 1e-3

@@ -20,7 +20,8 @@ from smc_mujoco.mechanisms.plant import field_array, plant
 from smc_mujoco.simulation.python_controller import Controller
 
 H = 2.5e-4  # s
-IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
+IMPLICIT = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+RK4 = mujoco.mjtIntegrator.mjINT_RK4
 NAMES = pytest.mark.parametrize(
     "name", ["duffing", "inverted_pendulum", "pendulum_network", "panda"]
 )
@@ -75,7 +76,8 @@ def test_a_locked_rotors_torque_comes_at_once_without_inductance():
 @pytest.mark.slow
 def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
     motor = DCMotor(inductance=0.0)
-    inertia, volts = 1.0 + motor.gear**2 * motor.rotor_inertia, 6.0
+    inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
+    volts = 6.0
     t, _, speed, torque = driven(bare(motor), lambda t: volts, 8.0).T
     time_constant = motor.resistance * inertia / motor.constant**2
     left = np.exp(-t / time_constant)
@@ -87,7 +89,8 @@ def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
 
 
 def test_the_defaults_are_the_datasheets_motor():
-    stall_current, no_load_speed = 24.0 / MOTOR.resistance, 24.0 / MOTOR.torque_constant
+    stall_current = 24.0 / MOTOR.resistance
+    no_load_speed = 24.0 / MOTOR.torque_constant
     assert stall_current == pytest.approx(80.2, rel=0.01)  # A
     assert no_load_speed == pytest.approx(7580 * 2 * math.pi / 60, rel=0.01)  # rad/s
     mechanical = MOTOR.resistance * MOTOR.rotor_inertia / MOTOR.torque_constant**2
@@ -122,10 +125,8 @@ def test_a_commutator_raises_the_torque_where_a_brush_bridges_two_bars():
         bridge_2=0.01,
         brush_2=0.4,
     )
-    step, even = (
-        drive_step((motor,), 1e-3, True),
-        motor.constant / motor.resistance * (3.0 - motor.constant * 5.0),
-    )
+    step = drive_step((motor,), 1e-3, True)
+    even = motor.constant / motor.resistance * (3.0 - motor.constant * 5.0)
     beside = 0.1 + math.acos(1.0 - (9.0 * 0.02) ** 2) / 9.0
     for turned, share in (
         (0.1, 0.2),
@@ -153,7 +154,8 @@ def test_a_ripple_needs_a_motor_alone_whose_current_follows_at_once():
 
 @NAMES
 def test_the_rotors_inertia_is_reflected_to_the_joint(name):
-    with_motor, own = build(plant(name), MOTOR), build(plant(name))
+    with_motor = build(plant(name), MOTOR)
+    own = build(plant(name))
     reflected = MOTOR.gear**2 * MOTOR.rotor_inertia
     assert with_motor.dof_armature == pytest.approx(own.dof_armature + reflected, rel=1e-12)
     assert with_motor.dof_M0 == pytest.approx(
@@ -175,12 +177,14 @@ def test_a_motor_of_vanishing_constant_is_the_ideal_actuator():
 
 @NAMES
 def test_play_of_no_width_is_a_rigid_rotor(name):
-    with_rotor, rigid = build(plant(name), Backlash(0.0, 2e-3, 0.05)), build(plant(name))
+    with_rotor = build(plant(name), Backlash(0.0, 2e-3, 0.05))
+    rigid = build(plant(name))
     dofs = dof_ids(rigid)
     rigid.dof_armature[dofs] += 2e-3
     rigid.dof_damping[dofs] += 0.05
     mujoco.mj_setConst(rigid, mujoco.MjData(rigid))
-    a, b = home(with_rotor), home(rigid)
+    a = home(with_rotor)
+    b = home(rigid)
     seconds = 0.2 if name == "panda" else 2.0  # before it meets its stops
     deviation = np.abs(
         driven(with_rotor, sine, seconds, a)[:, 1] - driven(rigid, sine, seconds, b)[:, 1]
@@ -197,7 +201,8 @@ def test_play_of_no_width_is_a_rigid_rotor(name):
 @NAMES
 def test_the_joint_is_free_within_the_play_and_driven_beyond(name):
     model = build(plant(name), Backlash(0.02))
-    data, own = home(model), home(build(plant(name)))
+    data = home(model)
+    own = home(build(plant(name)))
     n = own.qpos.size
     rotors = [model.joint(ROTOR + model.joint(i).name).qposadr[0] for i in range(n)]
     assert data.qpos[rotors] == pytest.approx(own.qpos)  # the rotor starts in the middle
@@ -222,7 +227,8 @@ def test_flanks_meet_without_bounce_and_without_gain(speed, inertia):
     model = bare(Backlash(0.02, inertia), name="inverted_pendulum")
     data = mujoco.MjData(model)
     data.qvel[1] = speed
-    momentum, energies = inertia * speed, [0.5 * inertia * speed**2]
+    momentum = inertia * speed
+    energies = [0.5 * inertia * speed**2]
     for _ in range(4000):
         mujoco.mj_step(model, data)
         energies.append(0.5 * 0.125 * data.qvel[0] ** 2 + 0.5 * inertia * data.qvel[1] ** 2)
@@ -294,10 +300,13 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
     kind = plant(name)
     motor = DCMotor(0.5, 0.0, 0.05, 2.0, 0.0, voltage=10.0, command="voltage")
     scenario = smc.Scenario(plant=kind, law="none", actuator=motor)
-    model, rng = build(kind, motor), np.random.default_rng(1)
+    model = build(kind, motor)
+    rng = np.random.default_rng(1)
     data = mujoco.MjData(model)
     for _ in range(20):
-        x, v, u = rng.uniform(-1, 1, kind.n), rng.uniform(-3, 3, kind.n), rng.uniform(-9, 9)
+        x = rng.uniform(-1, 1, kind.n)
+        v = rng.uniform(-3, 3, kind.n)
+        u = rng.uniform(-9, 9)
         data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u
         mujoco.mj_forward(model, data)
         for i in range(kind.n):
@@ -310,7 +319,8 @@ def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
     speed.
     """
     motor = DCMotor(0.5, 0.0, 0.05, 20.0, 0.0, voltage=10.0, command="voltage")
-    mass, drag = 2.0, motor.constant**2 / motor.resistance
+    mass = 2.0
+    drag = motor.constant**2 / motor.resistance
     fields = {
         "actuator": motor,
         "feedforward": smc.Constant(5.0),
@@ -324,7 +334,8 @@ def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
             plant=axis, law="none", integrator="RK4", physics_step=1e-3, sensor=None, **fields
         )
     )
-    speed, lag = 5.0 * motor.constant / motor.resistance / drag, mass / drag
+    speed = 5.0 * motor.constant / motor.resistance / drag
+    lag = mass / drag
     exact = speed * (trace.t - lag * (1.0 - np.exp(-trace.t / lag)))
     np.testing.assert_allclose(trace.x[:, 0], exact, atol=1e-8)
 

@@ -123,8 +123,10 @@ def test_an_encoder_measures_no_velocity():
 
 def test_the_velocity_is_the_filtered_difference_of_the_readings():
     _, x, v = read(smc.Encoder(counts=200))
-    tau, dt = 5e-3, 1e-3
-    a, estimate = tau / (tau + dt), 0.0
+    tau = 5e-3
+    dt = 1e-3
+    a = tau / (tau + dt)
+    estimate = 0.0
     expected = [0.0]
     for before, now in zip(x[:-1, 0], x[1:, 0], strict=True):
         estimate = a * estimate + (1 - a) * (now - before) / dt
@@ -138,7 +140,8 @@ def test_a_tachometer_beside_the_encoder_is_not_rounded():
 
 
 def test_replacing_the_sensor_replaces_the_velocity_that_was_left_out():
-    with_encoder, without = scenario(PERFECT), scenario(None)
+    with_encoder = scenario(PERFECT)
+    without = scenario(None)
     assert dataclasses.replace(with_encoder, sensor=None) == without
     assert dataclasses.replace(without, sensor=PERFECT) == with_encoder
     assert (
@@ -217,7 +220,8 @@ def test_losses_are_independent_of_the_noise():
     noisy = {"noise": smc.Noise(position=0.1), "duration": 10.0}
     trace, x, _ = read(sensor, **noisy)
     _, full, _ = read(PERFECT, **noisy)
-    arrived, z = (x == full)[1:, 0], (full - trace.x)[1:, 0]
+    arrived = (x == full)[1:, 0]
+    z = (full - trace.x)[1:, 0]
     assert abs(np.corrcoef(arrived, np.abs(z))[0, 1]) < 4 / math.sqrt(len(z))
     assert abs(np.corrcoef(arrived, z)[0, 1]) < 4 / math.sqrt(len(z))
 

@@ -24,19 +24,20 @@ def by_events(scenario, u, level, d=lambda t: 0.0):
     `level`.
     """
     plant = scenario.plant
-    values, x, v, rows = (
-        plant.values({}),
-        scenario.resolved.x0[0],
-        0.0,
-        [(scenario.resolved.x0[0], 0.0, 0.0)],
-    )
+    values = plant.values({})
+    x = scenario.resolved.x0[0]
+    v = 0.0
+    rows = [(scenario.resolved.x0[0], 0.0, 0.0)]
 
     def others(x, v, t, held):
         f, g = plant.nominal([x], [v], 0, values)
         return f / g + held + d(t), g
 
     for k, held in enumerate(u[:-1]):
-        t, end, rest, pushed = k * PERIOD, (k + 1) * PERIOD, 0.0, 0.0
+        t = k * PERIOD
+        end = (k + 1) * PERIOD
+        rest = 0.0
+        pushed = 0.0
         while end - t > 1e-15:
             load = others(x, v, t, held)[0]
             if v == 0.0 and abs(load) <= level:
@@ -61,7 +62,9 @@ def by_events(scenario, u, level, d=lambda t: 0.0):
             stopped.__dict__.update(terminal=True, direction=-1.0)
             path = solve_ivp(slope, (t, end), [x, v], events=stopped, **EXACT)
             pushed -= level * way * (path.t[-1] - t)
-            t, x, v = path.t[-1], path.y[0, -1], 0.0 if path.status == 1 else path.y[1, -1]
+            t = path.t[-1]
+            x = path.y[0, -1]
+            v = 0.0 if path.status == 1 else path.y[1, -1]
         rows.append((x, rest, pushed / PERIOD))
     return np.array(rows).T
 
@@ -107,8 +110,11 @@ def test_motion_and_rest_are_those_of_an_integration_by_events(plant, law, x0, l
 
 @pytest.mark.parametrize("seed", range(30))
 def test_a_step_of_constant_forces_has_the_mean_and_first_moment_of_its_friction(seed):
-    random, h, parts = np.random.default_rng(seed), 1e-3, 20_000
-    level, mobility = random.uniform(0.0, 1.0), random.uniform(0.5, 10.0)
+    random = np.random.default_rng(seed)
+    h = 1e-3
+    parts = 20_000
+    level = random.uniform(0.0, 1.0)
+    mobility = random.uniform(0.5, 10.0)
     smooth = random.uniform(-1.5, 1.5)
     v0 = v = random.choice([0.0, 1.0]) * random.uniform(-1.0, 1.0) * h * mobility
     forces = np.empty(parts)
@@ -163,7 +169,8 @@ def test_the_reference_loop_does_the_same_to_the_bit(plant, extra):
     }
     scenario = smc.Scenario(**fields | extra)
     assert scenario.exact_friction
-    compiled, plain = smc.run(scenario).arrays(), reference.run(scenario).arrays()
+    compiled = smc.run(scenario).arrays()
+    plain = reference.run(scenario).arrays()
     assert np.ptp(compiled["held"]) > 0.0
     for name, values in compiled.items():
         np.testing.assert_array_equal(values, plain[name], err_msg=name)
@@ -208,7 +215,8 @@ def test_your_own_robot_of_one_joint_has_it_too():
     fields |= {"friction": smc.Coulomb(0.4)}
     scenario = smc.Scenario(disturbance=smc.Sine(0.2, 60.0), **fields)
     assert scenario.exact_friction
-    trace, plain = smc.run(scenario), reference.run(scenario)
+    trace = smc.run(scenario)
+    plain = reference.run(scenario)
     assert trace.d[:, 0] == pytest.approx(0.2 * np.sin(60.0 * trace.t), abs=1e-12)
     assert trace.arrays()["held"].sum() > 0.01
     assert trace.x == pytest.approx(plain.x, abs=1e-12)

@@ -15,7 +15,8 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
 
-IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
+IMPLICIT = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+RK4 = mujoco.mjtIntegrator.mjINT_RK4
 INERTIA = {"inverted_pendulum": 0.125, "duffing": 1.0}  # kg m^2, kg
 PLANTS = pytest.mark.parametrize("name", sorted(INERTIA))
 STEPS = pytest.mark.parametrize(
@@ -125,8 +126,10 @@ def test_a_joint_stuck_by_lugre_stands(name, h):
 )
 def test_lugre_breaks_away_at_its_static_level(h, part):
     model = bare(min(INERTIA), part, h=h)
-    data, friction = mujoco.MjData(model), model.actuator(f"passive:{model.joint(0).name}").id
-    most, speed = 0.0, 0.0
+    data = mujoco.MjData(model)
+    friction = model.actuator(f"passive:{model.joint(0).name}").id
+    most = 0.0
+    speed = 0.0
     while data.time < 21.0:  # a ramp of static / 20 a second
         data.ctrl[0] = part.static * data.time / 20.0
         mujoco.mj_step(model, data)
@@ -191,7 +194,8 @@ def test_a_joint_breaks_away_at_no_less_than_it_slides_with():
 def test_lugre_of_driven_joints_leaves_the_free_joint_alone():
     """Both kinds in one batch, too: they have different actuators."""
     at = plant("furuta")
-    both, arm = LuGre(0.01, 0.01, 1.0), LuGre(0.01, 0.01, 1.0, driven=True)
+    both = LuGre(0.01, 0.01, 1.0)
+    arm = LuGre(0.01, 0.01, 1.0, driven=True)
     assert [build(at, part).actuator(1).name for part in (both, arm)] == ["passive:arm"] * 2
     assert [build(at, part).nactuator for part in (both, arm)] == [3, 2]
     assert both.structure() != arm.structure()

@@ -8,14 +8,17 @@ from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 
-DURATION, PERIOD = 0.2, 1e-3
+DURATION = 0.2
+PERIOD = 1e-3
 
 
 def exact(plant: smc.Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
     """Positions at the samples, of x'' = f + g F and tau F' = u - F with commands that are held, to
     1e-12.
     """
-    values, state, positions = plant.values({}), np.array([x0, 0.0, 0.0]), [x0]
+    values = plant.values({})
+    state = np.array([x0, 0.0, 0.0])
+    positions = [x0]
 
     def slope(_, y, held):
         f, g = plant.nominal(y[:1], y[1:2], 0, values)
@@ -42,13 +45,12 @@ def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default
 
 
 def test_the_mean_of_its_force_over_a_control_period_is_in_the_trace():
-    tau, trace = (
-        5e-3,
-        smc.run(
-            smc.Scenario(plant="duffing", law="classical", duration=0.05, actuator=smc.Lag(5e-3))
-        ),
+    tau = 5e-3
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law="classical", duration=0.05, actuator=smc.Lag(5e-3))
     )
-    force, means = 0.0, [0.0]
+    force = 0.0
+    means = [0.0]
     for u in trace.u[:-1, 0]:
         end = u + (force - u) * np.exp(-PERIOD / tau)
         means.append(u + (force - end) * tau / PERIOD)  # of F = u + (F0 - u) exp(-t / tau)

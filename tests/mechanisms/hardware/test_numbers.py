@@ -16,10 +16,8 @@ pytestmark = pytest.mark.quick
 PUBLIC = [getattr(home, name) for home in (smc, smc.hardware, smc.signals) for name in home.__all__]
 PARTS = [value for value in PUBLIC if isinstance(value, type) and issubclass(value, Part)]
 NAMES = re.compile(r"^  ((?:\w+)(?:, \w+)*): (.*?)(?=^  \w|\Z)", re.DOTALL | re.MULTILINE)
-LEAST, RANGE = (
-    re.compile(r"([\d.e-]+)(?: \([^)]*\))? or more"),
-    re.compile(r"([\d.]+) \.\. ([\d.]+)"),
-)
+LEAST = re.compile(r"([\d.e-]+)(?: \([^)]*\))? or more")
+RANGE = re.compile(r"([\d.]+) \.\. ([\d.]+)")
 
 
 def said(part):
@@ -46,7 +44,8 @@ def made(part):
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.__name__)
 def test_a_docstring_says_what_is_declared(part):
     for name, whole in of_fields(part).items():
-        words, of_all = said(part)[name], whole.one if isinstance(whole, OrNone) else whole
+        words = said(part)[name]
+        of_all = whole.one if isinstance(whole, OrNone) else whole
         if isinstance(of_all, Each):
             one = of_all.one
         else:

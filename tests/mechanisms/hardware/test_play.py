@@ -40,8 +40,11 @@ def between_plastic_stops(scenario, parts):
     """Positions of Van der Pol's cart at the samples, (K + 1,), under super-twisting: the flanks do
     not bounce.
     """
-    gains, h, bound = scenario.law.gains, scenario.control_period / parts, scenario.limits[0]
-    inertia, play = scenario.actuator[0].rotor_inertia, scenario.actuator[0].gap / 2
+    gains = scenario.law.gains
+    h = scenario.control_period / parts
+    bound = scenario.limits[0]
+    inertia = scenario.actuator[0].rotor_inertia
+    play = scenario.actuator[0].gap / 2
     x = y = scenario.resolved.x0[0]
     v = w = integral = 0.0
     positions = [x]

@@ -161,7 +161,8 @@ def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
 
 def test_without_holding_a_joint_creeps_where_friction_equals_the_load():
     """Why joints stick here: with hold=0 half of the limit moves a joint at F^-1, about 0.2 rad/s."""
-    p, load = (P1[0], P2[0], P3[0]), 0.5 * limits(0)[1]
+    p = (P1[0], P2[0], P3[0])
+    load = 0.5 * limits(0)[1]
     common = {"disturbance": smc.Constant(load), "duration": 5.0}
     creep = flywheel(0.1, 0.0, friction=smc.hardware.Sigmoid(*p, hold=0.0), **common).v[-1, 0]
     assert sigmoid(creep, *p) == pytest.approx(load, rel=1e-6)
@@ -175,9 +176,11 @@ def test_a_joint_breaks_away_at_the_holding_force(hold):
     if hold is None:
         low, high = limits(0)
     else:
-        low, high = (-hold, hold)
+        low = -hold
+        high = hold
     for most, slope in ((high, 0.2), (low, -0.2)):
-        part, load = smc.hardware.Sigmoid(P1[0], P2[0], P3[0], hold=hold), smc.signals.Ramp(slope)
+        part = smc.hardware.Sigmoid(P1[0], P2[0], P3[0], hold=hold)
+        load = smc.signals.Ramp(slope)
         trace = flywheel(0.1, 0.0, friction=part, disturbance=load, duration=2.5)
         start = np.argmax(np.abs(trace.v[:, 0]) > 0.01)
         assert abs(trace.d[start, 0]) == pytest.approx(abs(most), rel=0.02)
@@ -204,7 +207,8 @@ def test_a_joint_at_rest_stays_and_one_torn_loose_slides():
 
 
 def test_stuck_joints_are_critically_damped():
-    load, part = 0.1, smc.hardware.Sigmoid(P1[0], P2[0], P3[0])
+    load = 0.1
+    part = smc.hardware.Sigmoid(P1[0], P2[0], P3[0])
     fields = {"disturbance": smc.Constant(load), "duration": 0.4, "control_period": 5e-4}
     trace = flywheel(0.1, 0.0, friction=part, **fields)
     expected = load / (0.1 * 200.0**2)
@@ -302,11 +306,9 @@ def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():
 
 def published(model, fitted, motor, external, v):
     """The dry friction and the damping of Rhoban/bam's Model.compute_frictions, for arrays."""
-    stribeck, loaded, directional = (
-        model in ("m2", "m4", "m5", "m6"),
-        model not in ("m1", "m2"),
-        model in ("m5", "m6"),
-    )
+    stribeck = model in ("m2", "m4", "m5", "m6")
+    loaded = model not in ("m1", "m2")
+    directional = model in ("m5", "m6")
     if stribeck:
         near = np.exp(-(np.abs(v / fitted["dtheta_stribeck"]) ** fitted["alpha"]))
     else:
@@ -350,10 +352,8 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
             numbers = functools.partial(
                 reference.sliding_friction, friction, reference.friction_numbers(friction, 0)
             )
-            speeds, torques = (
-                np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0],
-                np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0],
-            )
+            speeds = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0]
+            torques = np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]
             for v in speeds:
                 for motor in torques:
                     for load in torques:
@@ -393,11 +393,10 @@ def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
 
 def ends(model, weight):
     """The torques at which a servo that holds a weight of so many N m lifts it, and lets it fall."""
-    servo, plant = (
-        smc.hardware.servo("mx106", model),
-        smc.plant("pendulum_network", n=2, kc=0.0, b=0.0),
-    )
-    p, found = plant.values({}), []
+    servo = smc.hardware.servo("mx106", model)
+    plant = smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
+    p = plant.values({})
+    found = []
     level = math.asin(weight / (p.m * p.grav * p.l))
     for slope in (0.2, -0.2):
         u = smc.signals.TimeSeries([0.0, 10.0], [weight, weight + 10.0 * slope])
@@ -425,7 +424,8 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
     """
     from scipy.optimize import brentq
 
-    weight, fitted = 1.0, SERVOS["mx106"][model]
+    weight = 1.0
+    fitted = SERVOS["mx106"][model]
     lift, drop = ends(model, weight)
 
     def held(m):
@@ -435,7 +435,8 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
     down: Any = brentq(lambda m: weight - m - held(m), -5.0, weight)
     assert lift == pytest.approx(up, abs=0.015)
     assert drop == pytest.approx(down, abs=0.015)
-    driving, driven_back = lift - weight, weight - drop
+    driving = lift - weight
+    driven_back = weight - drop
     if model in ("m1", "m2"):
         assert driving == pytest.approx(driven_back, rel=0.05)
     else:

@@ -21,7 +21,8 @@ from smc_mujoco.simulation.prepare import motors_at_start
 PERIOD = 5e-3  # s, of the control
 MOTOR = Stepper(steps=1600, torque=0.3, damping=4e-3, speed=60.0, ramp=80.0, stop_band=0.2)
 # accelerations that turn, and stop; rates below and above sqrt(2 ramp)
-SLOW, FAST = smc.Sine(6.0, 17.0, phase=math.pi / 2), smc.Sine(40.0, 25.0, phase=math.pi / 2)
+SLOW = smc.Sine(6.0, 17.0, phase=math.pi / 2)
+FAST = smc.Sine(40.0, 25.0, phase=math.pi / 2)
 KINDS = {
     "slow": (MOTOR, SLOW),
     "fast": (MOTOR, FAST),
@@ -55,12 +56,19 @@ def steps_by_events(motor, commands, phase, duration):
     `commands`: (time, u) of the samples.
     """
     per = motor.steps * motor.gear / math.tau
-    ramp, speed, wish, last = motor.ramp * per, 0.0, (0, 0), 0.0
+    ramp = motor.ramp * per
+    speed = 0.0
+    wish = (0, 0)
+    last = 0.0
     events = [(t, 0, u) for t, u in commands]
     if motor.refill:
         looks = [(k + phase) * motor.refill for k in range(math.ceil(duration / motor.refill))]
         events += [(t, 1, 0.0) for t in looks if t < duration]
-    steps, way, n, period, free = [], 0, 0, math.inf, 0.0
+    steps = []
+    way = 0
+    n = 0
+    period = math.inf
+    free = 0.0
 
     def next_step():
         """Return the period of a step that is added, 0 for none."""
@@ -72,7 +80,9 @@ def steps_by_events(motor, commands, phase, duration):
         if way and wanted != way:
             way = 0
         if not way:
-            way, n, period = wanted, 0, math.inf
+            way = wanted
+            n = 0
+            period = math.inf
         if not way:
             return 0.0
         if 1.0 / rate < period:
@@ -99,7 +109,9 @@ def steps_by_events(motor, commands, phase, duration):
                 pass
             continue
         speed = max(-motor.speed * per, min(motor.speed * per, speed + u * per * (t - last)))
-        last, rate, sign = t, math.floor(abs(speed) + 1e-9), 1 if speed >= 0.0 else -1
+        last = t
+        rate = math.floor(abs(speed) + 1e-9)
+        sign = 1 if speed >= 0.0 else -1
         stops = abs(speed) < motor.stop_band * per or rate < 1 or wish[0] == -sign
         wish = (0, 0) if stops else (sign, rate)
         if i + 1 < len(events):
@@ -115,7 +127,9 @@ def field_of(motor, steps):
     """Knots (t, position of the field in rad of the joint) of a piecewise linear field; two at a
     jump.
     """
-    knots, target, before = [(0.0, 0.0)], 0, -math.inf
+    knots = [(0.0, 0.0)]
+    target = 0
+    before = -math.inf
 
     def at(t):
         if len(knots) > 1:
@@ -145,7 +159,10 @@ def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
     grid = np.unique(
         np.concatenate([np.arange(0.0, times[-1], substep), times, knots[knots <= times[-1]]])
     )
-    x, v, impulse, values = x0, 0.0, 0.0, plant.values({})
+    x = x0
+    v = 0.0
+    impulse = 0.0
+    values = plant.values({})
     rows = []
 
     def torque(place, x):
@@ -189,7 +206,8 @@ def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
 
 def by_events(one):
     """Steps of a scenario's motor by events, with the commands of its run's samples."""
-    s, motor = one.resolved, one.stepper
+    s = one.resolved
+    motor = one.stepper
     trace = smc.run(one)
     commands = list(zip(trace.t, trace.u[:, 0], strict=True))
     return trace, steps_by_events(motor, commands[:-1], motors_at_start(s)[0]["phase"], trace.t[-1])
@@ -262,7 +280,8 @@ def test_the_callback_is_the_reference_loop_to_the_last_bit(name):
         "x0": 0.3,
     } | CONDITIONS[name]
     one = smc.Scenario(**fields, duration=0.4, control_period=PERIOD, seed=2)
-    compiled, looped = smc.run(one), reference.run(one)
+    compiled = smc.run(one)
+    looped = reference.run(one)
     for column, values in compiled.arrays().items():
         assert np.array_equal(values, looped.arrays()[column]), column
 
@@ -272,7 +291,9 @@ def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
     one = scenario(
         dataclasses.replace(MOTOR, steps=math.inf), SLOW, clock=smc.Clock(missed=0.3), duration=0.5
     )
-    loop, speed, last = looped(one), 0.0, 0.0
+    loop = looped(one)
+    speed = 0.0
+    last = 0.0
     for k, t in enumerate(PERIOD * np.arange(one.samples)):
         if loop.late(k) >= 0:
             speed, last = speed + loop.log["u"][k, 0] * (t - last), t
@@ -295,12 +316,16 @@ def pushed(y, gains, memory):
 
 
 def test_the_nominal_model_has_the_acceleration_as_its_input():
-    plant, x, v = smc.plant("furuta", bq=1e-5), (0.3, 0.2), (1.0, 2.0)
+    plant = smc.plant("furuta", bq=1e-5)
+    x = (0.3, 0.2)
+    v = (1.0, 2.0)
     trace = smc.run(
         scenario(MOTOR, None, plant, law=pushed(), model="nominal", x0=x, v0=v, duration=0.01)
     )
     p = plant.values({})
-    Jp, s, c = p.Jc + p.m * p.l**2, math.sin(x[1]), math.cos(x[1])
+    Jp = p.Jc + p.m * p.l**2
+    s = math.sin(x[1])
+    c = math.cos(x[1])
     torque = (
         Jp * s * c * v[0] ** 2 + p.m * p.grav * p.l * s - p.bq * v[1] - p.m * p.L * p.l * c * 3.0
     )

@@ -19,7 +19,8 @@ def implicit_observer(y, gains, memory):
     """Two signs at the end of the period: u = -a S1 - alpha S2 of s and s - z, where z' = -a S1
     starts at `start`.
     """
-    a, alpha = gains.a * y.dt, gains.alpha * y.dt
+    a = gains.a * y.dt
+    alpha = gains.alpha * y.dt
     second = min(max((y.de - gains.start - memory[0]) / alpha, -1.0), 1.0)
     first = min(max((y.de - alpha * second) / a, -1.0), 1.0)
     memory[0] -= a * first
@@ -29,7 +30,8 @@ def implicit_observer(y, gains, memory):
 @law_function(gains=GAINS, positive=("a", "alpha"), memory=1)
 def explicit_observer(y, gains, memory):
     """The same with both signs at the start of the period."""
-    first, second = sgn(y.de), sgn(y.de - gains.start - memory[0])
+    first = sgn(y.de)
+    second = sgn(y.de - gains.start - memory[0])
     memory[0] -= y.dt * gains.a * first
     return -gains.a * first - gains.alpha * second, y.de
 
@@ -47,7 +49,9 @@ def with_model(y, gains, memory):
     e = x - z, s_e = e' + ke e. Both signs are at the end of the period. The model starts at rest in
     0.
     """
-    h, e, de = y.dt, y.e - memory[0], y.de - memory[1]
+    h = y.dt
+    e = y.e - memory[0]
+    de = y.de - memory[1]
     linear = gains.ke * de + gains.ks * (de + gains.ke * e)
     free = (de - h * linear) + gains.ke * e / (1.0 + h * gains.ke)
     w = linear + gains.Mv * min(max(free / (h * gains.Mv), -1.0), 1.0)
@@ -81,9 +85,12 @@ def observed_twisting_60(y, gains, memory):
     h = y.dt
     position, velocity = 1.0 + memory[0], 1.0 + memory[1]  # predicted for this sample
     b = y.e - position
-    sign, error = b / (h * h * gains.k3), 0.0
+    sign = b / (h * h * gains.k3)
+    error = 0.0
     if abs(sign) > 1.0:
-        sign, lead, half = sgn(b), 1.0 + h * gains.k2 + h * h * gains.k4, 0.5 * h * gains.k1
+        sign = sgn(b)
+        lead = 1.0 + h * gains.k2 + h * h * gains.k4
+        half = 0.5 * h * gains.k1
         root = (math.sqrt(half * half + lead * (abs(b) - h * h * gains.k3)) - half) / lead
         error = sign * root * root
     estimate = velocity + h * (gains.k3 * sign + gains.k4 * error)
@@ -101,7 +108,8 @@ def variation_of(signal):
 def means(trace):
     """Return the mean of d over the period that begins at each sample, N, (samples, 1)."""
     (d,) = trace.scenario.disturbance
-    h, angle = trace.scenario.control_period, d.omega * trace.t
+    h = trace.scenario.control_period
+    angle = d.omega * trace.t
     return (d.amplitude * (np.cos(angle) - np.cos(angle + d.omega * h)) / (d.omega * h))[:, None]
 
 
@@ -163,7 +171,8 @@ def reaching(runs):
 
 def explicit(runs):
     """Total variation of u, and the largest |x|, implicit over explicit."""
-    traces, ratios = runs.traced(runs.grid()), {}
+    traces = runs.traced(runs.grid())
+    ratios = {}
     measures = {
         "variation of u, implicit / explicit": lambda trace: variation_of(trace.u),
         "largest |x|, implicit / explicit": lambda trace: largest(trace.v),
@@ -178,7 +187,8 @@ def at_periods(runs, condition, count=None):
     """Return period -> trace of the claim's law at the first periods, with one step of the plant a
     period.
     """
-    law, periods = runs.laws[0], runs.values["periods"][:count]
+    law = runs.laws[0]
+    periods = runs.values["periods"][:count]
     return runs.traced(
         {
             h: runs.scenario(runs.plant, law, condition, control_period=h, physics_step=h)

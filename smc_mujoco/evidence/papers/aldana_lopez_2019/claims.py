@@ -27,7 +27,8 @@ def general_fixed_time(y, gains, memory):
 def gamma(gains):
     """Return the least bound of the general system, s."""
     A, B, p, q, k = (gains[name] for name in "ABpqk")
-    m, n = (1.0 - k * p) / (q - p), (k * q - 1.0) / (q - p)
+    m = (1.0 - k * p) / (q - p)
+    n = (k * q - 1.0) / (q - p)
     return math.gamma(m) * math.gamma(n) * (A / B) ** m / (A**k * math.gamma(k) * (q - p))
 
 
@@ -49,7 +50,8 @@ def general_margins(gains):
 def least_bound(law):
     """Return the supremum of the settling times over all starts, s."""
     k1, k2, a, b = (law.gains[name] for name in ("k1", "k2", "a", "b"))
-    m, n = (1.0 - a) / (b - a), (b - 1.0) / (b - a)
+    m = (1.0 - a) / (b - a)
+    n = (b - 1.0) / (b - a)
     return math.gamma(m) * math.gamma(n) * (k1 / k2) ** m / (k1 * (b - a))
 
 
@@ -103,7 +105,8 @@ def predefined(runs):
     """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the time Tc that the gains
     were scaled for.
     """
-    law, cells = runs.law(runs.plant, *runs.laws), {}
+    law = runs.law(runs.plant, *runs.laws)
+    cells = {}
     for tc in runs.values["times"][: 1 if runs.quick else None]:
         gains = {gain: least_bound(law) / tc * law.gains[gain] for gain in ("k1", "k2")}
         cells[tc] = runs.plant, runs.law(runs.plant, *runs.laws, **gains), runs.values["start"]

@@ -72,7 +72,8 @@ def long_run(runs, plant, lam, position, rate=0.0):
     """Return a run of 40 s with another lambda, from position times x0 with every channel at rate
     times |x0| per s.
     """
-    x0, law = find_plant(plant).x0, with_gains(runs.law(plant, OURS), lam=lam)
+    x0 = find_plant(plant).x0
+    law = with_gains(runs.law(plant, OURS), lam=lam)
     start = {"x0": [position * x for x in x0], "v0": rate * max(map(abs, x0)), "duration": LONG_RUN}
     return runs.scenario(
         plant, OURS, law=law, control_period=LONG_PERIOD, physics_step=LONG_PERIOD, **start
@@ -151,9 +152,11 @@ def largest_delays(runs, plants, laws, within=TOLERATED_ERROR):
     searched as well.
     """
     if runs.quick:
-        apart, integrator = (QUICK_RESOLUTION, "implicitfast")
+        apart = QUICK_RESOLUTION
+        integrator = "implicitfast"
     else:
-        apart, integrator = (1, "RK4")
+        apart = 1
+        integrator = "RK4"
     levels = [
         0,
         *(periods for delay in DELAYS if (periods := round(delay / CONTROL_PERIOD)) >= apart),
@@ -207,7 +210,8 @@ def smallest_stable(runs):
     values.
     """
     ends = dying(runs, dict.fromkeys(runs.plants, (MIN_LAMBDA, U_MAX)))
-    low, high = dict.fromkeys(runs.plants, MIN_LAMBDA), dict.fromkeys(runs.plants, U_MAX)
+    low = dict.fromkeys(runs.plants, MIN_LAMBDA)
+    high = dict.fromkeys(runs.plants, U_MAX)
     for _ in range(QUICK_ROUNDS if runs.quick else ROUNDS):
         tried = {
             plant: np.geomspace(low[plant], high[plant], INNER_VALUES + 2).tolist()
@@ -242,7 +246,8 @@ def dies_out(trace):
     Fast modes are over in the second fifth. The start counts since a run may come to rest in
     another well.
     """
-    fifth, size = len(trace.t) // 5, np.abs(trace.x).max(axis=1)
+    fifth = len(trace.t) // 5
+    size = np.abs(trace.x).max(axis=1)
     return bool(
         size[-fifth:].max() < min(size[fifth : 2 * fifth].max(), size[0])
     )  # NaN, of a failed run, is not
@@ -328,7 +333,8 @@ def robust(runs):
 
 def scalable(runs):
     """Claim 7: scalable."""
-    sizes, ratios = [n for n in runs.values["sizes"] if n <= QUICK_MAX_SIZE or not runs.quick], {}
+    sizes = [n for n in runs.values["sizes"] if n <= QUICK_MAX_SIZE or not runs.quick]
+    ratios = {}
     for plant in runs.plants:
         networks = [find_plant(plant, n=n) for n in sizes]
         grid = []
@@ -383,7 +389,9 @@ def never_chatters(runs):
         for period in (periods[0], periods[-1]):
             for delay in ends:
                 cells.append((period, delay))
-    rate, at, limit = {}, {}, {}
+    rate = {}
+    at = {}
+    limit = {}
     for plant in runs.plants:
         scores = runs.scores(
             runs.scenario(plant, OURS, control_period=period * 1e-3, input_delay=delay * 1e-3)
@@ -405,7 +413,8 @@ def never_chatters(runs):
 
 def better(runs):
     """Claim 12: better smoothness and robustness than the alternatives."""
-    checks, beside = [], []
+    checks = []
+    beside = []
     for plant in runs.plants:
         for sentence, name, metric, condition in MEASURES:
             values = {
@@ -447,10 +456,12 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
     states = np.column_stack([0.3 * np.sin(7 * t), 2.1 * np.cos(7 * t)])
     # kept alive while their addresses are used
     functions = {name: cfunctions.compile_component(law) for name, law in laws.items()}
-    shortest, loop = dict.fromkeys(laws, np.inf), _loop()
+    shortest = dict.fromkeys(laws, np.inf)
+    loop = _loop()
     for _ in range(QUICK_TIMED_ROUNDS if quick else TIMED_ROUNDS):
         for name, law in laws.items():
-            seen, gains = np.zeros(len(FIELD_INDEX)), np.array([*law.gains.values(), 0.0])
+            seen = np.zeros(len(FIELD_INDEX))
+            gains = np.array([*law.gains.values(), 0.0])
             for field, value in FIXED_FIELDS.items():
                 seen[FIELD_INDEX[field]] = value
             arrays = seen, gains, np.zeros(law.memory), np.zeros(2)
@@ -466,7 +477,8 @@ def _loop() -> Callable:
     """Return a compiled loop that calls a law once per state."""
     from numba import njit
 
-    e, de = FIELD_INDEX["e"], FIELD_INDEX["de"]
+    e = FIELD_INDEX["e"]
+    de = FIELD_INDEX["de"]
 
     @njit
     def loop(function, seen, states, addresses):
@@ -502,7 +514,8 @@ JERK_SHARES = (1.05, 1.5)
 
 def higher_degree(runs):
     """Claim 15: general relative degree r."""
-    third, grid = runs.mutated(find_law("observer_free_third")), {}
+    third = runs.mutated(find_law("observer_free_third"))
+    grid = {}
     for name in runs.plants:
         jerk = lyapunov.input_gain(find_plant(name)) * U_MAX / LAG
         velocities = [estimator("levant", L=share * jerk) for share in JERK_SHARES]
@@ -552,9 +565,11 @@ MIN_RISE_SHARE = 1e-12  # of the run's largest V: less is rounding
 
 def decreases(runs):
     """Claim 18: Vdot <= -eps s^2 for all s != 0."""
-    share, worst = {}, {}
+    share = {}
+    worst = {}
     for name in runs.plants:
-        plant, gains = find_plant(name), runs.law(name, OURS).gains
+        plant = find_plant(name)
+        gains = runs.law(name, OURS).gains
         x, v = lyapunov.plane(plant, gains["k1"], points=51 if runs.quick else lyapunov.GRID_POINTS)
         states = plant, gains["lam"], gains["k1"], x, v
         rate = np.where(
@@ -575,7 +590,8 @@ def never_rises(runs):
     """Claim 19: V decreases monotonically."""
     rising = {}
     for trace in runs.traces([runs.scenario(name, OURS) for name in runs.plants]):
-        plant, gains = trace.scenario.plant, trace.scenario.law.gains
+        plant = trace.scenario.plant
+        gains = trace.scenario.law.gains
         s = (
             trace.v + gains["k1"] * trace.x - trace.u / lyapunov.input_gain(plant)
         )  # alpha - u / g, u of the actuator
@@ -655,7 +671,8 @@ def side_by_side(runs):
 
 def moderate_undershoot(runs):
     """Claim 31: Van der Pol: moderate undershoot."""
-    over, threshold = overshoot(runs, runs.plant, OURS), runs.thresholds["overshoot, %"]
+    over = overshoot(runs, runs.plant, OURS)
+    threshold = runs.thresholds["overshoot, %"]
     what = f"{runs.plant}: overshoot of {OURS}, percentage points outside {threshold.text} %"
     checked = runs.check(
         "overshoot, %", what, threshold.distance(over)
@@ -721,11 +738,9 @@ def distortion(runs):
             runs.scenario(plant, law, plant=one) for law in (CLASSICAL, OURS) for one in coupled
         )
         over = [score["overshoot"] for score in scores]
-        what, classical, ours = (
-            f"{plant}: overshoot of",
-            "overshoot of classical",
-            "overshoot of the paper's law",
-        )
+        what = f"{plant}: overshoot of"
+        classical = "overshoot of classical"
+        ours = "overshoot of the paper's law"
         checks += [
             slower(runs, plant, CLASSICAL),
             runs.check(
@@ -763,7 +778,8 @@ def settles_as_well(runs):
 
 def removes_chattering(runs):
     """Claim 52: removes the chattering of classical and adaptive."""
-    rivals, laws = (CLASSICAL, ADAPTIVE), (OURS, CLASSICAL, ADAPTIVE)
+    rivals = (CLASSICAL, ADAPTIVE)
+    laws = (OURS, CLASSICAL, ADAPTIVE)
     rates = {
         (plant, law): runs.score(plant, law)["tv_rate"] for plant in runs.plants for law in laws
     }
@@ -795,10 +811,8 @@ def nearly_identical(runs):
         law: runs.score(runs.plant, law, "sine")["ultimate_bound"]
         for law in (OURS, *RIVALS, UNCLAMPED)
     }
-    what, apart = (
-        f"{runs.plant}: residual under d of",
-        f"{runs.plant}: deviation from nominal under d, over |x0|",
-    )
+    what = f"{runs.plant}: residual under d of"
+    apart = f"{runs.plant}: deviation from nominal under d, over |x0|"
     checks = []
     for law in RIVALS:
         checks.append(
@@ -845,7 +859,8 @@ def fluctuation(trace):
     u = trace.u[conventions.last_part(trace)]
     if not np.isfinite(u).all():
         return np.inf, np.inf, np.inf
-    std, step = float(u.std(axis=0).max()), float(np.abs(np.diff(u, axis=0)).max())
+    std = float(u.std(axis=0).max())
+    step = float(np.abs(np.diff(u, axis=0)).max())
     power = (np.abs(np.fft.rfft(u - u.mean(axis=0), axis=0)) ** 2).max(axis=1)
     frequency = np.fft.rfftfreq(len(u), trace.scenario.control_period)
     return (
@@ -862,7 +877,8 @@ NEAR_FACTOR, FAR_FACTORS = (
     (1.0, 2.0),
 )  # of x0, chosen: tanh is linear; the study starts, and beyond
 MIN_BOUND = 1e-9  # N m or N: an actuator's bound if lambda is 0
-SERIES_LAW, FIXED_POINT_LAW = "observer_free_series", "observer_free_q15"
+SERIES_LAW = "observer_free_series"
+FIXED_POINT_LAW = "observer_free_q15"
 
 
 @law_function(gains={"lam": 6.0, "k1": 2.5}, positive=("lam",))
@@ -896,10 +912,8 @@ def cheap_tanh(runs):
             [nominal, *(replace(nominal, law=law) for law in cheap(runs, nominal.law))]
         )
         for name, trace in zip(CHEAP_TANH_GAINS, traces, strict=True):
-            time, apart = (
-                math.inf if trace.failure else settling_time(trace),
-                deviation(trace, reference),
-            )
+            time = math.inf if trace.failure else settling_time(trace)
+            apart = deviation(trace, reference)
             both = [
                 runs.check(
                     "deviation", f"{plant}, {name}: deviation, over |x0|", apart, sentence=name
@@ -977,7 +991,8 @@ def decay_rate(trace):
 
 def jumps(runs):
     """Claim 59: abrupt parameter jump: may not converge, stability preserved."""
-    peaks, bounds = {}, []
+    peaks = {}
+    bounds = []
     for plant in runs.plants:
         for condition in runs.conditions:
             (trace,) = runs.traces([runs.scenario(plant, OURS, condition)])
@@ -1000,7 +1015,8 @@ def delay_tolerant(runs):
     longest, below = (
         largest_delays(runs, runs.plants, tried, within) for within in (TOLERATED_ERROR, 1.0)
     )
-    checks, beside = [], []
+    checks = []
+    beside = []
     for plant in runs.plants:
         ours = longest[plant, OURS]
         for law in RIVALS:
@@ -1069,7 +1085,8 @@ def table_one(runs):
     evidence = []
     for name, (unit, numbers) in properties.items():
         for (column, law), mark in zip(TABLE_COLUMNS.items(), TABLE_MARKS[name], strict=True):
-            certain, cell = ", cannot fail" * ((name, column) in CERTAIN_CELLS), f"{name}: {column}"
+            certain = ", cannot fail" * ((name, column) in CERTAIN_CELLS)
+            cell = f"{name}: {column}"
             what = f"{cell} (paper: {'+' if mark == '+' else '--'}), {unit}{certain}"
             plus = runs.check(name, what, numbers[law], sentence=cell)
             minus = check(what, plus.value, OPPOSITE_RELATIONS[plus.relation], plus.limit, cell)
@@ -1100,9 +1117,11 @@ def growth(runs, law):
     """Return the growth of max |u|, far off against nearer or late against early, as a share; worst
     plant.
     """
-    rises, samples = [], round(HOLD_DURATION / CONTROL_PERIOD)
+    rises = []
+    samples = round(HOLD_DURATION / CONTROL_PERIOD)
     for plant in runs.plants:
-        bound, start = runs.law(plant, law), scale(runs.scenario(plant, law))
+        bound = runs.law(plant, law)
+        start = scale(runs.scenario(plant, law))
         near, far = (
             np.abs(commanded(bound, np.full(2 * samples, factor * start)))
             for factor in (10.0, 100.0)
@@ -1126,9 +1145,11 @@ def commanded(law, x, v=None, **signals):
     """Return what a law commands, sample by sample, in open loop: the signals do not depend on its
     command.
     """
-    function, gains = rebuild(law.function, lambda same: same), SimpleNamespace(**law.gains)
+    function = rebuild(law.function, lambda same: same)
+    gains = SimpleNamespace(**law.gains)
     memory, v = np.zeros(law.memory), np.zeros_like(x) if v is None else v
-    seen, u = {"x": x, "e": x, "v": v, "de": v} | signals, np.empty(len(x))
+    seen = {"x": x, "e": x, "v": v, "de": v} | signals
+    u = np.empty(len(x))
     rest = dict.fromkeys(("x", "v", "e", "de", "r", "dr", "ddr", "f"), 0.0) | {
         "g": 1.0,
         "dt": CONTROL_PERIOD,

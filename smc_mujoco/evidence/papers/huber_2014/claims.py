@@ -14,7 +14,8 @@ def implicit_twisting(y, gains, memory):
     S1 is in sgn(e+ + dt/2 e'+) and S2 in sgn(e'+), with e'+ = e' + dt v and e+ = e + dt (e' +
     e'+)/2, v the acceleration of the error.
     """
-    a, b = gains.G * (1.0 + gains.beta * y.dt / 2.0), gains.G * gains.beta
+    a = gains.G * (1.0 + gains.beta * y.dt / 2.0)
+    b = gains.G * gains.beta
     return command(y, two_signs(-(y.e + 1.5 * y.dt * y.de) / y.dt**2, a, -y.de / y.dt, b)), y.e
 
 
@@ -47,7 +48,8 @@ def ratios(runs, scenarios, names):
         "variation of u": lambda trace: np.abs(np.diff(quarter(trace.u), axis=0)).sum(),
         "mean square of e": lambda trace: np.mean(quarter(trace.x - trace.r) ** 2),
     }
-    traces, shares = runs.traces(scenarios), {}
+    traces = runs.traces(scenarios)
+    shares = {}
     for what, of in measures.items():
         pairs = zip(map(of, traces[::2]), map(of, traces[1::2]), strict=True)
         by_name = {}

@@ -15,7 +15,8 @@ def classical_margins(gains):
 
 def twisting_margins(gains):
     """The two conditions of twisting for e'' = g (u + d), N."""
-    r1, r2 = gains["r1"], gains["r2"]
+    r1 = gains["r1"]
+    r2 = gains["r2"]
     return {
         "(r1 + r2) - D > (r1 - r2) + D, N": 2.0 * (r2 - FORCE),
         "r1 - r2 > D, N": r1 - r2 - FORCE,
@@ -32,7 +33,8 @@ def super_twisting_margins(gains):
 
 def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""
-    starts, values = runs.values.get("starts", [0.5]), runs.values
+    starts = runs.values.get("starts", [0.5])
+    values = runs.values
     if runs.quick:
         plants, starts = (runs.plants[:1], starts[:1])
     else:

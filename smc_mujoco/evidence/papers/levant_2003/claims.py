@@ -35,7 +35,8 @@ def noise(runs):
     the same for every eps, relative to the speed of the loop. At one fixed period, white noise
     averages out where the loop is slow.
     """
-    values, scenarios = runs.values, []
+    values = runs.values
+    scenarios = []
     eps = [(h / values["pace"]) ** 3 for h in values["periods"]]
     for h, size in zip(values["periods"], eps, strict=True):
         sampled = {
@@ -84,9 +85,11 @@ def standard_chatters(runs):
     """Largest step of u of the last tenth of 12 s over 2 k, and half the range of the force behind
     the lag over k.
     """
-    steps, forces = {}, {}
+    steps = {}
+    forces = {}
     for (plant, *_), trace in runs.traced(runs.grid()).items():
-        last, k = slice(-int(END_SHARE * len(trace.t)), -1), trace.scenario.law.gains["k"]
+        last = slice(-int(END_SHARE * len(trace.t)), -1)
+        k = trace.scenario.law.gains["k"]
         steps[plant] = float(np.abs(np.diff(trace.u[last], axis=0)).max()) / (2.0 * k)
         forces[plant] = float(np.ptp(trace.force[last])) / (2.0 * k)
     return {"largest step of u / 2 k": steps, "amplitude of the force / k": forces}

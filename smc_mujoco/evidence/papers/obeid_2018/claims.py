@@ -49,10 +49,8 @@ def limit(runs):
         grid = {}
         for h in runs.values["periods"]:
             size = share * (2.0 * (eps / h) ** 0.5 - 1.0)
-            adapted, d = (
-                runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size),
-                smc.Sine(size, 2.0),
-            )
+            adapted = runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size)
+            d = smc.Sine(size, 2.0)
             name = f"{1e3 * h:g} ms, D = {size:.3g} N"
             grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
         measured[f"{side}: largest |s| of the last half / eps"] = runs.measured(
@@ -96,7 +94,8 @@ def falls(runs):
     """
     (trace,) = runs.traces(runs.grid(**sampled(runs)).values())
     inside, after = np.searchsorted(trace.t, (4.0, 6.0))
-    gain, force = float(abs(trace.u[inside, 0])), float(abs(trace.d[inside, 0]))
+    gain = float(abs(trace.u[inside, 0]))
+    force = float(abs(trace.d[inside, 0]))
     rest = float(np.abs(trace.u[after:-1]).max())
     return {"gain a second after the pulse / gain in it": rest / gain if gain else np.nan} | {
         "gain in the pulse / |d|": gain / force

@@ -49,7 +49,8 @@ def relay(runs, bound):
 
 def predicted(k1, k2, lag):
     """Return amplitude and frequency, Hz, of super-twisting by harmonic balance."""
-    a, b = FIRST_HARMONIC * k1, 16.0 * k2 / math.pi
+    a = FIRST_HARMONIC * k1
+    b = 16.0 * k2 / math.pi
     return lag**2 * (a * a + b) ** 2 / (4.0 * a * a), a / (lag * math.sqrt(a * a + b)) / math.tau
 
 
@@ -124,10 +125,8 @@ def some_disturbance(runs):
     for bound in runs.values["bounds"]:
         for lag in runs.values["lags"][QUICK_LAG if runs.quick else 0 :]:
             omega = runs.values["pace"] / lag
-            laws, d = (
-                (relay(runs, bound), super_twisting(runs, bound * omega)),
-                smc.Sine(bound, omega),
-            )
+            laws = (relay(runs, bound), super_twisting(runs, bound * omega))
+            d = smc.Sine(bound, omega)
             cases[f"|d| <= {bound:g} N, {1e3 * lag:g} ms"] = laws, lag, {"disturbance": d}
     return ratios(runs, "FOSMC / STA", cases)
 
@@ -136,11 +135,10 @@ def small_lags(runs):
     """Half the range of s, and the mean square of s', under d = sin t, L = 1, at ATCs of 1 to 10
     ms.
     """
-    bound, lags = runs.values["bound"], runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
-    laws, changes = (
-        (super_twisting(runs, bound), relay(runs, bound)),
-        {"disturbance": smc.Sine(bound, 1.0)},
-    )
+    bound = runs.values["bound"]
+    lags = runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
+    laws = (super_twisting(runs, bound), relay(runs, bound))
+    changes = {"disturbance": smc.Sine(bound, 1.0)}
     return ratios(
         runs,
         "STA / FOSMC",
@@ -152,8 +150,10 @@ def crossover(runs):
     """Amplitudes of s at the ATC where the two predictions are equal, at half and at twice of it,
     without d.
     """
-    bound, slope = runs.values["bound"], runs.values["slope"]
-    twisting, sign = super_twisting(runs, slope), relay(runs, bound)
+    bound = runs.values["bound"]
+    slope = runs.values["slope"]
+    twisting = super_twisting(runs, slope)
+    sign = relay(runs, bound)
     equal = (2.0 * RELAY_GAIN_RATIO * bound / math.pi) / predicted(
         1.5 * math.sqrt(slope), 1.1 * slope, 1.0
     )[0]

@@ -31,7 +31,8 @@ def winds_up(runs):
     else:
         starts = runs.values["starts"]
     grid = {f"from {start:g} m/s": runs.only(v0=start) for start in starts}
-    gains, bound = runs.law(runs.plant, *runs.laws).gains, runs.only().u_max
+    gains = runs.law(runs.plant, *runs.laws).gains
+    bound = runs.only().u_max
     most = min(bound**2 / (2.0 * gains["k2"]), (bound / gains["k1"]) ** 2)
     beyond = runs.measured(
         grid, lambda trace: -float(trace.v.min()) / most if trace.v.min() <= 0.0 else math.nan

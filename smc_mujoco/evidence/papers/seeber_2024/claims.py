@@ -24,7 +24,8 @@ def margins(gains):
 def slopes(period, duration, seed):
     """Return d with a slope of L or -L over each period, drawn by a seed, and |d| <= 1."""
     count = round(duration / period)
-    values, steps = [0.0], np.random.default_rng(seed).choice((-1.0, 1.0), count) * L * period
+    values = [0.0]
+    steps = np.random.default_rng(seed).choice((-1.0, 1.0), count) * L * period
     for step in steps:
         values.append(values[-1] + (step if abs(values[-1] + step) <= MAX_DISTURBANCE else -step))
     return smc.signals.TimeSeries((np.arange(count + 1) * period).tolist(), values)
@@ -53,7 +54,8 @@ def random_runs(runs, law):
     seeds, periods = (
         runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods")
     )
-    grid, fields = {}, {"duration": 5.0, "v0": 0.1}
+    grid = {}
+    fields = {"duration": 5.0, "v0": 0.1}
     for period, seed in itertools.product(periods, seeds):
         drawn = {"control_period": period, "disturbance": slopes(period, 5.0, seed)}
         name = f"{1e3 * period:g} ms, seed {seed}"
@@ -108,7 +110,8 @@ def compared(runs):
     older implicit law.
     """
     proper, *others = runs.laws
-    ours, ratios = random_runs(runs, proper), {}
+    ours = random_runs(runs, proper)
+    ratios = {}
     for law in others:
         ratios |= {
             f"{law}, {name}": ours[name] / theirs for name, theirs in random_runs(runs, law).items()

@@ -138,7 +138,8 @@ def commands(record: Record, first: int) -> np.ndarray:
     The replay does not know the samples before its start, so that term follows from the first
     recorded command.
     """
-    gains, u = cascade.defaults, np.zeros(len(record["t"]) - first)
+    gains = cascade.defaults
+    u = np.zeros(len(record["t"]) - first)
     u[0] = record["u"][first] - gains["kv"] * gains["kp"] * (
         record["r"][first] - record["x"][first]
     )

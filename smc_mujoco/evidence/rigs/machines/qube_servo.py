@@ -133,7 +133,8 @@ def zero(q, record: Record) -> dict[str, float]:
     gaps -= gaps @ smooth @ smooth.T
     left = np.log(np.linalg.norm(gaps, axis=1))
     even, *likely = np.exp((left.min() - left) * _independent(gaps[0]))
-    best, reach = int(np.argmax(likely)), ANGLE_COUNT // 16
+    best = int(np.argmax(likely))
+    reach = ANGLE_COUNT // 16
     nearby = np.sum(np.roll(likely, reach - best)[: 2 * reach + 1])
     if nearby > MIN_PROBABILITY * (even + np.sum(likely)):
         return {"brush": float(angles[best])}
@@ -158,7 +159,8 @@ def commands(record: Record, first: int) -> np.ndarray:
     """
     from scipy.signal import lfilter
 
-    gains, n = state_feedback.defaults, len(record["t"]) - first
+    gains = state_feedback.defaults
+    n = len(record["t"]) - first
     lag = 1.0 + gains["cutoff"] * PERIOD
     target = record.get("target_alpha", np.zeros(first + n))
 

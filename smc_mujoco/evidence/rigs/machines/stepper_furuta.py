@@ -98,7 +98,9 @@ def start(seed):
 
 def steps_of(*targets):
     """Return a reference that steps to targets, (s, degrees)."""
-    times, values, before = [0.0], [0.0], 0.0
+    times = [0.0]
+    values = [0.0]
+    before = 0.0
     for time, target in targets:
         times += [time, time + 1e-3]
         values += [before, math.radians(target)]
