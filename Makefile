@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack check docs lowest entered tagged build report live gains gallery bench lock setup
+.PHONY: help demo promised test slow quick attack check docs lowest entered tagged build report gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -69,10 +69,6 @@ build: setup ## the wheel and the source archive, in dist/
 report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
 	$(BIN)/smc-mujoco report
 
-live: ## the live page, live/index.html: laws and machines in a browser
-	@./setup.sh requirements-live.lock
-	$(BIN)/smc-mujoco export live/index.html
-
 gains: setup ## the laws' gains again, tuned by one rule (within 90 minutes on two cores)
 	$(BIN)/python benchmarks/gains.py --all
 
@@ -94,7 +90,6 @@ lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to u
 	@# the other locks leave out what requirements.lock has, except what it has only for Windows
 	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
 	$(LOCK) pyproject.toml --extra all --group test --group check $$beside -o requirements-test.lock && \
-	$(LOCK) pyproject.toml --extra live $$beside -c requirements-test.lock -o requirements-live.lock && \
 	for group in bench docs; do \
 		$(LOCK) --group $$group $$beside -c requirements-test.lock -o requirements-$$group.lock || exit; done
 

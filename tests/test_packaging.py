@@ -149,10 +149,8 @@ def test_the_wheel_says_what_it_is_and_needs(wheel):
         "report",
         "cluster",
         "rl",
-        "live",
         "fmu",
         "proof",
-        "mcap",
         "all",
     }
     assert about["Author"] == "The smc_mujoco developers"

@@ -1,4 +1,4 @@
-"""Laws from and to C and FMUs, and the live page. An annex: nothing in the core imports it."""
+"""Laws from and to C and FMUs. An annex: nothing in the core imports it."""
 
 from smc_mujoco.common import lazy
 

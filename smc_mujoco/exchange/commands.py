@@ -1,18 +1,14 @@
-"""smc-mujoco export: a law as C or as an FMU, and plants with their laws as a page in a browser."""
+"""smc-mujoco export: a law as C or as an FMU."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
-
-ENDINGS = ".c", ".fmu", ".html"
 
 
 def export(
@@ -20,9 +16,9 @@ def export(
     what: Annotated[
         list[str],
         typer.Argument(
-            metavar="[LAW|PLANT...] OUT",
+            metavar="[LAW] OUT",
             autocompletion=options.LAWS,
-            help="A law, and OUT.c or OUT.fmu; or plants with one motor, and the page, as live/index.html.",
+            help="A law, and OUT.c or OUT.fmu.",
             show_default=False,
         ),
     ],
@@ -66,15 +62,8 @@ def export(
     binary: Annotated[
         bool, typer.Option(help="FMU: whether to compile a binary for this machine.")
     ] = True,
-    law: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LAW|FILE",
-            help="Page: your own law, in addition to the library's; may be repeated.",
-        ),
-    ] = None,
 ) -> None:
-    """Write a law as C or as an FMU, or a page on which MuJoCo runs in a browser, by OUT's ending.
+    """Write a law as C or as an FMU, by OUT's ending.
 
     LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or
     gains.json that `smc-mujoco tune --out` wrote; left out, it is the name of OUT, as
@@ -93,47 +82,25 @@ def export(
       --period seconds on the inputs as they are at that time. A law of many joints has a variable
       for each element: x[1], x[2], M[1,1], and inputs for those of M, h, g, the matrix C of
       Coriolis forces and the tip's Jacobian J that it reads.
-    - OUT.html: a page to choose laws, move sliders, push the machine and compare two laws, in a
-      folder of files that any web server can serve without this package and without network, for
-      example `python -m http.server --directory live`. The browser simulates the models of the
-      package under its laws, translated to JavaScript, with the same sampling, delay, noise and
-      integrator. The address of the page holds all that you set, so that a link shares it. The
-      first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so
-      has `pip install 'smc-mujoco[live]'`.
 
     Example: smc-mujoco export observer_free.c --gains lam=6,k1=3 --type float
 
     Example: smc-mujoco export super_twisting controller.fmu --gains k1=5,k2=8 --velocity levant
     --u-max 6
-
-    Example: smc-mujoco export duffing cart_pole live/index.html --law my_law.py
     """
-    outs = [text for text in what if Path(text).suffix in ENDINGS]
-    if len(outs) != 1:
-        raise ScenarioError(
-            f"{len(outs) or 'no'} files to write: give one that ends in {', '.join(ENDINGS)}"
-        )
-    out = Path(outs[0])
-    others = [text for text in what if text != outs[0]]
+    *laws, last = what
+    out = Path(last)
+    if out.suffix not in (".c", ".fmu"):
+        raise ScenarioError(f"cannot write {last}: end its name in .c or .fmu")
+    if len(laws) > 1:
+        raise ScenarioError(f"{len(laws)} laws for {out}: give one")
     of_fmu = "surface", "velocity", "period", "u_max", "model", "joint", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
     options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
-    options.only_for(ctx, ("law",), out.suffix == ".html", "OUT.html: give the law before OUT")
-    options.only_for(
-        ctx,
-        ("gains", "joints"),
-        out.suffix != ".html",
-        "OUT.c and OUT.fmu: give --law a law with gains",
-    )
-    if out.suffix == ".html":
-        _write_page(others, law or [], out)
-        return
-    if len(others) > 1:
-        raise ScenarioError(f"{len(others)} laws for {out}: give one")
     with delay_ctrl_c():
         from smc_mujoco.control import from_text
     chosen = from_text.law(
-        others[0] if others else out.stem, **from_text.parsed_gains(gains, "--gains")
+        laws[0] if laws else out.stem, **from_text.parsed_gains(gains, "--gains")
     )
     with delay_ctrl_c(), options.as_options({r"\bjoints=": "--joints "}):
         if out.suffix == ".c":
@@ -161,24 +128,6 @@ def export(
             )
             what_it_is = f"FMI 3.0, Co-Simulation, every {period:g} s"
     print(f"{out}, {out.stat().st_size / 1024:.0f} kB; {what_it_is}")
-
-
-def _write_page(plants: Sequence[str], laws: Sequence[str], out: Path) -> None:
-    """Build the live page of plants, with the library's laws and others."""
-    if out.name != "index.html":
-        raise ScenarioError(
-            f"the page is {out.name!r}: it is index.html in a folder, such as live/index.html"
-        )
-    with delay_ctrl_c():
-        from smc_mujoco.common.progress import bar
-        from smc_mujoco.exchange.live.build import DEFAULT_PLANTS
-        from smc_mujoco.exchange.live.build import live as build
-
-    terminal = Terminal()
-    with bar("the live page", shown=terminal.is_terminal):
-        page = build(plants or DEFAULT_PLANTS, laws, out.parent)
-    terminal.wrote(page)
-    terminal.note(f"serve it: python -m http.server --directory {page.parent}")
 
 
 # heading in the help -> commands

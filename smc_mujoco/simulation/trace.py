@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.lib import format as npy
 
-from smc_mujoco.common import annexes, html
+from smc_mujoco.common import html
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -281,15 +281,13 @@ class Trace:
         )
 
     def export(self, path: str | os.PathLike[str]) -> Path:
-        """Write the trace to a .csv, .parquet, .mat (MATLAB 5) or .mcap file, without losing a bit
-        of any number.
+        """Write the trace to a .csv, .parquet or .mat (MATLAB 5) file, without losing a bit.
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the
         fewest digits that identify each number (0.1, not 0.10000000000000001), and nan after a
         failure. Parquet: the `columns`; the metadata of each column has its "unit", and that of the
         schema the "scenario", as JSON. MAT: the arrays by name, (K + 1, n), a struct `units` with
-        the unit of each ("m, rad" if channels differ), and `scenario`. MCAP: the moving machine and
-        the arrays, for Foxglove and Rerun (`pip install 'smc-mujoco[mcap]'`).
+        the unit of each ("m, rad" if channels differ), and `scenario`.
 
         Raises:
           ScenarioError: the name has another ending.
@@ -297,7 +295,7 @@ class Trace:
         path = as_path(path)
         if path.suffix not in _WRITERS:
             raise ScenarioError(
-                f"cannot export to {path.name!r}: end the name in .csv, .mat, .mcap or .parquet"
+                f"cannot export to {path.name!r}: end the name in .csv, .mat or .parquet"
             )
         with replacing(path) as file:
             _WRITERS[path.suffix](self, file)
@@ -338,16 +336,7 @@ def _write_parquet(trace: Trace, file: Path) -> None:
         )
 
 
-def _write_mcap(trace: Trace, file: Path) -> None:
-    annexes.module("smc_mujoco.exchange.recording", "Trace.export to .mcap").write(trace, file)
-
-
-_WRITERS = {
-    ".csv": _write_csv,
-    ".mat": _write_mat,
-    ".mcap": _write_mcap,
-    ".parquet": _write_parquet,
-}
+_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".parquet": _write_parquet}
 EXPORT_FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
 
 

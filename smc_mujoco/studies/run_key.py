@@ -33,7 +33,6 @@ UNRELATED_FOLDERS = (  # of this package, which do not affect runs
     "benchmark/realaigym",
     "evidence/audit",
     "evidence/papers",
-    "exchange/live",
     "draw",
     "testing",
     "control/tuned_gains",

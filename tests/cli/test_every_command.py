@@ -90,10 +90,6 @@ CALLS = {
     "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": [
         "analysis.chattering.chattering"
     ],
-    "export live/index.html": ["exchange.live.build.live"],
-    "export duffing furuta there/index.html --law pid --law classical": [
-        "exchange.live.build.live"
-    ],
     "export pid.c": ["exchange.c.export.law_to_c"],
     "export pid there.c --gains kp=50 --type float --joints 2": ["exchange.c.export.law_to_c"],
     "export pid.fmu": ["exchange.fmu.export.law_to_fmu"],
@@ -381,7 +377,7 @@ def test_every_option_says_what_it_is_in_which_unit_within_which_bounds_and_comp
             assert re.search(unit, words) or info.metavar, (written, words)
         if "int" in kind.replace("print", "") and written != "--joints":
             assert info.min in (0, 1, 2, 8), written
-        if written.strip("-") in NAMING and (name, written) != ("export", "--law"):
+        if written.strip("-") in NAMING:
             whole = NAMING[written.strip("-")]
             assert whole in " ".join(info.autocompletion(whole[:-1])), written
 

@@ -189,7 +189,6 @@ def test_a_name_that_no_file_can_have_is_one_sentence(name):
     ]
     calls += [
         lambda name: smc.exchange.law_from_c(f"{name}.c"),
-        lambda name: smc.live("duffing", out=name),
     ]
     short: dict[str, Any] = {"seeds": 1, "duration": 0.02, "progress": False}
     runs = [smc.Scenario(plant="duffing", law="classical", duration=0.02)]

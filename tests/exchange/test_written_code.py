@@ -1,6 +1,6 @@
 """A law in C is written as recorded: users read and compile it.
 
-Other tests run it, in C, in FMUs and in JavaScript.
+Other tests run it, in C and in FMUs.
 """
 
 import re

@@ -28,7 +28,7 @@ def run(
         str | None,
         typer.Option(
             metavar="FORMAT,...",
-            help="Also write each trace as csv, mat, mcap or parquet, beside its .npz.",
+            help="Also write each trace as csv, mat or parquet, beside its .npz.",
         ),
     ] = None,
     repeat: Annotated[
@@ -78,7 +78,7 @@ def show(
     export: Annotated[
         str | None,
         typer.Option(
-            metavar="FORMAT,...", help="Also write it as csv, mat, mcap or parquet, beside TRACE."
+            metavar="FORMAT,...", help="Also write it as csv, mat or parquet, beside TRACE."
         ),
     ] = None,
 ) -> None:
