@@ -133,7 +133,7 @@ def _order(
     number: str,
     table: Path,
 ) -> dict[str, Any]:
-    """Return the order for the process of an entry, see `entrant.tried`."""
+    """Return the order for the process of an entry, see `entrant.run_isolated`."""
     if os.path.isdir(folder):
         where = os.path.abspath(folder)
     else:
@@ -156,7 +156,7 @@ def _first_run(
     """
     with bar("first run", shown=progress):
         order = _order(folder, problems[:1], [0], number, made) | {"timed": True}
-        first = entrant.tried(order, TRIAL_TIME)
+        first = entrant.run_isolated(order, TRIAL_TIME)
     as_usual = rules(problem(problems[0]).version)["visible"]
     return first, instances or (UNCHECKED_INSTANCES if first["why_unchecked"] else as_usual)
 
@@ -172,7 +172,7 @@ def _all_runs(
     whole = len(order["problems"]) * len(order["instances"])
     limit = LEAST_TIME + SLACK * whole * first["seconds"]
     with bar(name, whole * (2 if unchecked else 1), progress, counted=True) as shown:
-        report = entrant.tried(order, limit, lambda done: shown.reached(done, shown.whole))
+        report = entrant.run_isolated(order, limit, lambda done: shown.reached(done, shown.whole))
         if unchecked:
             marks = [f"unchecked: {unchecked}"]
         else:
@@ -187,7 +187,7 @@ def _all_runs(
             turned = {key: order[key][::-1] for key in ("problems", "instances")} | {
                 "rows": str(again)
             }
-            entrant.tried(
+            entrant.run_isolated(
                 dict(order) | turned, limit, lambda done: shown.reached(whole + done, shown.whole)
             )
             if where := entrant.same(once, again, order["problems"]):

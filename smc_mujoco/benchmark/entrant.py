@@ -23,13 +23,13 @@ AT_ONCE = 256  # runs of a problem whose scenarios are in memory: chosen
 MAX_FAILURES = 3  # that are told
 
 
-def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any]:
-    """Run an entry in this process as an order says, write its rows, and return what is known of
+def worker(job: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Run an entry in this process as a job says, write its rows, and return what is known of
     its law.
     """
-    say("reading its folder")
-    entry = entries.read(order["folder"])
-    instances = order["instances"]
+    report("reading its folder")
+    entry = entries.read(job["folder"])
+    instances = job["instances"]
     failures = list[str]()
     about: dict[str, Any] = {}
     done = 0
@@ -37,24 +37,24 @@ def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any
 
     def groups() -> Iterator[list[runs.Row]]:
         nonlocal done, spent
-        for name in order["problems"]:
+        for name in job["problems"]:
             one = problem(name)
-            say(f"making its law for {one.plant}")
+            report(f"making its law for {one.plant}")
             law = entry.law(one.plant)
             found = list[runs.Row]()
             for i in range(0, len(instances), AT_ONCE):
                 part = instances[i : i + AT_ONCE]
-                scenarios = one.scenarios(law, part, order["number"])
+                scenarios = one.scenarios(law, part, job["number"])
                 if not about:
-                    about.update(_about(entry, scenarios[0], timed=order["timed"]))
-                say(f"running {name}")
+                    about.update(_about(entry, scenarios[0], timed=job["timed"]))
+                report(f"running {name}")
                 start = time.process_time()
                 found += runs.rows(one, scenarios, part, failures)
                 spent, done = spent + time.process_time() - start, done + len(part)
-                Path(order["count"]).write_text(str(done), encoding="utf-8")
+                Path(job["count"]).write_text(str(done), encoding="utf-8")
             yield found
 
-    runs.write(Path(order["rows"]), groups())
+    runs.write(Path(job["rows"]), groups())
     return about | {
         "seconds": spent / done,
         "failed": len(failures),
@@ -75,7 +75,7 @@ def _about(entry: entries.Entry, scenario: Scenario, timed: bool) -> dict[str, A
     return {"why_unchecked": why, "sample": found and [found.median, found.high, found.ratio]}
 
 
-def tried(
+def run_isolated(
     order: Mapping[str, Any], limit: float, reached: Callable[[int], None] = lambda done: None
 ) -> dict[str, Any]:
     """Run an entry in another process, and return its report; `limit` in s; `reached` hears how
@@ -95,7 +95,9 @@ def tried(
 
         def work() -> None:
             try:
-                outcome.append(guard.tried(MODULE, dict(order) | {"count": str(count)}, limit))
+                outcome.append(
+                    guard.run_isolated(MODULE, dict(order) | {"count": str(count)}, limit)
+                )
             except guard.Failed as failed:
                 outcome.append(failed)
 

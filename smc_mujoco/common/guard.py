@@ -1,10 +1,10 @@
-"""Foreign machine code (laws in C, FMUs, policies, models): tried in another process, and watched
-in our own.
+"""Foreign machine code (laws in C, FMUs, policies, models): first run in another process, and
+watched in our own.
 
-The process of a trial runs this file as a script. It may crash, hang or fill its memory: it has
-limits, and ends with everything that it has started. It reports its progress as lines in a file.
-The last line is the stage at which it died, a fault, or "unloading". What is tried must load
-quickly, so only functions of this file import smc_mujoco.
+The other process runs this file as a script. It may crash, hang or fill its memory: it has limits,
+and ends with everything that it has started. It reports its progress as lines in a file. The last
+line is the stage at which it died, a fault, or "unloading". It must start quickly, so only
+functions of this file import smc_mujoco.
 """
 
 import contextlib
@@ -19,15 +19,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-MAX_MEMORY = 4 * 2**30  # bytes that a trial may have: chosen
-MAX_FILE = 10**9  # bytes of a file that a trial writes: chosen
+MAX_MEMORY = 4 * 2**30  # bytes that the process may have: chosen
+MAX_FILE = 10**9  # bytes of a file that it writes: chosen
 MAX_PROGRESS = 10**7  # bytes of a report: chosen
 BLOCK_SIZE = 2**16  # bytes; no file system gives a file more at once
-FAULT, END = (
-    "Fault",
-    "unloading",
-)  # a line that begins so names a fault; the last line of a trial that passes
-ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
+FAULT = "Fault"  # begins a line that names a fault
+END = "unloading"  # the last line of a job that passes
+ALTERS = (
+    "changes the arithmetic of its thread (rounding, flush-to-zero, traps), "
+    "by which other simulations compute too"
+)
 # Signal -> its usual cause. The causes of other signals are reads, writes and divisions.
 CAUSES = {
     int(signal.SIGABRT): "aborts",
@@ -40,58 +41,45 @@ class Fault(Exception):
 
 
 class Failed(Exception):
-    """A trial that failed, in words."""
+    """A job that failed, in words."""
 
     def __init__(self, stage: str, fault: str, code: int | None, timeout: float):
         super().__init__(fault or f"{stage} {_ended(code, timeout)}")
-        self.stage, self.fault, self.code = (
-            stage,
-            fault,
-            code,
-        )  # code: None if the process was stopped
+        self.stage = stage
+        self.fault = fault
+        self.code = code  # None if the process was stopped
 
 
-def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
-    """Call `attempt(order, say)` of a module in another process.
+def run_isolated(module: str, job: Mapping[str, Any], timeout: float) -> Any:
+    """Return what `worker(job, report)` of a module returns in another process.
 
-    Return its result: plain data, as the order is.
-
-    `attempt` calls `say` with each stage that it begins, and raises Fault with what is wrong. The
-    timeout is in s.
+    Job and result are plain data. The worker calls `report` with each stage that it begins, and
+    raises Fault with what is wrong. The timeout is in s.
     """
     from smc_mujoco.common import files, process
 
     with files.scratch() as folder:
-        task = {
-            "module": module,
-            "order": order,
-            "path": [os.path.abspath(place) for place in sys.path],
-        }
+        path = [os.path.abspath(place) for place in sys.path]
         with files.no_room():
-            (folder / "order").write_text(json.dumps(task), encoding="utf-8")
+            task = json.dumps({"module": module, "job": job, "path": path})
+            (folder / "job").write_text(task, encoding="utf-8")
+        command = [sys.executable, "-P", __file__, str(folder)]
         try:
-            code = process.timed(
-                [sys.executable, "-P", __file__, str(folder)], timeout, output=False
-            ).returncode
+            code = process.timed(command, timeout, output=False).returncode
         except process.TimedOut:
             code = None
+        lines = ["loading"]
         report = folder / "report"
         if report.exists():
-            text = report.read_bytes()[:MAX_PROGRESS].decode(errors="replace")
-        else:
-            text = ""
-        lines = ["loading", *text.splitlines()]
+            lines += report.read_bytes()[:MAX_PROGRESS].decode(errors="replace").splitlines()
         if lines[-1] == END and code == 0:
             return json.loads(lines[-2])
         with files.no_room():  # a report that could not be written is no fault of the module
             (folder / "block").write_bytes(bytes(BLOCK_SIZE))
-    stages = [line for line in lines if not line.startswith(f"{FAULT} ")]
-    raise Failed(
-        stages[-1],
-        lines[-1].removeprefix(f"{FAULT} ") if lines[-1] != stages[-1] else "",
-        code,
-        timeout,
-    )
+    fault = ""
+    if lines[-1].startswith(f"{FAULT} "):
+        fault = lines.pop().removeprefix(f"{FAULT} ")
+    raise Failed(lines[-1], fault, code, timeout)
 
 
 def _ended(code: int | None, timeout: float) -> str:
@@ -115,9 +103,8 @@ class Arithmetic:
         self.numbers = (ctypes.c_double * 4)(3.0, 10.0, 2.0**-1022, 2.0**1000)
         self.environment = ctypes.create_string_buffer(256)  # C's fenv_t has 8 to 32 bytes
         self.library = ctypes.PyDLL(None if os.name == "posix" else "ucrtbase")
-        self.traps: Callable[[], int] = getattr(
-            self.library, "fegetexcept", lambda: 0
-        )  # only in some C libraries
+        # only in some C libraries
+        self.traps: Callable[[], int] = getattr(self.library, "fegetexcept", lambda: 0)
         self.library.fegetenv(self.environment)
         self.state = self.traps()
         self.results = computed(self.numbers)
@@ -137,16 +124,11 @@ def computed(numbers: Any) -> tuple[float, ...]:
     The float64 nearest to 1/3 is below it, and that to 1/10 above. No result is subnormal itself:
     it may be read as 0.
     """
-    three, ten, tiny, big = (
-        numbers[0],
-        numbers[1],
-        numbers[2],
-        numbers[3],
-    )  # from memory: no compiler knows them
+    three, ten, tiny, big = numbers[:]  # from memory: no compiler knows them
     return 1.0 / three, 1.0 / ten, tiny / ten * big
 
 
-# the process of a trial
+# the other process
 
 
 def limit() -> None:
@@ -166,25 +148,22 @@ def limit() -> None:
 
 
 def run(folder: Path) -> None:
-    """Carry out the order in a folder, and report there."""
-    order = json.loads((folder / "order").read_text(encoding="utf-8"))
-    sys.path[:] = order["path"]
+    """Do the job in a folder, and report there."""
+    task = json.loads((folder / "job").read_text(encoding="utf-8"))
+    sys.path[:] = task["path"]
     limit()
-    with (folder / "report").open("w", encoding="utf-8") as report:
-        say = functools.partial(print, file=report, flush=True)
+    with (folder / "report").open("w", encoding="utf-8") as file:
+        report = functools.partial(print, file=file, flush=True)
         try:
-            result = json.dumps(
-                importlib.import_module(order["module"]).attempt(order["order"], say)
-            )
-            say(f"{result}\n{END}")
+            result = importlib.import_module(task["module"]).worker(task["job"], report)
+            report(f"{json.dumps(result)}\n{END}")
         except MemoryError:
-            say(FAULT, f"takes more than {MAX_MEMORY / 2**30:g} GiB of memory: make it smaller")
+            report(FAULT, f"takes more than {MAX_MEMORY / 2**30:g} GiB of memory: make it smaller")
         except Exception as error:
-            if type(error).__name__ in (FAULT, "ScenarioError"):
-                kind = ""
-            else:
-                kind = f"{type(error).__name__}: "
-            say(FAULT, f"{kind}{' '.join(str(error).split())}")
+            words = " ".join(str(error).split())
+            if type(error).__name__ not in (FAULT, "ScenarioError"):
+                words = f"{type(error).__name__}: {words}"
+            report(FAULT, words)
 
 
 if __name__ == "__main__":

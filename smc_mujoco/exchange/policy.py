@@ -28,7 +28,7 @@ import numpy as np
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.files import reading
-from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
+from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, run_isolated
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.law import Law, Measurement, law_function
 
@@ -133,11 +133,11 @@ class File:
         return load_network(self)(observation)
 
 
-def attempt(order: Mapping[str, Any], say: Callable) -> None:
+def worker(job: Mapping[str, Any], report: Callable) -> None:
     """Read the network in a file, in the process of a trial."""
-    say("reading it")
+    report("reading it")
     try:
-        load_network(File(**order))
+        load_network(File(**job))
     except ScenarioError as error:
         raise Fault(str(error)) from None
 
@@ -290,7 +290,7 @@ def _callable(act: Any) -> tuple[Act, str]:
         with reading(path, "policy", "give the path of a file that a library wrote"):
             file = File(str(path.resolve()), _digest(path))
         try:
-            tried(__name__, dataclasses.asdict(file), LOAD_TIMEOUT)
+            run_isolated(__name__, dataclasses.asdict(file), LOAD_TIMEOUT)
         except Failed as failed:
             raise ScenarioError(failed.fault or f"policy {path.name!r}: {failed}") from None
         return file, path.stem

@@ -161,7 +161,7 @@ def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(
     with pytest.raises(ScenarioError, match="not the table that its result was written for"):
         smc.results(target.parent)
     monkeypatch.setattr(
-        guard, "tried", lambda module, order, limit: entrant.attempt(order, lambda *stage: None)
+        guard, "run_isolated", lambda module, job, limit: entrant.worker(job, lambda *stage: None)
     )
     with pytest.raises(ScenarioError, match="not what"):
         entering.enter(folder, out=out, instances=2, verify=True)
@@ -189,7 +189,7 @@ def test_a_table_does_not_depend_on_how_many_runs_are_in_memory_at_once(tmp_path
     for at_once in (2, 5):
         monkeypatch.setattr(entrant, "AT_ONCE", at_once)
         table = tmp_path / f"{at_once}.parquet"
-        entrant.attempt(
+        entrant.worker(
             order | {"rows": str(table), "count": str(tmp_path / "count")}, lambda stage: None
         )
         tables.append(table.read_bytes())
@@ -366,7 +366,7 @@ def test_a_failure_of_a_file_that_can_do_more_than_compute_is_told_with_what_it_
     def fails(module, order, timeout):
         raise guard.Failed("unloading", "cannot write runs.parquet", None, timeout)
 
-    monkeypatch.setattr(guard, "tried", fails)
+    monkeypatch.setattr(guard, "run_isolated", fails)
     order = {
         "folder": str(folder),
         "number": "",
@@ -378,7 +378,7 @@ def test_a_failure_of_a_file_that_can_do_more_than_compute_is_told_with_what_it_
         ScenarioError,
         match=r"cannot write runs.parquet \(line . of law.py has import os, which can",
     ):
-        entrant.tried(order | {"rows": str(tmp_path / "rows")}, 1.0)
+        entrant.run_isolated(order | {"rows": str(tmp_path / "rows")}, 1.0)
 
 
 def test_the_command_tells_the_place_and_the_share_of_targets_of_each_question(

@@ -267,22 +267,22 @@ def test_a_trial_reports_what_its_module_returns_or_raises(tmp_path, monkeypatch
     monkeypatch.setattr(sys, "path", sys.path[:])
     trials = {
         "passes": (
-            lambda order, say: say("loading") or {"k": order},
+            lambda job, report: report("loading") or {"k": job},
             ["loading", '{"k": 3}', "unloading"],
         ),
         "is wrong": (
-            lambda order, say: (_ for _ in ()).throw(guard.Fault("it is\nNaN")),
+            lambda job, report: (_ for _ in ()).throw(guard.Fault("it is\nNaN")),
             ["Fault it is NaN"],
         ),
-        "fails": (lambda order, say: {}[order], ["Fault KeyError: 3"]),
+        "fails": (lambda job, report: {}[job], ["Fault KeyError: 3"]),
         "is large": (
-            lambda order, say: bytes(2**62),
+            lambda job, report: bytes(2**62),
             ["Fault takes more than 4 GiB of memory: make it smaller"],
         ),
     }
-    for attempt, lines in trials.values():
-        monkeypatch.setitem(sys.modules, "trial", types.SimpleNamespace(attempt=attempt))
-        (tmp_path / "order").write_text('{"module": "trial", "order": 3, "path": ["a"]}')
+    for worker, lines in trials.values():
+        monkeypatch.setitem(sys.modules, "trial", types.SimpleNamespace(worker=worker))
+        (tmp_path / "job").write_text('{"module": "trial", "job": 3, "path": ["a"]}')
         guard.run(tmp_path)
         assert (tmp_path / "report").read_text().splitlines() == lines
     assert limits == ["set"] * len(trials)

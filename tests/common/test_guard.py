@@ -19,14 +19,14 @@ from smc_mujoco.common import guard
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the code of these trials is for POSIX")
 
 
-def attempt(order: Mapping[str, Any], say: Callable) -> Any:
-    """What a test orders, in the process of its trial."""
-    say("working")
-    kind = order["kind"]
+def worker(job: Mapping[str, Any], report: Callable) -> Any:
+    """What a test wants done, in the other process."""
+    report("working")
+    kind = job["kind"]
     if kind == "fill":
         return len([bytes(2**26) for _ in range(1000)])
     if kind == "write":
-        with Path(order["file"]).open("wb") as file:
+        with Path(job["file"]).open("wb") as file:
             file.truncate(guard.MAX_FILE + 1)
     if kind == "forks":
         children = []
@@ -38,12 +38,12 @@ def attempt(order: Mapping[str, Any], say: Callable) -> Any:
     if kind == "exit":
         os._exit(1)
     if kind == "deep":
-        raise guard.Fault(f"is wrong:\n {order['kind']}")
-    return order
+        raise guard.Fault(f"is wrong:\n {job['kind']}")
+    return job
 
 
 def test_what_a_trial_returns_comes_back():
-    assert guard.tried(__name__, {"kind": "none", "more": [1.5, None]}, 60.0) == {
+    assert guard.run_isolated(__name__, {"kind": "none", "more": [1.5, None]}, 60.0) == {
         "kind": "none",
         "more": [1.5, None],
     }
@@ -59,7 +59,7 @@ def test_what_a_trial_returns_comes_back():
 )
 def test_a_trial_has_limits(kind, said, tmp_path):
     with pytest.raises(guard.Failed, match=f"^{said}") as failed:
-        guard.tried(__name__, {"kind": kind, "file": str(tmp_path / "large")}, 60.0)
+        guard.run_isolated(__name__, {"kind": kind, "file": str(tmp_path / "large")}, 60.0)
     assert (failed.value.stage, failed.value.code) == ("working", 0)
     assert not [path for path in tmp_path.iterdir() if path.stat().st_size > 0]
 
@@ -71,7 +71,7 @@ def test_a_trial_without_room_for_its_report_blames_no_module():
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (guard.BLOCK_SIZE // 2, limits[1]))
         with pytest.raises(smc.ScenarioError) as refused:
-            guard.tried(__name__, {"kind": "exit"}, 60.0)
+            guard.run_isolated(__name__, {"kind": "exit"}, 60.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert (
@@ -81,7 +81,7 @@ def test_a_trial_without_room_for_its_report_blames_no_module():
 
 
 def test_what_a_trial_starts_ends_with_it():
-    running = guard.tried(__name__, {"kind": "forks"}, 60.0)
+    running = guard.run_isolated(__name__, {"kind": "forks"}, 60.0)
     for _ in range(500):  # until the process that inherits orphans has noticed
         running = [one for one in running if alive(one)]
         if not running:

@@ -191,13 +191,13 @@ def test_a_policy_may_look_ahead_in_environments_of_its_own():
 def here(monkeypatch):
     """Files are tried in this process, where the stand-ins are."""
     monkeypatch.setattr(
-        policy, "tried", lambda module, order, timeout: policy.load_network(policy.File(**order))
+        policy, "run_isolated", lambda module, job, timeout: policy.load_network(policy.File(**job))
     )
 
 
 @pytest.mark.slow
 def test_a_library_that_a_file_crashes_is_one_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(policy, "tried", guard.tried)
+    monkeypatch.setattr(policy, "run_isolated", guard.run_isolated)
     (tmp_path / "onnxruntime.py").write_text("import os\nSessionOptions = os.abort\n")
     (tmp_path / "net.onnx").write_bytes(b"x")
     monkeypatch.syspath_prepend(tmp_path)

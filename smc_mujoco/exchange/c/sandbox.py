@@ -1,7 +1,7 @@
 """Try a law's library in a separate process, which may crash, and report the result in one
 sentence.
 
-`attempt`, in the process of `common.guard`, loads the library, sets it up, calls the law on
+`worker`, in the process of `common.guard`, loads the library, sets it up, calls the law on
 request, and unloads it. The process must start quickly, so the functions that start it, and only
 they, import more of smc_mujoco.
 """
@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
+from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, run_isolated
 
 STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest run
 LATER_STEPS, TIME_RATIO = (
@@ -99,7 +99,7 @@ def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any
 
     words = {"library": str(library.file), "symbol": library.symbol, "trial": trial}
     try:
-        return tried(__name__, words, library.timeout)
+        return run_isolated(__name__, words, library.timeout)
     except Failed as failed:
         why = str(failed).replace(str(library.file), library.path.name)
         file = library.path.name
@@ -442,29 +442,29 @@ class Trial:
         return code, self.out.values[: self.channels], self.out.values[self.channels :]
 
 
-def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
+def worker(job: Mapping[str, Any], report: Callable) -> dict[str, str | int]:
     """Load, set up and on request call a law. Return the library's constants."""
     arithmetic = Arithmetic()
-    symbol = order["symbol"]
+    symbol = job["symbol"]
 
     def done(step: str) -> None:
         if arithmetic.changed():
             raise Fault(f"{step} {ALTERS}: {FAULTS[ALTERED_ARITHMETIC][1]}")
 
-    say("loading")
+    report("loading")
     try:
-        law, library = entry(order["library"], symbol)
+        law, library = entry(job["library"], symbol)
     except (OSError, AttributeError) as error:
         raise Fault(
             f"cannot be loaded ({error}): build it for this machine, with all it needs"
         ) from None
     done("loading it")
-    say("smc_setup")
+    report("smc_setup")
     if code := set_up(library):
         raise Fault(f"smc_setup returned {code}: fix it")
     done("smc_setup")
-    if trial := order["trial"]:
-        say(symbol)
+    if trial := job["trial"]:
+        report(symbol)
         set_sizes(library, len(trial["gains"]) // max(1, trial["joints"]), trial["memory"])
         try:
             with Path(trial["calls"]).open("wb") as calls:

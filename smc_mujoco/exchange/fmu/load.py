@@ -31,7 +31,7 @@ from smc_mujoco.common.constraints import Positive, Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
-from smc_mujoco.common.guard import Failed, tried
+from smc_mujoco.common.guard import Failed, run_isolated
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
@@ -415,6 +415,6 @@ def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
         "step": law.period,
     }
     try:
-        tried(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
+        run_isolated(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
     except Failed as failed:
         raise ScenarioError(f"{Path(law.path).name}: {failed}") from None

@@ -163,18 +163,18 @@ class Slave:
         self.said.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
 
 
-def attempt(order: Mapping[str, Any], say: Callable) -> None:
+def worker(job: Mapping[str, Any], report: Callable) -> None:
     """Run an FMU on a double integrator x'' = u.
 
-    `order` is from `load`, and `say` reports a stage.
+    `job` is from `load`, and `report` reports a stage.
     """
-    say("instantiation")
-    slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
-    length = order["step"] or TRIAL_PERIOD
+    report("instantiation")
+    slave = Slave(job["folder"], list(job["inputs"].values()), job["outputs"], job["fixed"])
+    length = job["step"] or TRIAL_PERIOD
     x = 0.5
     v = 0.0
     for k in range(TRIAL_STEPS):
-        say(f"the step from t = {k * length:g} s")
+        report(f"the step from t = {k * length:g} s")
         r = 0.1 * math.sin(k * length)
         dr = 0.1 * math.cos(k * length)
         seen = {
@@ -189,12 +189,12 @@ def attempt(order: Mapping[str, Any], say: Callable) -> None:
             "de": v - dr,
         }
         seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
-        outputs = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
+        outputs = slave.step([seen.get(name, 0.0) for name in job["inputs"]], k * length, length)
         if not all(map(math.isfinite, outputs)):
-            raise Fault(f"{order['outputs'][0]} is {outputs[0]:g} after {k + 1} steps: {CURE}")
+            raise Fault(f"{job['outputs'][0]} is {outputs[0]:g} after {k + 1} steps: {CURE}")
         v += length * min(max(outputs[0], -MAX_COMMAND), MAX_COMMAND)
         x += length * v
         if abs(x) > MAX_POSITION:
             x, v = math.copysign(MAX_POSITION, x), 0.0
-    say("termination")
+    report("termination")
     slave.close()

@@ -290,7 +290,7 @@ def tried(source: Source, timeout: float) -> None:
         order = {"path": source.path, "text": str(folder / "text"), "assets": copies}
         order |= {"library": str(libmujoco.path()), "plugins": [*map(str, libmujoco.plugins())]}
         try:
-            guard.tried(mjcf_trial.__name__, order, timeout)
+            guard.run_isolated(mjcf_trial.__name__, order, timeout)
         except OSError:  # this process may not start others
             return
         except guard.Failed as failed:

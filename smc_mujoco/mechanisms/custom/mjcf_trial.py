@@ -17,52 +17,50 @@ VFS_SIZE = 1024  # bytes, more than any version's mjVFS has
 HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_char_p)
 
 
-def attempt(order: Mapping[str, Any], say: Callable) -> None:
-    """Try the model that an order describes: library, plugins, path or text with assets.
+def worker(job: Mapping[str, Any], report: Callable) -> None:
+    """Try the model that a job describes: library, plugins, path or text with assets.
 
-    `say` reports a stage.
+    `report` reports a stage.
     """
 
     def fail(message: bytes | None) -> None:
-        say(FAULT, *(message or b"").decode(errors="replace").split())
+        report(FAULT, *(message or b"").decode(errors="replace").split())
         os._exit(0)
 
     def warned(message: bytes) -> None:  # MuJoCo's other warnings concern runs
         if b"NaN" in message and b"XML" in message:
             fail(b"it holds a NaN")
 
-    say("loading")
-    library = ctypes.CDLL(order["library"])
+    report("loading")
+    library = ctypes.CDLL(job["library"])
     for name in ("mj_parseXML", "mj_parseXMLString", "mj_compile", "mj_makeData"):
         getattr(library, name).restype = ctypes.c_void_p
     library.mjs_getError.restype = ctypes.c_char_p
     handlers = {"mju_user_error": HANDLER(fail), "mju_user_warning": HANDLER(warned)}
     for name, handler in handlers.items():
         ctypes.c_void_p.in_dll(library, name).value = ctypes.cast(handler, ctypes.c_void_p).value
-    for plugin in order["plugins"]:
+    for plugin in job["plugins"]:
         library.mj_loadPluginLibrary(plugin.encode())
-    say("reading")
+    report("reading")
     error = ctypes.create_string_buffer(MESSAGE_SIZE)
     files = None
-    if order["path"]:
-        spec = library.mj_parseXML(os.fsencode(order["path"]), None, error, MESSAGE_SIZE)
+    if job["path"]:
+        spec = library.mj_parseXML(os.fsencode(job["path"]), None, error, MESSAGE_SIZE)
     else:
         files = ctypes.create_string_buffer(VFS_SIZE)
         library.mj_defaultVFS(files)
-        for name, place in order["assets"].items():
+        for name, place in job["assets"].items():
             content = Path(place).read_bytes()
             library.mj_addBufferVFS(files, name.encode(), content, len(content))
-        spec = library.mj_parseXMLString(
-            Path(order["text"]).read_bytes(), files, error, MESSAGE_SIZE
-        )
+        spec = library.mj_parseXMLString(Path(job["text"]).read_bytes(), files, error, MESSAGE_SIZE)
     if not spec:
         fail(error.value)
-    say("compiling")
+    report("compiling")
     pointer = ctypes.c_void_p(spec)
     model = library.mj_compile(pointer, files)
     if not model:
         fail(library.mjs_getError(pointer))
-    say("starting")
+    report("starting")
     data = library.mj_makeData(ctypes.c_void_p(model))
     if not data:
         fail(b"no memory for its data")

@@ -495,7 +495,7 @@ def test_an_fmu_is_tried_on_a_double_integrator_between_walls(step, h, monkeypat
     }
     made = mock.Mock(**{"step.side_effect": lambda seen, t, h: [8.0 * seen[names.index("e")]]})
     monkeypatch.setattr(slave, "Slave", lambda *_: made)
-    slave.attempt(order, said := mock.Mock())
+    slave.worker(order, said := mock.Mock())
     y: Any = Measurement(*np.transpose([call.args[0] for call in made.step.mock_calls]))
     known = {
         "t": h * np.arange(500),
@@ -528,7 +528,7 @@ def test_an_fmu_is_tried_on_a_double_integrator_between_walls(step, h, monkeypat
     with pytest.raises(
         Fault, match="u is nan after 1 steps: fix the FMU, or its inputs and parameters"
     ):
-        slave.attempt(order, said)
+        slave.worker(order, said)
 
 
 def test_a_slave_says_which_variable_it_could_not_set(foreign, tmp_path):
