@@ -272,7 +272,6 @@ def saturated(y, gains, memory):
     return float(str(-100.0)), y.e
 
 
-@pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 @pytest.mark.parametrize(
     "law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"]
 )

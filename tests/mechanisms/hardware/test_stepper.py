@@ -8,13 +8,14 @@ import math
 
 import numpy as np
 import pytest
+from helpers import reference
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import chattering
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.envs.episode import Setting
 from smc_mujoco.hardware import Stepper
-from smc_mujoco.simulation import model, reference
+from smc_mujoco.simulation import model
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.prepare import motors_at_start
 

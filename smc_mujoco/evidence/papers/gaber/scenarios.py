@@ -17,9 +17,12 @@ from typing import Any
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.simulation.conditions import (
+from smc_mujoco.simulation.conditions import (  # noqa: F401
+    CONTROL_PERIOD,
     DURATION,
     NAMED,
+    PLANTS,
+    SINE,
     Condition,
 )
 from smc_mujoco.simulation.grid import case
