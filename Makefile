@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack check docs lowest entered tagged build report gains gallery bench lock setup
+.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build report gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -32,6 +32,10 @@ quick: ## the first case of each test that takes little: a minute, for every cha
 attack: ## random scenarios, calls and files by the thousand, for releases (10 minutes)
 	@./setup.sh requirements-test.lock
 	$(BIN)/python tests/attack.py
+
+mutants: ## small faults of ROOM=metrics, drawn from SEED, and which of them its tests find
+	@./setup.sh requirements-test.lock
+	@ROOM="$(ROOM)" SEED="$(SEED)" COUNT="$(COUNT)" $(BIN)/python tests/mutants.py
 
 check: ## lint, format and types
 	@./setup.sh requirements-test.lock
