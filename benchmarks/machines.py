@@ -21,12 +21,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import stepper_figures as stepper
 
 import smc_mujoco as smc
 from smc_mujoco.common.version import versions
 from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.evidence.rigs.machines import emps, quanser
-from smc_mujoco.evidence.rigs.predictions import Told, percentiles, predicted
 from smc_mujoco.evidence.rigs.rig import Rig, percentages
 from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 from smc_mujoco.simulation.time_series import TimeSeries
@@ -194,47 +194,69 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
         )
 
 
-def of_stepper(told: Told) -> Iterator[TwinFigure | Order]:
+def of_stepper(seeds: int) -> Iterator[TwinFigure | Order]:
     """Yield the figures of all laws, and the order of laws in all sets, without parts of the twin
     too.
     """
-    about = told.prediction
     rig = smc.rig("stepper_furuta")
-    for condition in about.conditions:
-        for law in about.order:
-            for figure in about.shown:
-                if not len(values := told.of(law, condition, figure)):
+    sets = len(rig.members())
+    whole = {name: stepper.predicted(rig, name, seeds) for name in stepper.CONDITIONS}
+    for condition, by_set in whole.items():
+        for law in stepper.ORDER:
+            runs = [run for by_law in by_set.values() for run in by_law[law]]
+            known = {}
+            if law == stepper.FITTED_ON:
+                known = stepper.RECORDED[condition]
+            for figure, unit in stepper.SHOWN.items():
+                values = stepper.standing(runs, figure)
+                if not len(values):
                     continue
-                if law == about.fitted_on:
-                    known = about.recorded[condition]
-                else:
-                    known = {}
-                middle, low, high = percentiles(values)
+                middle, low, high = stepper.percentiles(values)
                 yield TwinFigure(
                     rig=rig.name,
                     record=f"{condition}, {law.replace('_', ' ')}",
                     law=law.replace("_", " "),
                     figure=figure.replace("_", " "),
-                    unit=about.units[figure],
+                    unit=unit,
                     machine=known.get(figure, math.nan),
                     twin=middle,
                     low=low,
                     high=high,
                     runs=len(values),
                 )
-    for without in ("", *about.left_out):
-        for condition in about.conditions if not without else list(about.conditions)[:1]:
-            count, sets = told.ordered(condition, without)
-            yield Order(
-                rig=rig.name,
-                condition=condition,
-                figure=about.rank.replace("_", " "),
-                laws=tuple(law.replace("_", " ") for law in about.order),
-                ordered=count,
-                sets=sets,
-                tau=told.correlation(condition, without),
-                variant=f"without {without}" * bool(without),
-            )
+    found = {("", condition): by_set for condition, by_set in whole.items()}
+    for part, changes in stepper.LEFT_OUT.items():
+        few = stepper.predicted(rig, "hold", max(1, seeds // 4), changes)
+        found[f"without {part}", "hold"] = few
+    for (variant, condition), by_set in found.items():
+        count, tau = stepper.ordered(by_set)
+        yield Order(
+            rig=rig.name,
+            condition=condition,
+            figure="alpha rms",
+            laws=tuple(law.replace("_", " ") for law in stepper.ORDER),
+            ordered=count,
+            sets=sets,
+            tau=tau,
+            variant=variant,
+        )
+
+
+def described(row: TwinFigure) -> dict[str, object]:
+    """Return a row as JSON data, without fields that have their default; None stands for NaN, and
+    "falls" for inf.
+    """
+    told = {}
+    for field in dataclasses.fields(row):
+        value = getattr(row, field.name)
+        if value is field.default or value == field.default:
+            continue
+        if isinstance(value, float) and math.isnan(value):
+            value = None
+        elif isinstance(value, float):
+            value = "falls" if math.isinf(value) else float(f"{value:.4g}")
+        told[field.name] = value
+    return told
 
 
 def main() -> None:
@@ -256,12 +278,11 @@ def main() -> None:
                 print(f"{path} is not there: its old rows stay")
                 rows += [one for one in twin_figures.rows(name) if one.record == record]
     rows += [*of_emps(), *of_qube_servo_3()]
-    stepper = smc.rig("stepper_furuta")
-    rows += of_stepper(predicted(stepper, given.seeds))
+    rows += of_stepper(given.seeds)
     data = {
         "command": f"python benchmarks/machines.py FOLDER --seeds {given.seeds} --write",
         "versions": versions(),
-        "figures": [twin_figures.described(row) for row in rows if isinstance(row, TwinFigure)],
+        "figures": [described(row) for row in rows if isinstance(row, TwinFigure)],
         "orders": [dataclasses.asdict(row) for row in rows if isinstance(row, Order)],
     }
     for row in rows:

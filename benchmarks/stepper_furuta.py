@@ -22,10 +22,18 @@ import math
 import sys
 
 import numpy as np
+from stepper_figures import (
+    CONDITIONS,
+    RECORDED,
+    fallen,
+    figures,
+    logged,
+    percentiles,
+    start,
+)
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs.machines.stepper_furuta import NAMES, PREDICTION
-from smc_mujoco.evidence.rigs.predictions import percentiles
+from smc_mujoco.evidence.rigs.machines.stepper_furuta import NAMES
 
 SEEDS = {
     False: ({11: 230, 12: 130, 13: 180}, {14: 240}),
@@ -109,12 +117,12 @@ def about(nearest, random):
             return shares
 
 
-def distance(figures):
+def distance(by_condition):
     """Return the rms deviation of condition -> figures from the recorded ones, in spreads."""
     apart = []
     for condition, spreads in SPREADS.items():
-        found = figures[condition]
-        recorded = PREDICTION.recorded[condition]
+        found = by_condition[condition]
+        recorded = RECORDED[condition]
         for name, spread in spreads.items():
             if name in LINEAR:
                 off = found[name] - recorded[name]
@@ -130,13 +138,13 @@ def distance(figures):
 def recordings(pairs, condition):
     """Return the figures of a simulated recording for each pair of quantities and a seed."""
     rig = smc.rig("stepper_furuta")
-    fields = PREDICTION.conditions[condition]
+    fields = CONDITIONS[condition]
     scenarios = []
     for one, seed in pairs:
         scenarios.append(
-            rig.with_values(one, "drawn").scenario(x0=PREDICTION.start(seed), seed=seed, **fields)
+            rig.with_values(one, "drawn").scenario(x0=start(seed), seed=seed, **fields)
         )
-    return [PREDICTION.figures(trace) for trace in smc.run(scenarios)]
+    return [figures(logged(trace)) for trace in smc.run(scenarios)]
 
 
 def explored(rounds, draw, prior):
@@ -150,11 +158,11 @@ def explored(rounds, draw, prior):
                 (quantities(one, prior), number)
                 for number, one in enumerate(drawn, 100_000 * seed + first)
             ]
-            runs = {name: recordings(pairs, name) for name in PREDICTION.conditions}
+            runs = {name: recordings(pairs, name) for name in CONDITIONS}
             for i, one in enumerate(drawn):
-                figures = {name: its[i] for name, its in runs.items()}
-                fell = any(map(PREDICTION.fallen, figures.values()))
-                found.append((math.inf if fell else distance(figures), one))
+                found_of = {name: its[i] for name, its in runs.items()}
+                fell = any(map(fallen, found_of.values()))
+                found.append((math.inf if fell else distance(found_of), one))
             print(f"seed {seed}: {first + BATCH} of {draws}", file=sys.stderr)
     return sorted(found, key=lambda each: each[0])
 
@@ -166,13 +174,13 @@ def accepted(one, number):
     pairs = [(one, 1_000 * number + i) for i in range(RUNS)]
     runs = {"hold": recordings(pairs, "hold")}
     _, low, high = percentiles(np.array([run["alpha_rms"] for run in runs["hold"]]))
-    inside = low <= PREDICTION.recorded["hold"]["alpha_rms"] <= high
+    inside = low <= RECORDED["hold"]["alpha_rms"] <= high
     rests = np.median([run["resting"] for run in runs["hold"]])
     print(f"trial {number}: {low:.4f} to {high:.4f}, rests {rests:.2f}", file=sys.stderr)
-    if not inside or rests < 0.5 or any(map(PREDICTION.fallen, runs["hold"])):
+    if not inside or rests < 0.5 or any(map(fallen, runs["hold"])):
         return math.inf
     runs["nudges"] = recordings(pairs, "nudges")
-    if any(map(PREDICTION.fallen, runs["nudges"])):
+    if any(map(fallen, runs["nudges"])):
         return math.inf
     medians = {}
     for name, its in runs.items():

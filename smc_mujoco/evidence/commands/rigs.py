@@ -4,7 +4,7 @@ records.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,9 +12,6 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
-
-if TYPE_CHECKING:
-    from smc_mujoco.evidence.rigs.rig import Rig
 
 
 def rig(
@@ -79,17 +76,13 @@ def rig(
     json: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Fit: also write the result to a file.")
     ] = None,
-    seeds: Annotated[
-        int, typer.Option(min=1, help="Predictions: runs of each law on each parameter set.")
-    ] = 4,
 ) -> None:
     """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to
     records.
 
     The twin starts from the measured state. If the machine's controller is known, the loop is
     closed and only the references are those of the record; else the twin repeats the recorded
-    command. The table has the fit of the whole record, 100 (1 - |y - yhat| / |y - mean y|) percent,
-    and that of a machine that does nothing.
+    command. The table has the fit of the whole record, 100 (1 - |y - yhat| / |y - mean y|) percent.
 
     With --fit the quantities are chosen that give the least sum of squared residuals. They are
     printed with their standard errors, with what the records cannot tell, and with the fit of each
@@ -98,13 +91,9 @@ def rig(
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in
     rad and time in s. The first line of a CSV file has the names of the columns.
 
-    Without a file: what the twin said of each public record, and what the machine did. A bursty
-    machine never repeats a record. This simulates each law again, on the twin and on the twin
-    without some of its parts. It takes minutes.
+    Without a file: what the twin said of each public record, and what the machine did.
 
     Example: smc-mujoco rig
-
-    Example: smc-mujoco rig stepper_furuta
 
     Example: smc-mujoco rig qube_servo run.csv --sets driver --duration 6 --film run.mp4
 
@@ -117,11 +106,10 @@ def rig(
         "a record beside its twin: leave out --fit",
     )
     options.only_for(ctx, ("quantities", "given", "starts", "seed", "json"), fit, "--fit")
-    options.only_for(ctx, ("seeds",), not files, "predictions: leave the file out")
     if name is None or (not files and not fit):
         if fit:
             raise ScenarioError("--fit without a rig: give one, or a plant")
-        _tell(name or "", seeds, figure)
+        _tell(name or "", figure)
         return
     files, named = files or [], options.pairs(columns, "columns", "theta=arm_angle,t=time")
     if fit:
@@ -133,10 +121,8 @@ def rig(
     _repeat(name, files[0], named, options.names(sets), start, duration, figure, film)
 
 
-def _tell(name: str, seeds: int, figure: Path | None) -> None:
-    """Show what twins said of public records, of one machine or of all; of a bursty one, what is
-    predicted.
-    """
+def _tell(name: str, figure: Path | None) -> None:
+    """Show what twins said of public records, of one machine or of all."""
     with delay_ctrl_c():
         from smc_mujoco.common.files import writable
         from smc_mujoco.evidence.commands import tables
@@ -147,42 +133,19 @@ def _tell(name: str, seeds: int, figure: Path | None) -> None:
     writable(figure)
     terminal = Terminal()
     rows = twin_figures.rows(name)
-    twin = find_rig(name) if name else None
-    if twin is not None and not rows:
+    if not rows:
         raise ScenarioError(
             f"no public record of {name} is known here: give one, a CSV or npz file"
         )
     if figure:
         terminal.wrote(*twins_figure(rows, figure))
-    if twin is None:
-        for table in tables.machines(rows, twin_figures.orders()):
-            terminal.print(table)
-        terminal.note(twin_figures.ABOUT, wrap=True)
-    elif twin.prediction is None:
-        terminal.print(tables.figures_of_twin(twin.label, rows))
-        terminal.note(twin_figures.ABOUT, wrap=True)
+    if name:
+        terminal.print(tables.figures_of_twin(find_rig(name).label, rows))
     else:
-        _predict(twin, seeds, terminal)
-
-
-def _predict(twin: "Rig", seeds: int, terminal: Terminal) -> None:
-    """Show what a rig's twin predicts of its machine."""
-    from smc_mujoco.common.progress import bar
-    from smc_mujoco.evidence.commands import tables
-    from smc_mujoco.evidence.rigs.predictions import predicted
-
-    if twin.prediction:
-        batches = len(twin.members()) * (1 + len(twin.prediction.left_out))
-    else:
-        batches = 1
-    with bar(twin.name, batches) as shown:
-        told = predicted(twin, seeds, report=lambda count: shown.advance(1.0))
-    for table in tables.predicted(told):
-        terminal.print(table)
-    terminal.note(told.prediction.about, wrap=True)
-    terminal.note(
-        f"{len(twin.members())} parameter sets, {seeds} seeds each, {terminal.seconds:.0f} s"
-    )
+        terminal.print(tables.machines(rows))
+    if orders := twin_figures.orders(name):
+        terminal.print(tables.orders(orders))
+    terminal.note(twin_figures.ABOUT, wrap=True)
 
 
 def _fit(
@@ -259,7 +222,7 @@ def _repeat(
     twins = {"twin": twin} | {name: twin.set(name) for name in sets}
     fits = {"twin": twin.fit(record)}
     fits |= {name: shown.fits([record])[0] for name, shown in twins.items() if name != "twin"}
-    terminal.print(tables.fits(twin.label, fits | {"do nothing": twin.idle(record)}))
+    terminal.print(tables.fits(twin.label, fits))
     title = f"{twin.name}: {file.stem}"
     if figure:
         from smc_mujoco.evidence.rigs.figure import residual_figure

@@ -7,7 +7,6 @@ import math
 from collections.abc import Mapping, Sequence
 from statistics import median_low
 
-import numpy as np
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Column, Table
@@ -20,7 +19,6 @@ from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.certificates.certificate import Certificate
 from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.evidence.rigs.identify import Identified
-from smc_mujoco.evidence.rigs.predictions import Told, percentiles
 from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
@@ -146,34 +144,41 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     return table
 
 
-def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table]:
-    """Return a table of how far twins are from their machines, by what their records were used for,
-    and the orders.
-    """
+def machines(rows: Sequence[TwinFigure]) -> Table:
+    """Return how far twins are from their machines, by what their records were used for."""
     right = functools.partial(Column, justify="right", no_wrap=True)
-    named = functools.partial(
-        Column, "machine", no_wrap=True
-    )  # a column keeps the cells of its table
-    heads = []
-    for head in ("\nrows", "median\n%", "largest\n%", "within\nrange", "public\n%"):
-        heads.append(right(head))
     table = titled(
         "How far the twin is from the machine",
-        named(),
+        Column("machine", no_wrap=True),
         Column("records\nare", no_wrap=True),
-        *heads,
+        right("\nrows"),
+        right("median\n%"),
+        right("largest\n%"),
+        right("within\nrange"),
+        right("public\n%"),
         pad_edge=False,
     )
     for group in twin_figures.summaries(rows):
         table.add_row(*group.cells)
-    ends = right("sets in the\nmachine's order"), right("tau")
-    orders = titled(
-        "Laws in the machine's order", named(), "condition", "twin", *ends, pad_edge=False
+    return table
+
+
+def orders(by_laws: Sequence[Order]) -> Table:
+    """Return in how many parameter sets of a twin its laws stand in the machine's order."""
+    right = functools.partial(Column, justify="right", no_wrap=True)
+    table = titled(
+        "Laws in the machine's order",
+        Column("machine", no_wrap=True),
+        "condition",
+        "twin",
+        right("sets in the\nmachine's order"),
+        right("tau"),
+        pad_edge=False,
     )
     for one in by_laws:
         counts = f"{one.ordered} of {one.sets}", f"{one.tau:z.2f}"
-        orders.add_row(one.rig, one.condition, one.variant or "whole", *counts)
-    return [table, orders]
+        table.add_row(one.rig, one.condition, one.variant or "whole", *counts)
+    return table
 
 
 def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:
@@ -211,74 +216,6 @@ def _told(value: float) -> str:
     if math.isinf(value):
         return "falls"
     return f"{value:.4g}"
-
-
-def predicted(told: Told) -> list[Table]:
-    """Return three tables of predictions: what was fitted on, what is predicted, and which parts
-    decide the order.
-    """
-    about = told.prediction
-    right = functools.partial(Column, justify="right")
-    heads = [right(f"{name},\n{who}") for name in about.recorded for who in ("machine", "twin")]
-    fitted = titled(
-        f"Fitted on: {about.fitted_on}; median, and 5 to 95 % of seeds and sets",
-        "figure",
-        *heads,
-        "unit",
-    )
-    for figure in about.recorded[next(iter(about.recorded))]:
-        cells = [
-            cell
-            for name, figures in about.recorded.items()
-            for cell in _fitted(told, name, figure, figures.get(figure))
-        ]
-        fitted.add_row(figure.replace("_", " "), *cells, about.units[figure])
-    words = [figure.replace("_", " ").replace("acceleration", "accel.") for figure in about.shown]
-    shown = [
-        right(f"{name}\n{about.units[figure]}")
-        for name, figure in zip(words, about.shown, strict=True)
-    ]
-    heads = [Column("law", no_wrap=True), "", *shown, right("falls\n%")]
-    laws = titled("Predicted, but for the law fitted on", *heads, pad_edge=False)
-    for law in about.order:
-        for name in about.conditions:
-            cells = [_spread(told.of(law, name, figure)) for figure in about.shown]
-            laws.add_row(
-                law.replace("_", " "), name, *cells, f"{100.0 * told.falls(law, name):.0f}"
-            )
-    first = next(iter(about.conditions))
-    medians = [right(law.replace("_", " ")) for law in about.order]
-    title = f"What of the twin decides it: {about.rank.replace('_', ' ')} in {first}, {about.units[about.rank]}"
-    parts = titled(title, "twin", *medians, right("sets in the\nmachine's order"), right("tau"))
-    for without in dict.fromkeys(key[0] for key in told.values):
-        cells = [_spread(told.of(law, first, about.rank, without)) for law in about.order]
-        for i, law in enumerate(about.order):
-            if 0.0 < (fell := told.falls(law, first, without)) < 1.0:
-                cells[i] += f"\n{100.0 * fell:.0f} % fall"
-        count, sets = told.ordered(first, without)
-        label = f"without {without}" if without else "whole"
-        parts.add_row(
-            label, *cells, f"{count} of {sets}", f"{told.correlation(first, without):z.2f}"
-        )
-    return [fitted, laws, parts]
-
-
-def _fitted(told: Told, condition: str, figure: str, recorded: float | None) -> tuple[str, str]:
-    """Return the machine's figure and the twin's, empty if none was recorded."""
-    if recorded is None:
-        return "", ""
-    return number(recorded), _spread(told.of(told.prediction.fitted_on, condition, figure))
-
-
-def _spread(values: np.ndarray) -> str:
-    """Return the median of a figure, and in a second line its range, if it has one, as "0.21…0.9"."""
-    if not len(values):
-        return "all fall"
-    middle, *ends = percentiles(values)
-    low, high = (f"{float(f'{value:.{2 if abs(value) < 1.0 else 3}g}'):g}" for value in ends)
-    if low == high:
-        return number(middle)
-    return f"{number(middle)}\n{low}…{high}"
 
 
 def _to_error(value: float, error: float) -> str:

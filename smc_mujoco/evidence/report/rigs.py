@@ -71,9 +71,7 @@ class Repeated:
 
     rig: Rig
     name: str  # of the record's file
-    fits: Mapping[str, Mapping[str, float]] = frozen(
-        {}
-    )  # parameter set or "do nothing" -> column -> percent
+    fits: Mapping[str, Mapping[str, float]] = frozen({})  # parameter set -> column -> percent
     t: np.ndarray = dataclasses.field(
         default_factory=lambda: np.empty(0)
     )  # s, (K,), thinned to few points
@@ -116,7 +114,6 @@ def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
             ((predicted, measured, t),) = twin.predictions([record])
         except ScenarioError as error:
             return Repeated(rig=twin, name=path.name, why=str(error))
-        fits["do nothing"] = twin.idle(record)
         step = -(-len(t) // MAX_CURVE_POINTS)
         thin = []
         for columns in (measured, predicted):

@@ -46,26 +46,24 @@ def runs(
     that `tuned` returns. `seeds`, `gains`, `duration` and `starts` are as in `smc.grid`; starts are
     by default within 20 % of the rig's x0.
     """
-    chosen = _chosen(rig, laws)
-    given, found = (
-        [law for law in chosen if isinstance(law, Candidate) == searched]
-        for searched in (False, True)
-    )
-    scenarios = []
+    given = []
+    found = []
+    for law in _chosen(rig, laws):
+        (found if isinstance(law, Candidate) else given).append(law)
     around = _starts(rig, starts)
+    nominal = [Condition("nominal", {})]
+    scenarios = []
     for name, fields in _machines(rig).items():
-        free = dict(fields)
-        plant = free.pop("plant")
+        plant = fields.pop("plant")
+        base = []
         if given:
-            base = grid([plant], given, ["nominal"], seeds, gains, duration, around)
-        else:
-            base = []
+            base += grid([plant], given, ["nominal"], seeds, gains, duration, around)
         if found:
-            nominal = [Condition("nominal", {})]
             base += all_combinations(
                 [plant], lambda _: found, nominal, range(seeds), duration, around
             )
-        scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
+        for scenario in base:
+            scenarios.append(dataclasses.replace(scenario, **fields).named(name))
     return scenarios
 
 
@@ -74,21 +72,15 @@ def objective(rig: Rig, starts: Starts | None = None) -> Objective:
     each condition.
     """
     machines = _machines(rig)
-    u_max = machines["set 1"]["u_max"]
-    bound: Any = (
-        None if u_max == math.inf else u_max
-    )  # where firmware bounds its own command, that of the drive
-    fields: dict[str, Any] = machines["set 1"] | {
-        "law": "none",
-        "x0": _starts(rig, starts).x0,
-        "u_max": bound,
-    }
+    around = _starts(rig, starts)
+    fields: dict[str, Any] = machines["set 1"] | {"law": "none", "x0": around.x0}
+    if fields["u_max"] == math.inf:  # firmware bounds its own command: take the drive's bound
+        fields["u_max"] = None
     first = Scenario(**fields)
     period = first.control_period
-    sets = tuple(Condition(name, fields) for name, fields in machines.items())
     return Objective(
-        conditions=sets,
-        starts=_starts(rig, starts),
+        conditions=tuple(Condition(name, fields) for name, fields in machines.items()),
+        starts=around,
         control_period=period,
         weight=period,
         u_max=min(first.limits),
@@ -115,10 +107,8 @@ def tuned(
     found = []
     for law in map(coerce.law, _chosen(rig, laws)):
         try:
-            with warnings.catch_warnings():
-                warnings.filterwarnings(
-                    "ignore", "no set of gains tried", ScenarioWarning
-                )  # the remark says so
+            with warnings.catch_warnings():  # the remark says it
+                warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
                 made = tune(
                     plant,
                     law,
@@ -142,16 +132,16 @@ def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
     """Return the laws to compare: the rig's own have its gains."""
     if not rig.ensemble:
         raise ScenarioError(
-            f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
-            "from records and draw other sets with Identified.drawn"
+            f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as "
+            "qube_servo, or identify it from records and draw sets with Identified.drawn"
         )
     shipped = {law.name: law for law in rig.laws}
     given = rig.laws if laws is None else laws
-    if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
+    if not given:
         raise ScenarioError(
             f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)"
         )
-    return chosen
+    return [shipped.get(law, law) if isinstance(law, str) else law for law in given]
 
 
 def _starts(rig: Rig, starts: Starts | None) -> Starts:
@@ -162,10 +152,11 @@ def _machines(rig: Rig) -> dict[str, dict[str, Any]]:
     """Return set -> the fields of a Scenario that a rig's machine has, without where runs begin."""
     found = {}
     for name, member in rig.members().items():
-        fields: dict[str, Any] = {"u_max": None, "physics_step": None} | member.machine(
-            Values(**member.values)
-        )
-        found[name] = {key: value for key, value in fields.items() if key not in BY_STARTS}
+        fields: dict[str, Any] = {"u_max": None, "physics_step": None}
+        fields |= member.machine(Values(**member.values))
+        for start in BY_STARTS:
+            fields.pop(start, None)
+        found[name] = fields
     return found
 
 
@@ -185,7 +176,5 @@ def sentence(board: Any, labels: Mapping[str, str] = frozen({})) -> str:
     if board.winner:
         return f"{labels.get(board.winner, board.winner)} wins on all {count} parameter sets"
     wins = Counter(block.winner for block in board.blocks if block.winner).most_common()
-    others = (
-        ", ".join(f"{labels.get(law, law)} on {number}" for law, number in wins) or "none on any"
-    )
-    return f"no law wins on all {count} parameter sets ({others})"
+    others = [f"{labels.get(law, law)} on {number}" for law, number in wins]
+    return f"no law wins on all {count} parameter sets ({', '.join(others) or 'none on any'})"

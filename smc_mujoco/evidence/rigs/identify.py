@@ -22,11 +22,10 @@ from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
-from smc_mujoco.common.text import joined
 from smc_mujoco.evidence.rigs import search
-from smc_mujoco.evidence.rigs.records import Columns, Record, percent
-from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
-from smc_mujoco.evidence.rigs.rig import RADIANS_GAIN, Fall, Quantity, Rig, Source
+from smc_mujoco.evidence.rigs.records import Columns, Record
+from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
+from smc_mujoco.evidence.rigs.rig import Fall, Quantity, Rig, Source
 from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.evidence.rigs.uncertainty import BLOCKS, MAX_CORRELATION, statistics
 from smc_mujoco.mechanisms.hardware.part import column_ends
@@ -49,15 +48,18 @@ SETTINGS = (
 # Frictions and inertias of the library's plants, which are 0 or more.
 FRICTIONS = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta"))
 INERTIAS = frozenset(("J", "Jc"))
-POOR_FIT = (
-    80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
-)
+POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
-# factor between a quantity before and after, beyond which a column may be in another unit; chosen
-UNIT_FACTOR = 5.0
-FACTOR_TOLERANCE = 0.1  # relative difference up to which such factors count as the same; chosen
 Count = Annotated[int, Whole(low=1, high=1000)]
-MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
+SLOW = (
+    "the residuals are slow, as where a force was not recorded: true errors may be several "
+    "standard errors"
+)
+POOR = (
+    "the fit is poor: the model lacks something, a column is another one or in another unit "
+    "(angles are in rad), or the search ended in a local minimum: start from other values, with "
+    "more starts or another seed"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,77 +85,26 @@ class Identified:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on what the records cannot determine, and on a poor fit."""
-        sentences = []
-        for (i, second), (j, first) in itertools.product(enumerate(self.values), repeat=2):
-            if j < i and abs(correlation := self.correlations[i, j]) > MAX_CORRELATION:
-                sentences.append(
+        """What the records cannot determine, and what to doubt."""
+        notes = []
+        for (i, first), (j, second) in itertools.combinations(enumerate(self.values), 2):
+            correlation = self.correlations[i, j]
+            if abs(correlation) > MAX_CORRELATION:
+                notes.append(
                     f"{first} and {second} cannot be told apart (correlation {correlation:.3f})"
                 )
         for name, value in self.values.items():
             quantity = self.rig.quantities[name]
             if value in (quantity.least, quantity.most):
-                sentences.append(
-                    f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip()
-                )
+                notes.append(f"{name} is at the end of its range")
             elif self.errors[name] > abs(value):
-                sentences.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
-        return sentences + self._scale_notes() + self._loss_notes() + self._doubts()
-
-    def _scale_notes(self) -> list[str]:
-        """Sentences on quantities that cannot be negative and are far from their values before."""
-        before = {name: self.before.quantities[name] for name in self.values}
-        positive = {name: q.value for name, q in before.items() if q.least >= 0.0 and q.value > 0.0}
-        factors = {name: self.values[name] / value for name, value in positive.items()}
-        far = {}
-        for name, factor in factors.items():
-            if not 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR:
-                far[name] = factor
-        if not far:
-            return []
-        middle = float(np.median(list(far.values())))
-        if len(far) > 1 and all(
-            abs(factor / middle - 1.0) < FACTOR_TOLERANCE for factor in far.values()
-        ):
-            return [
-                f"{joined(list(far))} are {middle:.3g} times what they were before: look at the unit of the command"
-            ]
-        changes = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
-        return [
-            f"{joined(changes)}: look at the units of the columns, unless the values before were only a guess"
-        ]
-
-    def _doubts(self) -> list[str]:
-        """Sentences on residuals that the standard errors do not allow for, and on a poor fit."""
-        sentences = []
+                notes.append(f"{name} may as well be 0")
         worst = min(min(fit.values()) for fit in self.fits)
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
-            sentences.append(
-                f"the residuals are slow, with {self.independent:.0f} independent samples, as where a force was not "
-                "recorded: true errors may be several standard errors"
-            )
+            notes.append(SLOW)
         if worst < POOR_FIT:
-            if isinstance(worst, Fall):
-                poor = f"the twin {worst}"
-            else:
-                poor = f"the worst fit is {worst:.0f} %"
-            sentences.append(
-                f"{poor}: the model lacks something, a column is wrong or in another unit, or "
-                "the search ended in a local minimum; start from other values, with more starts or another seed"
-            )
-        return sentences
-
-    def _loss_notes(self) -> list[str]:
-        """Sentences on whole records that the values before repeat better."""
-        sentences = []
-        for i, (fit, before) in enumerate(zip(self.fits, self.fits_before, strict=True)):
-            if min(fit.values()) < min(before.values()) - MAX_FIT_LOSS:
-                sentences.append(
-                    f"record {i + 1}, repeated as a whole, fits by {percent(fit)} and by {percent(before)} with the "
-                    "values before, though its pieces fit better: errors add up over the record, or the model lacks "
-                    "something"
-                )
-        return sentences
+            notes.append(POOR)
+        return notes
 
     @constrained
     def drawn(self, count: Count = 8, seed: Seed = 0) -> Rig:
@@ -164,25 +115,22 @@ class Identified:
         """
         names = list(self.values)
         rng = np.random.default_rng(seed)
-        spread, middle = (
-            np.array([of[name] for name in names]) for of in (self.errors, self.values)
-        )
+        spread = np.array([self.errors[name] for name in names])
+        covariance = self.correlations * np.outer(spread, spread)
         draws = rng.multivariate_normal(
-            middle, self.correlations * np.outer(spread, spread), count, method="eigh"
+            list(self.values.values()), covariance, count, method="eigh"
         )
-        known = [self.rig.quantities[name] for name in names]
-        kept = np.clip(
-            draws, [quantity.least for quantity in known], [quantity.most for quantity in known]
-        )
-        return dataclasses.replace(
-            self.rig, ensemble=tuple(dict(zip(names, row, strict=True)) for row in kept.tolist())
-        )
+        for i, name in enumerate(names):
+            quantity = self.rig.quantities[name]
+            draws[:, i] = np.clip(draws[:, i], quantity.least, quantity.most)
+        sets = tuple(dict(zip(names, row, strict=True)) for row in draws.tolist())
+        return dataclasses.replace(self.rig, ensemble=sets)
 
     def __repr__(self) -> str:
-        values = ", ".join(
-            f"{name} = {value:.4g} ± {self.errors[name]:.1g}" for name, value in self.values.items()
-        )
-        return f"identified({self.rig.name!r}, {values})"
+        values = []
+        for name, value in self.values.items():
+            values.append(f"{name} = {value:.4g} ± {self.errors[name]:.1g}")
+        return f"identified({self.rig.name!r}, {', '.join(values)})"
 
     def save(self, path: str | Path) -> Path:
         """Write values, errors, correlations and fits to a JSON file. Return its path."""
@@ -199,13 +147,12 @@ class Identified:
             "correlations": self.correlations.tolist(),
         }
         for key, fits in (("fits", self.fits), ("fits_before", self.fits_before)):
-            about[key] = [
-                {
-                    column: str(value) if isinstance(value, Fall) else value
-                    for column, value in fit.items()
-                }
-                for fit in fits
-            ]
+            about[key] = []
+            for fit in fits:
+                falls = isinstance(min(fit.values()), Fall)
+                about[key].append(
+                    {name: str(value) for name, value in fit.items()} if falls else fit
+                )
         return write_json(Path(path), about)
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:
@@ -255,19 +202,13 @@ def identify(
       ScenarioError: an unknown quantity, not a record, columns in another unit or in the wrong
         order, or records that cannot tell the quantities apart.
     """
-    many: list[Any]
-    if isinstance(records, (list, tuple)):
-        many = list(records)
-    else:
-        many = [records]
+    many: Any = records if isinstance(records, (list, tuple)) else [records]
     if not many:
         raise ScenarioError("there are no records: give at least one")
     twin, data = _twin(rig, many)
     twin = twin.with_values(start or {})
     names = _checked_names(twin, quantities)
-    fits_before = tuple(twin.fits(data))  # also refuses records that are too short
-    for record, fit in zip(data, fits_before, strict=True):
-        twin.refuse_degrees(record, fit)
+    fits_before = twin.fits(data)  # also refuses records that are too short
     with bar(f"identify {twin.name}", 2 * most * (2 * len(names) + 1), shown=progress) as drawn:
         replays, slopes, by_steps = _solved(twin, names, data, starts, seed, most, drawn.advance)
         errors, correlations, independent = statistics(replays, slopes, by_steps)
@@ -275,6 +216,8 @@ def identify(
     fitted = twin.with_values(values, "identified from records")
     states = _starting_states(fitted, data, replays, slopes.point)
     steps = replays.short_steps
+    if steps:
+        fits_before = twin.fits(data, **steps)
     return Identified(
         rig=fitted,
         before=twin,
@@ -282,7 +225,7 @@ def identify(
         errors=errors,
         correlations=correlations,
         fits=tuple(fitted.fits(data, states=states, **steps)),
-        fits_before=tuple(twin.fits(data, **steps)) if steps else fits_before,
+        fits_before=tuple(fits_before),
         predictions=tuple(fitted.predictions(data, states=states, **steps)),
         evaluations=replays.evaluations,
         independent=independent,
@@ -318,7 +261,6 @@ def _solved(
     pieces = Replays(twin, names, data, False, report)
     reached = search.search(pieces, starts, seed, most)
     if twin.controller is None:
-        _refuse_swapped(twin, names, data, reached)
         slopes, moved = search.accurate(pieces, reached)
         return pieces, search.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
@@ -328,26 +270,6 @@ def _solved(
     slopes = search.refine(closed, search.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
-
-
-def _refuse_swapped(
-    twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], reached: Slopes
-) -> None:
-    """Raise ScenarioError if records of one joint fit badly as they are, and well with position and
-    command swapped.
-    """
-    (x, *others), u = twin.columns.x, twin.columns.u
-    if others or twin.columns.state or twin.dynamics is not None or reached.fit >= POOR_FIT:
-        return
-    swapped = Replays(
-        twin, names, [dict(record) | {x: record[u], u: record[x]} for record in data], False
-    )
-    fit = search.search(swapped, 4, 0, search.ROUGH_STEPS).fit
-    if fit > max(RADIANS_GAIN, reached.fit + RADIANS_GAIN):
-        raise ScenarioError(
-            f"the columns {x} and {u} of the record of {twin.name} look swapped, as its pieces fit by {fit:.0f} % with "
-            f"them exchanged and by {reached.fit:.0f} % as they are: name the position {x} and the command {u}"
-        )
 
 
 def _starting_states(
@@ -363,20 +285,18 @@ def _starting_states(
         return [None] * len(data)
     if replays.closed:
         return [replays.state(point, k) for k in range(len(data))]
-    whole_records = Replays(fitted, [], data, False, whole=True)
-    whole_records.steps = replays.short_steps
-    firsts = []
-    for i in range(len(data)):
-        firsts.append(next(k for k, piece in enumerate(replays.pieces) if piece.record == i))
-    candidates = [whole_records.start, Point(np.zeros(0), point.states[firsts])]
+    repeats = Replays(fitted, [], data, False, whole=True)
+    repeats.steps = replays.short_steps
+    of_records = [piece.record for piece in replays.pieces]
+    firsts = [of_records.index(i) for i in range(len(data))]
+    none = np.zeros(0)
+    candidates = [repeats.start, Point(none, point.states[firsts])]
     for candidate in tuple(candidates):
-        slopes = whole_records.slopes(candidate)
-        candidates.append(Point(candidate.values, candidate.states + slopes.moves(np.zeros(0))))
-    costs = np.array(
-        [[cost([rows]) for rows in pieces] for pieces in whole_records.residuals(candidates)]
-    )
+        moves = repeats.slopes(candidate).moves(none)
+        candidates.append(Point(none, candidate.states + moves))
+    costs = repeats.costs(candidates)
     best = costs.argmin(axis=0)
-    return [whole_records.state(candidates[best[i]], i) for i in range(len(data))]
+    return [repeats.state(candidates[best[i]], i) for i in range(len(data))]
 
 
 def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
@@ -398,24 +318,22 @@ def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
     `base`.
     """
     settings = {}
-    if base is not None:
-        settings = {}
-        for name in SETTINGS:
-            if getattr(base, name) is not None:
-                settings[name] = getattr(base, name)
-    lower = dict.fromkeys(plant.parameters, -np.inf)
-    lower |= dict.fromkeys(
-        (FRICTIONS | INERTIAS | {*plant.dry, *plant.added}) & set(plant.parameters), 0.0
-    )
-    lower |= dict.fromkeys(plant.positive, 1e-6)
+    for name in SETTINGS:
+        value = getattr(base, name, None)
+        if value is not None:
+            settings[name] = value
+    from_zero = FRICTIONS | INERTIAS | {*plant.dry, *plant.added}
+    quantities = {}
+    for name, value in plant.parameters.items():
+        least = 0.0 if name in from_zero else -np.inf
+        if name in plant.positive:
+            least = 1e-6
+        quantities[name] = Quantity(value, "", "nominal value of the plant", least)
     ends = column_ends(plant)
     return Rig(
         name=plant.name,
         label=plant.label or plant.name,
-        quantities={
-            name: Quantity(value, "", "nominal value of the plant", lower[name])
-            for name, value in plant.parameters.items()
-        },
+        quantities=quantities,
         machine=lambda q: settings | {"plant": dataclasses.replace(plant, parameters=vars(q))},
         columns=Columns(
             x=tuple(f"x{end}" for end in ends), u=f"u{ends[0]}", reference=f"r{ends[0]}"

@@ -17,9 +17,8 @@ from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 CUBIC_WINDOW, CUBIC_DEGREE = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
-COMPARED_PERIOD = (
-    0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
-)
+# s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
+COMPARED_PERIOD = 0.01
 # Hz, and number of poles, of the low-pass filter. Chosen: three times the fastest public exciting
 # motions, 1.6 Hz.
 CUTOFF = 5.0
@@ -40,8 +39,9 @@ class Filter:
         self.step = step_of(t)
         if not long_enough(data, columns):
             raise ScenarioError(
-                f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
-                f"at least {MIN_DURATION:g} s, with a sample every {MAX_STEP:g} s or more often"
+                f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: "
+                f"for its torques give at least {MIN_DURATION:g} s, with a sample every "
+                f"{MAX_STEP:g} s or more often"
             )
         self.stride = max(1, round(COMPARED_PERIOD / self.step))
         self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")

@@ -7,13 +7,13 @@ rig.
 import dataclasses
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import trace as traces
@@ -22,9 +22,8 @@ from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
 MIN_SAMPLES = 50  # of a replay; chosen
-STATE_SAMPLES = (
-    15  # on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
-)
+# on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
+STATE_SAMPLES = 15
 RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ from it; chosen
 # s, between samples: beyond it the time is in another unit, or the motion is missed; chosen
 MAX_PERIOD = 0.2
@@ -40,39 +39,31 @@ class Columns:
     """Names of a record's columns."""
 
     time: str = "t"  # s
-    x: tuple[str, ...] = (
-        "x",
-    )  # position of each channel, rad or m; or of each joint that has a torque
+    # position of each channel, rad or m; or of each joint that has a torque
+    x: tuple[str, ...] = ("x",)
     u: str = "u"  # command, in the unit of the rig's u
     reference: str = "reference"  # of the driven joint, if the loop is closed
     feedforward: str = "feedforward"  # what is added to the controller's u; records may lack it
     others: tuple[str, ...] = ()  # references of the other joints; records may lack them
-    state: tuple[
-        str, ...
-    ] = ()  # positions, then velocities, without noise and offset; only simulated runs have them
-    offset: tuple[
-        float, ...
-    ] = ()  # what is subtracted from each channel's column to get the plant's x; empty for 0
-    torque: tuple[
-        str, ...
-    ] = ()  # of each joint, for records whose torques are predicted from the motion
+    # positions, then velocities, without noise and offset; only simulated runs have them
+    state: tuple[str, ...] = ()
+    # what is subtracted from each channel's column to get the plant's x; empty for 0
+    offset: tuple[float, ...] = ()
+    # of each joint, for records whose torques are predicted from the motion
+    torque: tuple[str, ...] = ()
 
     def needed(self, closed: bool) -> tuple[str, ...]:
         """Return the columns that a record must have; for a closed loop also the reference."""
-        command = self.torque or (self.u, self.reference)[: 1 + closed]
+        command = self.torque or (self.u,)
+        if closed and not self.torque:
+            command = self.u, self.reference
         return self.time, *self.x, *command
-
-    @property
-    def references(self) -> tuple[str, ...]:
-        """References of the joints, the driven one first."""
-        return self.reference, *self.others
 
     @property
     def known(self) -> tuple[str, ...]:
         """All columns that a replay may read."""
-        return tuple(
-            dict.fromkeys((*self.needed(True), *self.references, self.feedforward, *self.state))
-        )
+        more = self.reference, *self.others, self.feedforward, *self.state
+        return tuple(dict.fromkeys((*self.needed(True), *more)))
 
 
 def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -> Record | Trace:
@@ -80,23 +71,17 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
 
     `names`: the rig's name of a column -> the file's.
     """
-    with reading(
-        path, "record", "give the path of a CSV file, or of an npz file with arrays by column"
-    ) as file:
-        columns = None
+    cure = "give the path of a CSV file, or of an npz file with arrays by column"
+    columns = {}
+    with reading(path, "record", cure) as file:
         if file.suffix == ".npz":
             with file.open("rb") as opened, np.load(opened) as arrays:
-                columns = {} if "about" in arrays else dict(arrays)
-    if columns is None:
-        columns = _csv(file)
-    elif not columns:
+                columns = dict(arrays)
+    if "about" in columns:
         return traces.load(file)
+    columns = columns or _csv(file)
     for ours, theirs in (names or {}).items():
-        if theirs not in columns:
-            raise ScenarioError(
-                f"{path} has no column {theirs!r} (it has {', '.join(columns)}): give one that it has"
-            )
-        columns[ours] = columns[theirs]
+        columns[ours] = find(f"column of {path}", theirs, columns)
     return columns
 
 
@@ -104,18 +89,19 @@ def _csv(file: Path) -> Record:
     """Return the columns of a CSV file. A cell that is empty, or not a number, is NaN."""
     rows = [row for _, row in csv_rows(file)]
     if len(rows) < 2:
-        count = "no lines" if not rows else "only 1 line"
         raise ScenarioError(
-            f"{file} has {count}: give a first line with the columns' names, and samples"
+            f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples"
         )
     heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
+    values = []
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
             raise ScenarioError(
-                f"{file}, line {number}: {len(row)} cells for {len(heads)} columns: give one for each"
+                f"{file}, line {number}: {len(row)} cells for {len(heads)} columns: "
+                "give one for each"
             )
-    values = np.array([[_cell(cell) for cell in row] for row in rows[1:]])
-    return {name: values[:, i] for i, name in enumerate(heads)}
+        values.append(list(map(_cell, row)))
+    return dict(zip(heads, np.array(values[1:]).T, strict=True))
 
 
 def _cell(text: str) -> float:
@@ -130,16 +116,15 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
     run's noise.
     """
     s = trace.scenario
-    sensor = trace.scenario.sensor
     by_column = {}
     for i, name in enumerate(columns.x):
-        x = trace.x[:, i] + (sensor.bias if sensor else 0.0)
+        x = trace.x[:, i]
+        if s.sensor:
+            x = x + s.sensor.bias
         if noisy and s.noise.position:
-            kind = philox.MEASUREMENT
-            x = x + s.noise.position * np.array(
-                [philox.normals(s.seed, i, kind, k)[0] for k in range(len(x))]
-            )
-        if quantum := sensor.quantum(s.plant.units[i] == "rad") if sensor else 0.0:
+            normals = [philox.normals(s.seed, i, philox.MEASUREMENT, k)[0] for k in range(len(x))]
+            x = x + s.noise.position * np.array(normals)
+        if s.sensor and (quantum := s.sensor.quantum(s.plant.units[i] == "rad")):
             x = quantum * np.floor(x / quantum + 0.5)
         by_column[name] = x
     return by_column
@@ -147,14 +132,16 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
 
 def of_trace(trace: Trace, columns: Columns) -> Record:
     """Return a run as a record with a rig's columns."""
-    offset = columns.offset or (0.0,) * len(columns.x)
     feedforward = trace.scenario.feedforward
+    added = np.zeros(len(trace.t))
+    if feedforward is not None:
+        added[:] = [evaluate(feedforward, t)[0] for t in trace.t]
     record = {columns.time: trace.t, columns.u: trace.u[:, 0], columns.reference: trace.r[:, 0]}
-    for (name, x), zero in zip(positions(trace, columns, noisy=True).items(), offset, strict=True):
-        record[name] = x + zero
-    added = [0.0 if feedforward is None else evaluate(feedforward, t)[0] for t in trace.t]
+    record |= positions(trace, columns, noisy=True)
+    for name, zero in zip(columns.x, columns.offset, strict=False):
+        record[name] = record[name] + zero
     record |= dict(zip(columns.state, np.column_stack([trace.x, trace.v]).T, strict=False))
-    return record | {columns.feedforward: np.array(added)}
+    return record | {columns.feedforward: added}
 
 
 def checked(record: Mapping[str, Any], columns: Columns, period: float | None, rig: str) -> Record:
@@ -169,19 +156,19 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
         )
     missing = [name for name in columns.needed(period is not None) if name not in record]
     if missing:
-        has = ", ".join(map(str, record)) or "none"
-        spare = next((name for name in record if name not in columns.known), "NAME")
-        example = f"--columns {missing[0]}={spare} (in Python names={{{missing[0]!r}: {spare!r}}})"
-        cure = f"add it, or say which it is, as {example}"
         raise ScenarioError(
-            f"the record of {rig} has no column {', '.join(missing)} (it has {has}): {cure}"
+            f"the record of {rig} has no column {', '.join(missing)} "
+            f"(it has {', '.join(map(str, record)) or 'none'}): add it, or say which it is, as "
+            f"--columns {missing[0]}=NAME (in Python names={{{missing[0]!r}: 'NAME'}})"
         )
     data = {name: _numbers(name, record[name], rig) for name in columns.known if name in record}
     t = data[columns.time]
     for name, values in data.items():
         if len(values) != len(t):
-            counts = f"{len(values)} samples and {columns.time} has {len(t)}"
-            raise ScenarioError(f"column {name} of {rig} has {counts}: give as many of each")
+            raise ScenarioError(
+                f"column {name} of {rig} has {len(values)} samples and {columns.time} has "
+                f"{len(t)}: give as many of each"
+            )
     step = _checked_step(t, period, rig)
     if period is None:
         even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
@@ -199,26 +186,29 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
     def at(sample: int) -> str:
         return f"{sample}, from {t[sample]:.6g} s to {t[sample + 1]:.6g} s"
 
-    back = np.flatnonzero(np.diff(t) <= 0.0)
     step = step_of(t)
-    if len(back):
+    gaps = np.diff(t)
+    if gaps.min() <= 0.0:
         raise ScenarioError(
-            f"time of {rig} runs backward after sample {at(back[0])}: give times that increase"
+            f"time of {rig} runs backward after sample {at(int(np.argmax(gaps <= 0.0)))}: "
+            "give times that increase"
         )
     if step > MAX_PERIOD:
         raise ScenarioError(
-            f"the record of {rig} is sampled every {step:g} s and lasts {t[-1] - t[0]:g} s: give time in s (a column "
-            f"in ms divided by 1000), with a sample every {MAX_PERIOD:g} s or more often"
+            f"the record of {rig} is sampled every {step:g} s and lasts {t[-1] - t[0]:g} s: "
+            "give time in s (a column in ms divided by 1000), with a sample every "
+            f"{MAX_PERIOD:g} s or more often"
         )
     if period is not None and abs(step - period) > RATE_TOLERANCE * period:
         raise ScenarioError(
-            f"the record of {rig} is sampled every {step:.4g} s and the rig's controller runs every {period:g} s: "
-            "resample it, or record every command"
+            f"the record of {rig} is sampled every {step:.4g} s and the rig's controller runs "
+            f"every {period:g} s: resample it, or record every command"
         )
-    gaps = np.flatnonzero(np.diff(t) > (MAX_GAP if period is None else MAX_GAP_CLOSED) * step)
-    if len(gaps):
+    longest = step * (MAX_GAP if period is None else MAX_GAP_CLOSED)
+    if gaps.max() > longest:
         raise ScenarioError(
-            f"the record of {rig} has a gap after sample {at(gaps[0])}: fill it in, or cut it there"
+            f"the record of {rig} has a gap after sample {at(int(np.argmax(gaps > longest)))}: "
+            "fill it in, or cut it there"
         )
     return step
 
@@ -236,10 +226,8 @@ def noise(data: Record, columns: Columns) -> float:
     have the standard deviation sqrt(70) sigma for white noise of sigma. Their median ignores short
     transients.
     """
-    differences = [np.abs(np.diff(data[name], 4)) for name in columns.x]
-    return min(
-        float(np.median(column)) / (NORMAL_MEDIAN * math.sqrt(70.0)) for column in differences
-    )
+    medians = [np.median(np.abs(np.diff(data[name], 4))) for name in columns.x]
+    return float(min(medians)) / (NORMAL_MEDIAN * math.sqrt(70.0))
 
 
 def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
@@ -253,8 +241,8 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
     wrong = np.flatnonzero(~np.isfinite(array))
     if len(wrong):
         raise ScenarioError(
-            f"column {name} of {rig} is {array[wrong[0]]} at sample {wrong[0]}, one of {len(wrong)} that are not "
-            "finite: fill them in, or cut the record there"
+            f"column {name} of {rig} is {array[wrong[0]]} at sample {wrong[0]}, one of "
+            f"{len(wrong)} that are not finite: fill them in, or cut the record there"
         )
     return array
 
@@ -272,7 +260,9 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
     last = min(len(data[columns.time]), at + STATE_SAMPLES + 1)
     times = period * (np.arange(first, last) - at)
     cubics = [np.polyfit(times, data[name][first:last], 3) for name in columns.x]
-    x = np.array([cubic[3] for cubic in cubics] if at else [data[name][0] for name in columns.x])
+    x = np.array([cubic[3] for cubic in cubics])
+    if not at:
+        x = np.array([data[name][0] for name in columns.x])
     return x, np.array([cubic[2] for cubic in cubics])
 
 
@@ -284,14 +274,3 @@ def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
     from scipy.signal import savgol_filter
 
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))
-
-
-def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:
-    """Return the record with some columns converted from degrees to radians."""
-    angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in names if name in record}
-    return {name: np.asarray(record[name]) for name in columns.known if name in record} | angles
-
-
-def percent(fit: Mapping[str, float]) -> str:
-    """Return a fit as text: "96 / 94 / 85 %"."""
-    return " / ".join(f"{value:.0f}" for value in fit.values()) + " %"

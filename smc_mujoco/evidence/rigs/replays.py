@@ -19,7 +19,7 @@ import functools
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from smc_mujoco.evidence.rigs.records import Record
 from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
 
 # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
 DIFFERENCE_STEP = 2e-3
@@ -40,9 +41,8 @@ MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
 SLOPE_HALVINGS = 2
 # largest residual of a sample, relative to the norm of the record; that of a run that fails
 WORST = 1.0
-SINGULAR_RATIO = (
-    1e-6  # ratio of singular values below which states at the start have no effect of their own
-)
+# ratio of singular values below which states at the start have no effect of their own
+SINGULAR_RATIO = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,9 +53,7 @@ class Piece:
     part: Part | None  # what its replay takes from the record; None if torques are predicted
     skipped: int  # samples at its start that are not compared
     measured: Record  # the columns compared, (N,) each
-    spread: Mapping[
-        str, float
-    ]  # norm of each whole column about its mean, by which residuals are divided
+    spread: Mapping[str, float]  # norm of each whole column about its mean: the unit of residuals
     scales: np.ndarray  # units of the free states, (s,)
 
 
@@ -84,19 +82,17 @@ class Slopes:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can
         cause.
         """
-        return [
-            row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0]
-            for S, row in zip(self.by_states, rows, strict=True)
-        ]
+        pairs = zip(self.by_states, rows, strict=True)
+        return [row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0] for S, row in pairs]
 
     def moves(self, step: np.ndarray) -> np.ndarray:
         """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities
         (p,) best.
         """
-        pieces = zip(self.residuals, self.by_values, self.by_states, strict=True)
-        return np.array(
-            [-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0] for r, J, S in pieces]
-        )
+        moves = []
+        for r, J, S in zip(self.residuals, self.by_values, self.by_states, strict=True):
+            moves.append(-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0])
+        return np.array(moves)
 
     def stepped(self, step: np.ndarray) -> "Slopes":
         """Return the slopes after a small step of the quantities (p,), with residuals that follow
@@ -160,20 +156,15 @@ class Replays:
         self.low = np.array([quantity.least for quantity in known]) / self.scales
         self.high = np.array([quantity.most for quantity in known]) / self.scales
         n = len(twin.columns.x)
-        known_start = (
-            twin.columns.state
-            or twin.dynamics is not None
-            or (closed and twin.score_from > twin.start)
-        )
-        # a controller reads the first positions as they were measured
-        if known_start:
+        self.free = np.arange(2 * n)
+        if closed:  # the controller has read the first positions as they were measured
+            self.free = self.free[n:]
+        forgotten = closed and twin.score_from > twin.start
+        if twin.columns.state or twin.dynamics is not None or forgotten:
             self.free = np.zeros(0, int)
-        else:
-            self.free = np.arange(2 * n)[n if closed else 0 :]
         self.evaluations = 0
-        self.steps: dict[
-            str, Any
-        ] = {}  # integrator and step of replays; none for the scenario's own
+        # integrator and step of replays; none for the scenario's own
+        self.steps: dict[str, Any] = {}
         self.corrections: list[Record] | None = None  # of each piece; None for none
         self.pieces = [piece for i in range(len(data)) for piece in self._pieces(i)]
 
@@ -185,10 +176,11 @@ class Replays:
 
     def values(self, point: Point) -> dict[str, float]:
         """Return the quantities at a point, cut to their ranges."""
-        cut = np.clip(
-            point.values * self.scales, [q.least for q in self.known], [q.most for q in self.known]
-        )
-        return dict(zip(self.names, cut.tolist(), strict=True))
+        found = {}
+        scaled = (point.values * self.scales).tolist()
+        for name, value, known in zip(self.names, scaled, self.known, strict=True):
+            found[name] = min(max(value, known.least), known.most)
+        return found
 
     def rig(self, point: Point) -> Rig:
         """Return the rig at a point."""
@@ -222,26 +214,29 @@ class Replays:
             list(map(self.relative, self.pieces, by_piece)) for by_piece in self.predicted(points)
         ]
 
+    def costs(self, points: Sequence[Point]) -> np.ndarray:
+        """Return the sum of squares of each piece at each point, (points, pieces)."""
+        found = []
+        for by_piece in self.residuals(points):
+            found.append([cost([rows]) for rows in by_piece])
+        return np.array(found)
+
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
         """Return the predicted columns of each piece at each point."""
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            predictions = [
-                [predicted for predicted, _, _ in rig.predictions(self.data)] for rig in rigs
-            ]
+            predictions = []
+            for rig in rigs:
+                predictions.append([columns for columns, _, _ in rig.predictions(self.data)])
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
-        if not self.corrections:
-            return predictions
-        return [
-            [
-                {name: values + added[name] for name, values in columns.items()}
-                for columns, added in zip(by_piece, self.corrections, strict=True)
-            ]
-            for by_piece in predictions
-        ]
+        for by_piece in predictions:
+            for columns, added in zip(by_piece, self.corrections or (), strict=False):
+                for name in columns:
+                    columns[name] = columns[name] + added[name]
+        return predictions
 
     def correct(self, point: Point, halvings: int) -> bool:
         """Correct later replays by what `halvings` of MAX_STEP change at a point; return whether
@@ -253,13 +248,14 @@ class Replays:
         if not (plain := rig.repeated(self._part(0))).realistic:
             return False
         self.steps = _steps(plain, 0)
-        plain_steps, coarse, fine = (
-            self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings)
-        )
-        self.corrections = [
-            {name: 2.0 * b[name] - a[name] - values for name, values in columns.items()}
-            for columns, a, b in zip(plain_steps, coarse, fine, strict=True)
-        ]
+        found = []
+        for k in (0, halvings - 1, halvings):
+            found.append(self._replayed([rig], [point], _steps(plain, k))[0])
+        self.corrections = []
+        for plain_steps, coarse, fine in zip(*found, strict=True):
+            self.corrections.append(
+                {name: 2.0 * fine[name] - coarse[name] - plain_steps[name] for name in fine}
+            )
         return True
 
     @property
@@ -282,63 +278,65 @@ class Replays:
         """Return what `predicted` returns, without corrections; `fields` replace those of the
         replays' scenarios.
         """
+        scenarios = []
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)
-            scenarios = [
-                rig.repeated(self._part(k), state=self.state(point, k), **fields)
-                for rig, point in zip(rigs, points, strict=True)
-                for k in range(len(self.pieces))
-            ]
+            for rig, point in zip(rigs, points, strict=True):
+                for k in range(len(self.pieces)):
+                    state = self.state(point, k)
+                    scenarios.append(rig.repeated(self._part(k), state=state, **fields))
             traces = iter(run(scenarios))
-        return [
-            [
-                {name: values[piece.skipped :] for name, values in rig.predicted(trace).items()}
-                for piece, trace in zip(self.pieces, traces, strict=False)
-            ]
-            for rig in rigs
-        ]
+        return [self.by_piece(rig, traces) for rig in rigs]
+
+    def by_piece(self, rig: Rig, traces: Iterator[Trace]) -> list[Record]:
+        """Return the columns of each piece that are compared, from the next replays of a rig."""
+        found = []
+        for piece, trace in zip(self.pieces, traces, strict=False):
+            columns = rig.predicted(trace)
+            for name in columns:
+                columns[name] = columns[name][piece.skipped :]
+            found.append(columns)
+        return found
 
     def relative(self, piece: Piece, predicted: Record) -> np.ndarray:
         """Return the residuals of a piece, sample by sample with all columns, (N,), divided by the
         columns' spread.
         """
-        rows = np.column_stack(
-            [(piece.measured[name] - predicted[name]) / piece.spread[name] for name in predicted]
-        )
-        return np.clip(
-            np.nan_to_num(rows, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST
-        ).ravel()
+        columns = []
+        for name, values in predicted.items():
+            columns.append((piece.measured[name] - values) / piece.spread[name])
+        rows = np.nan_to_num(np.column_stack(columns), nan=WORST, posinf=WORST, neginf=-WORST)
+        return np.clip(rows, -WORST, WORST).ravel()
 
     def slopes(self, point: Point) -> Slopes:
         """Return residuals and their derivatives at a point, by central differences that stay
         within the ranges.
         """
         p = len(self.names)
-        s = len(self.free)
         moved = []
         for sign in (1.0, -1.0):
+            step = sign * DIFFERENCE_STEP
             for e in np.eye(p):
-                values = np.clip(point.values + sign * DIFFERENCE_STEP * e, self.low, self.high)
+                values = np.clip(point.values + step * e, self.low, self.high)
                 moved.append(Point(values, point.states))
-            for e in np.eye(s):
-                moved.append(Point(point.values, point.states + sign * DIFFERENCE_STEP * e))
+            for e in np.eye(len(self.free)):
+                moved.append(Point(point.values, point.states + step * e))
         residuals, *rows = self.residuals([point, *moved])
-        ahead = rows[: p + s]
-        back = rows[p + s :]
-        gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [
-            2.0 * DIFFERENCE_STEP
-        ] * s
-        columns = []
+        count = len(moved) // 2
+        gaps = np.full(count, 2.0 * DIFFERENCE_STEP)
+        for j in range(p):
+            gaps[j] = moved[j].values[j] - moved[count + j].values[j]
+        by_values = []
+        by_states = []
         for k in range(len(self.pieces)):
-            columns.append(
-                np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
-            )
-        by_values, by_states = (
-            [of_piece[:, part] for of_piece in columns] for part in (slice(p), slice(p, None))
-        )
-        return Slopes(
-            point, residuals, by_values, by_states, len(self.pieces[0].measured), len(self.data)
-        )
+            columns = []
+            for ahead, back, gap in zip(rows[:count], rows[count:], gaps, strict=True):
+                columns.append((ahead[k] - back[k]) / gap)
+            every = np.column_stack(columns)
+            by_values.append(every[:, :p])
+            by_states.append(every[:, p:])
+        columns = len(self.pieces[0].measured)
+        return Slopes(point, residuals, by_values, by_states, columns, len(self.data))
 
     def _pieces(self, i: int) -> list[Piece]:
         """Return the pieces of record i."""
@@ -349,36 +347,31 @@ class Replays:
             spread = {name: _norm(values) for name, values in measured.items()}
             return [Piece(i, None, 0, measured, spread, np.zeros(0))]
         period = twin.step(data)
-        t = data[twin.columns.time]
         first = round(twin.start / period)
-        last = len(t) - 1
-        shortest = max(twin.window, (records.MIN_SAMPLES + 1) * period)
-        if self.whole:
-            count = 1
-        else:
+        last = len(data[twin.columns.time]) - 1
+        count = 1
+        if not self.whole:
+            shortest = max(twin.window, (records.MIN_SAMPLES + 1) * period)
             count = max(1, int((last - first) * period / shortest + 0.01))
         ends = np.linspace(first, last, count + 1).round().astype(int)
-        names = [*twin.columns.x, *([twin.columns.u] if self.closed else [])]
-        rates = [records.rate(data[name], period) for name in twin.columns.x]
-        varied = np.array(
-            [column.std() or 1.0 for column in (*(data[name] for name in twin.columns.x), *rates)]
-        )
+        x = [data[name] for name in twin.columns.x]
+        rates = [records.rate(column, period) for column in x]
+        varied = np.array([column.std() or 1.0 for column in (*x, *rates)])
+        names = [*twin.columns.x]
+        skipped = 0
+        if self.closed:
+            names.append(twin.columns.u)
+            skipped = round((twin.score_from - twin.start) / period)
+        spread = {name: _norm(data[name]) for name in names}
         pieces = []
         for first, last in itertools.pairwise(ends):
-            if count == 1:
-                duration = None
-            else:
+            duration = None
+            if count > 1:
                 duration = float(period * (last - first))
             part = twin.part(self.data[i], float(period * first), duration, self.closed)
-            if self.closed:
-                skipped = round((twin.score_from - twin.start) / period)
-            else:
-                skipped = 0
             measured = {name: data[name][first + skipped : last + 1] for name in names}
-            spread = {name: _norm(data[name]) for name in names}
-            pieces.append(
-                Piece(i, part, skipped, measured, spread, STATE_SCALE * varied[self.free])
-            )
+            scales = STATE_SCALE * varied[self.free]
+            pieces.append(Piece(i, part, skipped, measured, spread, scales))
         return pieces
 
 
@@ -406,6 +399,6 @@ def _scale(quantity: Quantity) -> float:
     without a range.
     """
     span = quantity.most - quantity.least
-    return max(
-        abs(quantity.value), 0.01 * span if np.isfinite(span) else 1e-3 * (quantity.value == 0.0)
-    )
+    if np.isfinite(span):
+        return max(abs(quantity.value), 0.01 * span)
+    return abs(quantity.value) or 1e-3

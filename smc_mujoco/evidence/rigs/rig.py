@@ -23,7 +23,6 @@ from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs import inverse, records
-from smc_mujoco.evidence.rigs.predictions import Prediction
 from smc_mujoco.evidence.rigs.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
@@ -33,12 +32,8 @@ from smc_mujoco.simulation.trace import Trace
 
 Values = SimpleNamespace  # quantities by name
 Source = Mapping[str, Any] | Trace  # a record as columns by name, or as a simulated run
-# percent: if radians improve a fit by this, and beyond this, its angles are in degrees; chosen
-RADIANS_GAIN = 50.0
 FAILED_FIT = -1e3  # percent: fit of a replay that fails in an open loop
-FALL_RANGES = (
-    2.0  # ranges of a measured joint, beyond which the twin of a closed loop has fallen; chosen
-)
+FALL_RANGES = 2.0  # ranges of a joint beyond which the twin of a closed loop has fallen; chosen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,9 +52,7 @@ class Fall(float):
     8.4 s".
     """
 
-    # s of the record, when a joint is first further from the measured one than that joint's whole
-    # range
-    time: float
+    time: float  # s of the record, when a joint is first off by more than its measured range
 
     def __new__(cls, time: float) -> "Fall":
         made = super().__new__(cls, -np.inf)
@@ -117,8 +110,6 @@ class Rig:
       ensemble: other parameter sets that fit about as well, each by name.
       laws: laws with gains for this machine, which a ranking compares by default.
       x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
-      prediction: figures that are predicted where records cannot be replayed, see
-        `evidence.rigs.predictions`.
       about: licence and history of the data, and what the twin predicts well or badly.
     """
 
@@ -140,7 +131,6 @@ class Rig:
     ensemble: tuple[Mapping[str, float], ...] = ()
     laws: tuple[Law, ...] = ()
     x0: tuple[float, ...] | None = None
-    prediction: Prediction | None = None
     about: str = ""
 
     def __post_init__(self) -> None:
@@ -156,7 +146,7 @@ class Rig:
         return {name: quantity.value for name, quantity in self.quantities.items()}
 
     def with_values(self, values: Mapping[str, float], source: str = "given") -> "Rig":
-        """Return the rig with other values of some quantities, SI units, that come from a source."""
+        """Return the rig with other values of some quantities, SI units, from a source."""
         changed = dict(self.quantities)
         for name, value in values.items():
             known = find(f"quantity of {self.name}", name, changed)
@@ -174,11 +164,10 @@ class Rig:
         """Return name -> the rig with one of its parameter sets: "set 1" for its own, then those of
         the ensemble.
         """
-        sets = {
-            f"set {i + 2}": self.with_values(values, "ensemble")
-            for i, values in enumerate(self.ensemble)
-        }
-        return {"set 1": self} | sets
+        sets = {"set 1": self}
+        for i, values in enumerate(self.ensemble, 2):
+            sets[f"set {i}"] = self.with_values(values, "ensemble")
+        return sets
 
     def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
         """Return a Scenario of the machine under a law, by default the rig's own controller.
@@ -227,9 +216,10 @@ class Rig:
                 f"records of {self.name} are not replayed, as their torques are predicted: use fit"
             )
         data = self.checked(record)
+        names = self.columns
         period = self.step(data)
-        first = round((self.start if start is None else number("start", start, low=0.0)) / period)
-        last = len(data[self.columns.time]) - 1
+        first = self._first(start, period)
+        last = len(data[names.time]) - 1
         if duration is not None:
             shortest = round(records.MIN_SAMPLES * period, 9)
             last = min(last, first + round(number("duration", duration, low=shortest) / period))
@@ -240,34 +230,38 @@ class Rig:
         def signal(values: np.ndarray) -> TimeSeries:
             return TimeSeries(times, values[: len(times)].tolist())
 
-        law = self.controller if closed else None
-        fields: dict[str, Any] = {"law": law or "none", "duration": times[-1]}
-        if law is None:
-            fields |= {
-                "feedforward": signal(data[self.columns.u][first:]),
-                "control_period": period,
-            }
+        fields: dict[str, Any] = {"duration": times[-1]}
+        if self.controller is not None and closed:
+            if self.commands is not None:
+                fed = self.commands(data, first)
+            else:
+                fed = data.get(names.feedforward, np.zeros(last + 1))[first:]
+            reference = signal(data[names.reference][first:])
+            fields |= {"law": self.controller, "reference": reference, "feedforward": signal(fed)}
         else:
-            added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
-            fields["reference"] = signal(data[self.columns.reference][first:])
-            fields["feedforward"] = signal(
-                added if self.commands is None else self.commands(data, first)
-            )
-        largest = float(np.abs(data[self.columns.u][first : last + 1]).max())
-        state = np.concatenate(records.state(data, self.columns, period, first))
+            command = signal(data[names.u][first:])
+            fields |= {"law": "none", "feedforward": command, "control_period": period}
+        zero = {}
         if self.zero:
             zero = self.zero(Values(**self.values), data)
-        else:
-            zero = {}
-        return Part(fields=fields, state=state, largest_u=largest, zero=zero)
+        return Part(
+            fields=fields,
+            state=np.concatenate(records.state(data, names, period, first)),
+            largest_u=float(np.abs(data[names.u][first : last + 1]).max()),
+            zero=zero,
+        )
+
+    def _first(self, start: float | None, period: float) -> int:
+        """Return the sample at which a replay starts."""
+        return round((self.start if start is None else number("start", start, low=0.0)) / period)
 
     def _too_short(self, data: Record, what: str, samples: int) -> ScenarioError:
         """Return the error for a record of fewer samples than it takes to repeat or to score it."""
         period = self.step(data)
-        count = len(data[self.columns.time])
+        lasts = len(data[self.columns.time]) * period
         return ScenarioError(
-            f"the record of {self.name} lasts {count * period:.3g} s, too short to {what} it: give at least "
-            f"{samples * period:.3g} s"
+            f"the record of {self.name} lasts {lasts:.3g} s, too short to {what} it: "
+            f"give at least {samples * period:.3g} s"
         )
 
     def repeated(
@@ -280,21 +274,19 @@ class Rig:
         """
         fields = self.machine(Values(**self.values | dict(part.zero)))
         sensor = fields.get("sensor")
-        if sensor is not None and not rounded:
-            fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)
         x, v = np.split(part.state if state is None else state, 2)
-        if sensor and not self.columns.state:
-            bias = sensor.bias
-        else:
-            bias = 0.0
+        if sensor is not None:
+            if not rounded:
+                fields["sensor"] = dataclasses.replace(sensor, counts=np.inf)
+            if not self.columns.state:
+                x = x - sensor.bias
         if self.controller is None:
             fields.pop("physics_step", None)
-            if (
-                fields.get("actuator") is None and fields.get("u_max") is None
-            ):  # the machine has had this command
+            if fields.get("actuator") is None and fields.get("u_max") is None:
+                # the machine has had this command
                 fields["u_max"] = max(part.largest_u, default_u_max(fields["plant"]))
         return Scenario.recorded(
-            **fields | dict(part.fields) | {"x0": tuple(x - bias), "v0": tuple(v)} | changes
+            **fields | dict(part.fields) | {"x0": tuple(x), "v0": tuple(v)} | changes
         )
 
     def measured(
@@ -308,26 +300,22 @@ class Rig:
         """
         scenario = self.replay(record, start, duration)
         data = self.checked(record)
+        names = self.columns
         period = scenario.control_period
-        n = scenario.plant.n
-        first = round((self.start if start is None else start) / period)
-        count = scenario.samples
-        part = slice(first, first + count + 1)
-        if scenario.sensor:
-            bias = scenario.sensor.bias
-        else:
-            bias = 0.0
-        x, v, u, r = np.zeros((4, count + 1, n))
-        for i, name in enumerate(self.columns.x):
-            x[:, i] = data[name][part] - bias
+        count = scenario.samples + 1
+        first = self._first(start, period)
+        part = slice(first, first + count)
+        x, v, u, r, nothing = np.zeros((5, count, scenario.plant.n))
+        for i, name in enumerate(names.x):
+            x[:, i] = data[name][part]
             v[:, i] = records.rate(data[name], period)[part]
-        u[:, 0] = data[self.columns.u][part]
-        if self.columns.reference in data:
-            r[:, 0] = data[self.columns.reference][part]
-        zero: dict[str, Any] = {
-            name: np.zeros((count + 1, n)) for name in ("s", "d", "force", "reaction")
-        }
-        t = period * np.arange(count + 1)
+        if scenario.sensor:
+            x -= scenario.sensor.bias
+        u[:, 0] = data[names.u][part]
+        if names.reference in data:
+            r[:, 0] = data[names.reference][part]
+        zero: dict[str, Any] = dict.fromkeys(("s", "d", "force", "reaction"), nothing)
+        t = period * np.arange(count)
         return Trace(t=t, x=x, v=v, u=u, applied=u.copy(), r=r, **zero, scenario=scenario)
 
     @property
@@ -371,22 +359,20 @@ class Rig:
         traces = [record for record in many if isinstance(record, Trace)]
         if not traces:
             return self, [record for record in many if not isinstance(record, Trace)]
-        if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
+        law = traces[0].scenario.law
+        if len(traces) < len(many) or any(trace.scenario.law != law for trace in traces):
             raise ScenarioError(
                 "records are traces of one law, or columns: give one kind at a time"
             )
         plant = self.machine(Values(**self.values))["plant"].name
-        if other := next(
-            (trace.scenario.plant.name for trace in traces if trace.scenario.plant.name != plant),
-            None,
-        ):
-            raise ScenarioError(
-                f"the trace is one of {other} and the plant of {self.name} is {plant}: give one of its own"
-            )
-        law = traces[0].scenario.law
-        state = tuple(
-            f"{kind} of {name}" for kind in ("position", "velocity") for name in self.columns.x
-        )
+        for trace in traces:
+            if trace.scenario.plant.name != plant:
+                raise ScenarioError(
+                    f"the trace is one of {trace.scenario.plant.name} and the plant of {self.name} "
+                    f"is {plant}: give one of its own"
+                )
+        positions = tuple(f"position of {name}" for name in self.columns.x)
+        rates = tuple(f"velocity of {name}" for name in self.columns.x)
         rig = dataclasses.replace(
             self,
             controller=None if law.name == "none" else law,
@@ -394,7 +380,7 @@ class Rig:
             dynamics=None,
             start=0.0,
             score_from=0.0,
-            columns=dataclasses.replace(self.columns, state=state, torque=()),
+            columns=dataclasses.replace(self.columns, state=positions + rates, torque=()),
         )
         return rig, [records.of_trace(trace, rig.columns) for trace in traces]
 
@@ -413,49 +399,11 @@ class Rig:
           predicted, for each torque. If the twin falls where the machine stands, each is a `Fall`.
 
         Raises:
-          ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a
-            record too short, or angles in degrees.
+          ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, or a
+            record too short.
         """
         rig, data = self.reading([record])
-        fit = rig.fits(data)[0]
-        rig.refuse_degrees(data[0], fit)
-        return fit
-
-    def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
-        """Raise ScenarioError if a record has degrees in place of radians.
-
-        It has degrees if it fits far better with all its angles, those of a joint, or the
-        references taken as degrees. A record that fits well as it is, by `fit`, is not simulated
-        again.
-        """
-        if (
-            min(fit.values()) >= 100.0 - RADIANS_GAIN
-            or "rad" not in self.scenario("none").plant.units
-        ):
-            return
-        joints = self.columns.x
-        references = self.columns.references
-        pairs = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
-        sets = (
-            (*joints, *references),
-            *((name,) for name in (*joints, *references)),
-            *pairs,
-            references,
-        )
-        there = [tuple(name for name in names if name in record) for names in sets]
-        suspects = [names for names in dict.fromkeys(there) if names]
-        others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
-        best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
-        if min(others[best].values()) > max(RADIANS_GAIN, min(fit.values()) + RADIANS_GAIN):
-            if best == 0:
-                which = "angles"
-            else:
-                which = f"values of {' and '.join(suspects[best])}"
-            raise ScenarioError(
-                f"the {which} of the record of {self.name} look like degrees, as it fits by "
-                f"{records.percent(others[best])} with them in radians and by {records.percent(fit)} as they are: "
-                "give radians"
-            )
+        return rig.fits(data)[0]
 
     def fits(
         self,
@@ -463,21 +411,18 @@ class Rig:
         states: Sequence[np.ndarray | None] | None = None,
         **changes: Any,
     ) -> list[dict[str, float]]:
-        """Return `fit` of several records, simulated in one batch, without the check for degrees;
-        see `predictions`.
-        """
-        predictions = self.predictions(many, states, **changes)
-        fits = [percentages(*prediction[:2]) for prediction in predictions]
-        if self.controller is not None:
-            for fit, (predicted, measured, t) in zip(fits, predictions, strict=True):
-                if (
-                    fall := fallen({name: predicted[name] for name in self.columns.x}, measured, t)
-                ) is not None:
-                    fit.update(dict.fromkeys(fit, fall))
-        return [
-            {"u" if name == self.columns.u else name: value for name, value in fit.items()}
-            for fit in fits
-        ]
+        """Return `fit` of several records, simulated in one batch; see `predictions`."""
+        fits = []
+        for predicted, measured, t in self.predictions(many, states, **changes):
+            fit = percentages(predicted, measured)
+            if self.columns.u in fit:
+                fit["u"] = fit.pop(self.columns.u)
+            if self.controller is not None:
+                joints = {name: predicted[name] for name in self.columns.x}
+                if fall := fallen(joints, measured, t):
+                    fit = dict.fromkeys(fit, fall)
+            fits.append(fit)
+        return fits
 
     def predictions(
         self,
@@ -491,79 +436,41 @@ class Rig:
         `states`: at the start of each, (2n,), in place of the measured ones. `changes`: fields of
         the replays that differ, such as their physics step.
         """
-        data = [self.checked(record) for record in many]
         names = self.columns
+        data = [self.checked(record) for record in many]
+        found = []
         if self.dynamics is not None:
             plant = self.dynamics(Values(**self.values))
-            return [
-                (
-                    inverse.torques(plant, one, names),
-                    inverse.measured(one, names),
-                    inverse.times(one, names),
-                )
-                for one in data
-            ]
-        pairs = zip(many, states or [None] * len(many), strict=True)
-        traces = run(
-            [self.repeated(self.part(record), state=state, **changes) for record, state in pairs]
-        )
-        replayed = []
-        for columns, trace in zip(data, traces, strict=True):
+            for columns in data:
+                measured = inverse.measured(columns, names)
+                torques = inverse.torques(plant, columns, names)
+                found.append((torques, measured, inverse.times(columns, names)))
+            return found
+        scenarios = []
+        for record, state in zip(many, states or [None] * len(many), strict=True):
+            scenarios.append(self.repeated(self.part(record), state=state, **changes))
+        for columns, trace in zip(data, run(scenarios), strict=True):
             period = trace.scenario.control_period
             first = round(self.score_from / period)
             after = round((self.score_from - self.start) / period)
             if len(trace.t) < after + records.MIN_SAMPLES:
                 raise self._too_short(columns, "score", first + records.MIN_SAMPLES)
-            predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
-            parts = {
-                name: columns[name][first : first + len(values)]
-                for name, values in predicted.items()
-            }
-            replayed.append(
-                (predicted, parts, columns[names.time][first : first + len(trace.t) - after])
-            )
-        return replayed
-
-    def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
-        """Return the fit of a machine that does nothing, as a baseline for twins.
-
-        Names and unit are those of `fit`.
-
-        In a closed loop its joints are where their references are, and u is the feedforward. In an
-        open loop it stays where the record is at `score_from`. If torques are predicted, they are
-        0.
-        """
-        data = self.checked(record)
-        columns = self.columns
-        if self.dynamics is not None:
-            measured = inverse.measured(data, columns)
-            return percentages(
-                {name: np.zeros_like(values) for name, values in measured.items()}, measured
-            )
-        first = round(self.score_from / self.step(data))
-        measured = {name: data[name][first:] for name in columns.x}
-        if self.period is None:
-            return percentages(
-                {name: np.full_like(values, values[0]) for name, values in measured.items()},
-                measured,
-            )
-        references = dict(zip(columns.x, columns.references, strict=False))
-        zero = np.zeros(len(data[columns.time]))
-        predicted = {name: data.get(references.get(name, ""), zero)[first:] for name in columns.x}
-        predicted["u"], measured["u"] = (
-            data.get(columns.feedforward, zero)[first:],
-            data[columns.u][first:],
-        )
-        return percentages(predicted, measured)
+            scored = slice(first, first + len(trace.t) - after)
+            predicted = self.predicted(trace)
+            for name, values in predicted.items():
+                predicted[name] = values[after:]
+            measured = {name: columns[name][scored] for name in predicted}
+            found.append((predicted, measured, columns[names.time][scored]))
+        return found
 
     def predicted(self, trace: Trace) -> Record:
         """Return the columns of a record that a replay gives, (K,) each, without the columns'
         offset.
         """
         by_column = records.positions(trace, self.columns)
-        return by_column | (
-            {} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]}
-        )
+        if trace.scenario.law.name != "none":
+            by_column[self.columns.u] = trace.u[:, 0]
+        return by_column
 
 
 def percentages(predicted: Record, measured: Record) -> dict[str, float]:
@@ -573,10 +480,7 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
         y = measured[name]
         with np.errstate(all="ignore"):
             share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
-        if np.isfinite(share):
-            percent[name] = 100.0 * (1.0 - share)
-        else:
-            percent[name] = FAILED_FIT
+        percent[name] = 100.0 * (1.0 - share) if np.isfinite(share) else FAILED_FIT
     return percent
 
 

@@ -11,6 +11,7 @@ by more than a factor of ten.
 """
 
 import dataclasses
+import itertools
 
 import numpy as np
 
@@ -21,19 +22,11 @@ from smc_mujoco.evidence.rigs.uncertainty import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
-DAMPINGS = (
-    0.0,
-    1e-2,
-    1.0,
-    1e3,
-)  # of the steps that are tried at once, relative to the curvature; chosen
-SHARES = (
-    0.3,
-    1.0,
-)  # shares of its linear move by which a piece's starting state is moved in trials; chosen
-MAX_STATE = (
-    100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
-)
+DAMPINGS = 0.0, 1e-2, 1.0, 1e3  # of steps that are tried at once, relative to the curvature; chosen
+# of its linear move by which a piece's starting state is moved in trials; chosen
+SHARES = 0.3, 1.0
+# scales of a state at the start, by which it may differ from the measured one; chosen
+MAX_STATE = 100.0
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 COST_TOLERANCE = 1e-5  # relative change of the cost at which the search ends; chosen
@@ -70,29 +63,25 @@ def _by_torques(replays: Replays) -> Point | None:
 
     twin = replays.twin
     start = replays.start
+    joints = twin.columns.x
+    columns = dataclasses.replace(twin.columns, torque=tuple(f"torque of {x}" for x in joints))
     data = [twin.checked(record) for record in replays.data]
     direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
-    columns = dataclasses.replace(
-        twin.columns, torque=tuple(f"torque of {name}" for name in twin.columns.x)
-    )
     if not direct or not all(inverse.long_enough(record, columns) for record in data):
         return None
+    measured = []
     for record in data:
         u = record[twin.columns.u]
-        record.update(zip(columns.torque, (u, *(0.0 * u for _ in columns.torque[1:])), strict=True))
-    measured = [inverse.measured(record, columns) for record in data]
+        record.update(dict.fromkeys(columns.torque, np.zeros_like(u)) | {columns.torque[0]: u})
+        measured.append(inverse.measured(record, columns))
 
     def differences(values: np.ndarray) -> np.ndarray:
-        fields = twin.machine(Values(**twin.values | replays.values(Point(values, start.states))))
-        pairs = zip(
-            (inverse.torques(fields["plant"], record, columns) for record in data),
-            measured,
-            strict=True,
-        )
+        quantities = twin.values | replays.values(Point(values, start.states))
+        plant = twin.machine(Values(**quantities))["plant"]
         gaps = []
-        for ours, theirs in pairs:
-            for name in columns.torque:
-                gaps.append(ours[name] - theirs[name])
+        for record, theirs in zip(data, measured, strict=True):
+            ours = inverse.torques(plant, record, columns)
+            gaps += [ours[name] - theirs[name] for name in columns.torque]
         return np.nan_to_num(np.concatenate(gaps))
 
     inside = np.clip(start.values, replays.low, replays.high)
@@ -112,14 +101,13 @@ def _random(replays: Replays, count: int, seed: int) -> list[Point]:
         drawn.append(
             Point(np.clip(signs * factors * magnitudes, replays.low, replays.high), start.states)
         )
-    costs = [cost(rows) for rows in replays.residuals(drawn)]
+    costs = replays.costs(drawn).sum(axis=1)
     return [drawn[i] for i in np.argsort(costs, kind="stable")[:count]]
 
 
 def better(replays: Replays, *points: Point) -> Point:
     """Return the point of least cost, the first one if several are equal."""
-    costs = [cost(rows) for rows in replays.residuals(points)]
-    return points[costs.index(min(costs))]
+    return points[replays.costs(points).sum(axis=1).argmin()]
 
 
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
@@ -177,16 +165,12 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     Each piece chooses the best move of its own states.
     """
     groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
-    trials = [point for group in groups for point in group]
-    size = len(groups[0])
-    costs = np.array([[cost([rows]) for rows in pieces] for pieces in replays.residuals(trials)])
+    costs = replays.costs(list(itertools.chain(*groups)))
     reached = []
-    for i, group in enumerate(groups):
-        of_length = costs[i * size : (i + 1) * size]
-        states = [group[variant].states[k] for k, variant in enumerate(of_length.argmin(axis=0))]
-        reached.append(
-            (Point(group[0].values, np.array(states)), float(of_length.min(axis=0).sum()))
-        )
+    for group, of_group in zip(groups, np.split(costs, len(groups)), strict=True):
+        states = [group[best].states[k] for k, best in enumerate(of_group.argmin(axis=0))]
+        total = float(of_group.min(axis=0).sum())
+        reached.append((Point(group[0].values, np.array(states)), total))
     return min(reached, key=lambda pair: pair[1])
 
 
@@ -200,9 +184,8 @@ def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Poin
     moves = slopes.moves(values - slopes.point.values)
     moved = []
     for share in SHARES:
-        moved.append(
-            Point(values, np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE))
-        )
+        states = np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE)
+        moved.append(Point(values, states))
     if len(replays.free):
         return [*moved, replays.at_rest(moved[-1])]
     return moved[-1:]

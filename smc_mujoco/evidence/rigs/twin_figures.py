@@ -2,7 +2,7 @@
 record.
 
     for one in rows("qube_servo"):
-        one.machine, one.twin, one.use            # of theta in record 11: 0.2638, 0.2628, "held out"
+        one.machine, one.twin, one.use        # of theta in record 11: 0.2638, 0.2628, "held out"
 
 A twin is a distribution over its parameter sets and seeds, so that each figure has a range. Whether
 a record was used is not written down with the figure but follows from the rig: one that was
@@ -28,8 +28,9 @@ from smc_mujoco.evidence.rigs.rig import catalogue
 
 FILE = Path(__file__).with_suffix(".json")
 ABOUT = (
-    "A figure of a signal is its rms about its mean. Range: over the twin's parameter sets, or 5 to 95 % of its runs. "
-    "Public: by published numbers. Held out: the twin was identified from other records. Unfitted: from none here."
+    "A figure of a signal is its rms about its mean. Range: over the twin's parameter sets, or 5 "
+    "to 95 % of its runs. Public: by published numbers. Held out: the twin was identified from "
+    "other records. Unfitted: from none here."
 )
 UNFITTED = "unfitted"
 FITTED = "fitted on"
@@ -86,11 +87,6 @@ class TwinFigure:
         """
         return abs(self.twin / self.machine - 1.0)
 
-    @property
-    def inside(self) -> bool:
-        """Whether the machine's figure is within the twin's range."""
-        return self.low <= self.machine <= self.high
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Order:
@@ -103,7 +99,7 @@ class Order:
     rig: str
     condition: str
     figure: str
-    laws: tuple[str, ...]
+    laws: Sequence[str]
     ordered: int
     sets: int
     tau: float
@@ -111,56 +107,22 @@ class Order:
 
 
 class Summary(NamedTuple):
-    """The figures of a machine's records with one use that are known, by the whole twin."""
+    """How far a machine's figures of records with one use are from those of its whole twin."""
 
     rig: str
     use: str
-    rows: Sequence[TwinFigure]
-
-    @property
-    def records(self) -> set[str]:
-        """Names of the records."""
-        return {row.record for row in self.rows}
-
-    @property
-    def median(self) -> float:
-        """The median of how far the twin is from the machine, a share."""
-        return float(np.median([row.apart for row in self.rows]))
-
-    @property
-    def largest(self) -> float:
-        """The largest of the same."""
-        return max(row.apart for row in self.rows)
-
-    @property
-    def inside(self) -> int:
-        """Number of the machine's figures that are within the twin's range."""
-        return sum(row.inside for row in self.rows)
-
-    @property
-    def published(self) -> float:
-        """How far published numbers are from the machine, the median, a share; NaN without any."""
-        known = []
-        for row in self.rows:
-            if not math.isnan(row.published):
-                known.append(abs(row.published / row.machine - 1.0))
-        return float(np.median(known)) if known else math.nan
+    count: int  # of figures that are known
+    median: float  # of how far the twin is from the machine, a share
+    largest: float
+    inside: int  # number of the machine's figures within the twin's range
+    published: float  # median of how far published numbers are, a share; NaN without any
 
     @property
     def cells(self) -> list[str]:
-        """The summary as the cells of a table: rig, use, rows, median, largest, within its range,
-        published.
-        """
-        median, largest, published = map(percent, (self.median, self.largest, self.published))
-        return [
-            self.rig,
-            self.use,
-            f"{len(self.rows)}",
-            median,
-            largest,
-            f"{self.inside}",
-            published,
-        ]
+        """The cells of a table."""
+        shares = map(percent, (self.median, self.largest, self.published))
+        median, largest, published = shares
+        return [self.rig, self.use, str(self.count), median, largest, str(self.inside), published]
 
 
 def percent(share: float) -> str:
@@ -172,18 +134,44 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f}"
 
 
+def known(rows: Sequence[TwinFigure]) -> list[TwinFigure]:
+    """Return the figures of whole twins, without those that are kept aside."""
+    return [row for row in rows if not row.variant and not math.isnan(row.machine)]
+
+
 def summaries(rows: Sequence[TwinFigure]) -> list[Summary]:
-    """Return the figures of whole twins by machine and use, without those that are kept aside."""
+    """Return the known figures by machine and use."""
     groups: dict[tuple[str, str], list[TwinFigure]] = {}
-    for row in rows:
-        if not row.variant and not math.isnan(row.machine):
-            groups.setdefault((row.rig, row.use), []).append(row)
-    return [Summary(rig, use, its) for (rig, use), its in groups.items()]
+    for row in known(rows):
+        groups.setdefault((row.rig, row.use), []).append(row)
+    found = []
+    for (rig, use), group in groups.items():
+        apart = [row.apart for row in group]
+        published = np.array([abs(row.published / row.machine - 1.0) for row in group])
+        published = published[~np.isnan(published)]
+        found.append(
+            Summary(
+                rig=rig,
+                use=use,
+                count=len(group),
+                median=float(np.median(apart)),
+                largest=max(apart),
+                inside=sum(row.low <= row.machine <= row.high for row in group),
+                published=float(np.median(published)) if len(published) else math.nan,
+            )
+        )
+    return found
 
 
 @functools.cache
-def _stored() -> dict[str, Any]:
-    return read_json(FILE)
+def _stored() -> tuple[list[TwinFigure], list[Order]]:
+    """Return the rows of the file; None stands for NaN, and "falls" for inf."""
+    meaning: dict[Any, float] = {None: math.nan, "falls": math.inf}
+    data = read_json(FILE)
+    figures = []
+    for row in data["figures"]:
+        figures.append(TwinFigure(**{name: meaning.get(row[name], row[name]) for name in row}))
+    return figures, [Order(**row) for row in data["orders"]]
 
 
 def rows(rig: str = "") -> list[TwinFigure]:
@@ -192,44 +180,11 @@ def rows(rig: str = "") -> list[TwinFigure]:
     Raises:
       ScenarioError: an unknown rig.
     """
-    every = [TwinFigure(**_numbers(row)) for row in _stored()["figures"]]
-    if not rig:
-        return every
-    return [row for row in every if row.rig == find("rig", rig, catalogue()).name]
+    name = rig and find("rig", rig, catalogue()).name
+    return [row for row in _stored()[0] if name in ("", row.rig)]
 
 
 def orders(rig: str = "") -> list[Order]:
-    """Return the orders of laws on the machines that ran several, of a rig, or of all; raises as
-    `rows`.
-    """
-    every = [Order(**row | {"laws": tuple(row["laws"])}) for row in _stored()["orders"]]
-    if not rig:
-        return every
-    return [row for row in every if row.rig == find("rig", rig, catalogue()).name]
-
-
-def described(row: TwinFigure | Order) -> dict[str, Any]:
-    """Return a row as JSON data, without fields that have their default; None stands for NaN, and
-    "falls" for inf.
-    """
-    fields = {f.name: (getattr(row, f.name), f.default) for f in dataclasses.fields(row)}
-    told = {}
-    for name, (value, default) in fields.items():
-        if value is not default and value != default:
-            told[name] = value
-    return {name: _as_data(value) for name, value in told.items()}
-
-
-def _as_data(value: Any) -> Any:
-    if isinstance(value, float):
-        if math.isnan(value):
-            return None
-        if math.isinf(value):
-            return "falls"
-        return float(f"{value:.4g}")
-    return value
-
-
-def _numbers(row: dict[str, Any]) -> dict[str, Any]:
-    meaning: dict[Any, float] = {None: math.nan, "falls": math.inf}
-    return {name: meaning.get(value, value) for name, value in row.items()}
+    """Return the orders of laws on the machines that ran several, as `rows`."""
+    name = rig and find("rig", rig, catalogue()).name
+    return [row for row in _stored()[1] if name in ("", row.rig)]

@@ -14,7 +14,6 @@ own noise and rounding, and a standard error is at least the deviation that thes
 """
 
 import dataclasses
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -31,9 +30,8 @@ REPEATS = 24  # simulated repetitions of the records of a closed loop, for stand
 BLOCKS = (60, 400)
 CORRELATION_TIMES = 10.0
 MIN_POWER = 1e-300  # in place of the power 0 of residuals that are all 0
-SINGULAR_RATIO = (
-    1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
-)
+# ratio of the slopes' singular values below which quantities cannot be told apart; chosen
+SINGULAR_RATIO = 1e-6
 
 
 def statistics(
@@ -54,7 +52,11 @@ def statistics(
             )
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < SINGULAR_RATIO * singular[0]:
-        raise _alike(replays.twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
+        one, other = np.argsort(-np.abs(rows[-1]))[:2]
+        raise ScenarioError(
+            f"the records of {replays.twin.name} cannot tell {names[one]} and {names[other]} apart: "
+            "leave one out, or give a longer record or one of a richer motion"
+        )
     covariance = jackknife(slopes)
     deviation = np.sqrt(np.diag(covariance))
     count = independent(slopes)
@@ -65,31 +67,7 @@ def statistics(
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
     deviation = np.hypot(deviation, by_steps)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
-    _refuse_alike(replays.twin.name, replays.values(slopes.point), errors, correlations)
     return errors, correlations, count
-
-
-def _refuse_alike(
-    rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray
-) -> None:
-    """Raise ScenarioError for two quantities of which only a sum is known: neither is above its
-    standard error.
-    """
-    names = list(values)
-    unknown = np.array([errors[name] > abs(value) for name, value in values.items()])
-    pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
-    i, j = np.unravel_index(int(pairs.argmax()), pairs.shape)
-    if pairs[i, j] > MAX_CORRELATION:
-        two = names[i], names[j]
-        raise _alike(rig, (f"{name} ({values[name]:.3g} ± {errors[name]:.2g})" for name in two))
-
-
-def _alike(rig: str, quantities: Iterable[str]) -> ScenarioError:
-    """Return the error that the records of a rig cannot tell some quantities apart."""
-    return ScenarioError(
-        f"the records of {rig} cannot tell {' and '.join(quantities)} apart: leave one out, or give a longer record or "
-        "one of a richer motion, or look at its units and columns"
-    )
 
 
 def jackknife(slopes: Slopes) -> np.ndarray:
@@ -99,7 +77,8 @@ def jackknife(slopes: Slopes) -> np.ndarray:
     pieces = list(zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True))
     parts = -(-_blocks(slopes) // len(pieces))
     normal = [_normal(*piece) for piece in pieces]
-    A, g = (np.sum([sums[i] for sums in normal], axis=0) for i in range(2))
+    A = sum(piece_A for piece_A, _ in normal)
+    g = sum(piece_g for _, piece_g in normal)
     moves = []
     for (r, J, S), (piece_A, piece_g) in zip(pieces, normal, strict=True):
         block = np.arange(len(r)) * parts // len(r)
@@ -137,9 +116,8 @@ def independent(slopes: Slopes) -> float:
         power = np.abs(np.fft.rfft(rows, 2 * len(rows), axis=0)) ** 2
         for correlation in np.fft.irfft(power, axis=0)[: len(rows)].T:
             end = int(np.argmax(correlation < 0.0)) or len(correlation)
-            times.append(
-                1.0 + 2.0 * float(correlation[1:end].sum() / max(correlation[0], MIN_POWER))
-            )
+            later = correlation[1:end].sum() / max(correlation[0], MIN_POWER)
+            times.append(1.0 + 2.0 * float(later))
     return sum(map(len, slopes.residuals)) / slopes.columns / float(np.median(times))
 
 
@@ -159,33 +137,23 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
     rounding, at first order.
     """
     rig = replays.rig(point)
-    pieces = replays.pieces
-    known = [
-        (piece.part, replays.state(point, k))
-        for k, piece in enumerate(pieces)
-        if piece.part is not None
-    ]
-    calm = [rig.repeated(part, state=state) for part, state in known]
-    noise = []
-    for piece in pieces:
-        noise.append(records.noise(rig.checked(replays.data[piece.record]), rig.columns))
-    noisy = [
-        dataclasses.replace(
-            rig.repeated(part, rounded=True, state=state), noise=Noise(noise[k]), seed=repeat
-        )
-        for repeat in range(REPEATS)
-        for k, (part, state) in enumerate(known)
-    ]
-    predicted = []
-    for k, trace in enumerate(run(calm + noisy)):
-        predicted.append(
-            {
-                name: values[pieces[k % len(pieces)].skipped :]
-                for name, values in rig.predicted(trace).items()
-            }
-        )
-    rows = [replays.relative(pieces[k % len(pieces)], values) for k, values in enumerate(predicted)]
-    expected, *repeats = np.concatenate(rows).reshape(1 + REPEATS, -1)
+    calm = []
+    noises = []
+    for k, piece in enumerate(replays.pieces):
+        state = replays.state(point, k)
+        calm.append(rig.repeated(piece.part, state=state))  # pyright: ignore[reportArgumentType]
+        noise = records.noise(rig.checked(replays.data[piece.record]), rig.columns)
+        rounded = rig.repeated(piece.part, rounded=True, state=state)  # pyright: ignore[reportArgumentType]
+        noises.append(dataclasses.replace(rounded, noise=Noise(noise)))
+    scenarios = list(calm)
+    for repeat in range(REPEATS):
+        scenarios += [dataclasses.replace(scenario, seed=repeat) for scenario in noises]
+    traces = iter(run(scenarios))
+    rows = []
+    for _ in range(1 + REPEATS):
+        predicted = replays.by_piece(rig, traces)
+        rows.append(np.concatenate(list(map(replays.relative, replays.pieces, predicted))))
+    expected, *repeats = rows
     moved = np.array([np.linalg.lstsq(J, repeat - expected, rcond=None)[0] for repeat in repeats])
     replays.report(1)
     return np.sqrt(np.mean(moved**2, axis=0))

@@ -45,10 +45,7 @@ def test_records_find_the_twin_of_their_columns(shown):
         ("slow.npz", "emps"),
     ]
     own = shown[0].fits["the twin’s"]
-    nothing = shown[0].fits["do nothing"]
     assert min(own.values()) > 90.0  # the velocity at the start is read off the positions
-    assert nothing["u"] == pytest.approx(0.0, abs=1.0)
-    assert own["x"] > nothing["x"]
     assert shown[0].why == ""
     assert "sampled every 0.002 s" in shown[1].why
 

@@ -392,7 +392,6 @@ def test_records_of_a_folder_are_repeated_in_few_points(tmp_path, monkeypatch):
             "name": "twin",
             "published": ("a",),
             "fit": lambda _, r: {"x": 90.0},
-            "idle": lambda _, r: {"x": 0.0},
         },
     )()
     t = np.arange(2401.0)
@@ -400,7 +399,7 @@ def test_records_of_a_folder_are_repeated_in_few_points(tmp_path, monkeypatch):
     twin.predictions = lambda many: [({"x": 2.0 * t}, {"x": t}, t)]
     monkeypatch.setattr(rigs, "read", lambda folder: [(folder / "a.csv", twin, {})])
     (shown,) = rigs.repeated(work(tmp_path), tmp_path)
-    assert shown.fits == {"the twin’s": {"x": 90.0}, "a": {"x": 50.0}, "do nothing": {"x": 0.0}}
+    assert shown.fits == {"the twin’s": {"x": 90.0}, "a": {"x": 50.0}}
     assert (shown.name, len(shown.t), shown.t[1], shown.why) == ("a.csv", 801, 3.0, "")
     np.testing.assert_array_equal(shown.twin["x"], 2.0 * shown.measured["x"])
     assert rigs.repeated(work(tmp_path), None) == ()

@@ -180,8 +180,8 @@ def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
     assert (np.abs(drawn[:, 1]) <= 50.0).all()
     assert (np.abs(drawn[:, 1]) >= 0.3).all()
     assert {*np.sign(drawn[:, 1])} == {-1.0, 1.0}
-    costs = [replays.cost(rows) for rows in curve.residuals(list(curve.tried))]
-    assert [replays.cost(rows) for rows in curve.residuals(points)] == sorted(costs)[:3]
+    costs = curve.costs(list(curve.tried)).sum(axis=1).tolist()
+    assert curve.costs(points).sum(axis=1).tolist() == sorted(costs)[:3]
     again = search._random(Curve(start=(0.5, 30.0)), 3, 7)
     assert [one.values.tolist() for one in again] == [one.values.tolist() for one in points]
     assert search.better(curve, points[2], points[0], points[1]) is points[0]

@@ -109,11 +109,3 @@ def test_a_brush_is_read_from_a_run_and_is_unknown_if_the_torque_is_even(brush, 
     measured = {"theta": trace.x[:, 0], "alpha": trace.x[:, 1], "plant_input": trace.u[:, 0]}
     found = zero(Values(**RIG.values), measured)
     assert found == ({"brush": pytest.approx(brush, abs=np.radians(1.0))} if brush else {})
-
-
-@pytest.mark.slow
-def test_degrees_are_told_from_radians(records):
-    angles = ("theta", "alpha", "target_theta", "target_alpha")
-    degrees = records[0] | {name: np.rad2deg(records[0][name]) for name in angles}
-    with pytest.raises(smc.ScenarioError, match="look like degrees"):
-        RIG.fit(degrees)

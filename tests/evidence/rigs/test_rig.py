@@ -3,17 +3,18 @@
 import dataclasses
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers import reference
+from helpers.runs import assert_same
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs.controllers import state_feedback
-from smc_mujoco.evidence.rigs.machines import qube_servo
-from smc_mujoco.simulation import python_controller, reference
-from smc_mujoco.simulation.trace import ARRAYS
+from smc_mujoco.simulation import python_controller
 
 QUBE = smc.rig("qube_servo")
 
@@ -105,23 +106,16 @@ def test_a_changed_quantity_changes_the_machine_and_its_source():
 
 
 @pytest.mark.parametrize(
-    ("make", "sentence"),
+    ("name", "values", "words"),
     [
-        (lambda: smc.rig("cube_servo"), "unknown rig 'cube_servo': did you mean 'qube_servo'?"),
-        (
-            lambda: smc.rig("qube_servo", arm=1.0),
-            "unknown quantity of qube_servo 'arm': did you mean 'arm_damping'?",
-        ),
-        (
-            lambda: smc.rig("qube_servo", arm_length=-1.0),
-            "qube_servo's arm_length is -1: give at least 0.01",
-        ),
+        ("cube_servo", {}, "unknown rig 'cube_servo': did you mean 'qube_servo'?"),
+        ("qube_servo", {"arm": 1.0}, "unknown quantity of qube_servo 'arm'"),
+        ("qube_servo", {"arm_length": -1.0}, "arm_length is -1: give at least 0.01"),
     ],
 )
-def test_what_is_no_rig_is_refused(make, sentence):
-    with pytest.raises(smc.ScenarioError) as error:
-        make()
-    assert str(error.value) == sentence
+def test_what_is_no_rig_is_refused(name, values, words):
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)):
+        smc.rig(name, **values)
 
 
 def test_the_twin_repeats_its_own_record(record):
@@ -178,24 +172,11 @@ def test_the_replay_is_the_controllers_own_command(record):
     gains = python_controller.Values(**scenario.law.gains)
     for k in range(400):
         r = python_controller.evaluate(scenario.reference, k * 2e-3)[0]
-        y = python_controller.Measurement(
-            0.0,
-            2e-3,
-            theta[first + k],
-            0.0,
-            theta[first + k] - r,
-            0.0,
-            r,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            q=alpha[first + k],
-        )
+        x = theta[first + k]
+        y = SimpleNamespace(dt=2e-3, e=x - r, q=alpha[first + k])
         added = python_controller.evaluate(scenario.feedforward, k * 2e-3)[0]
-        assert state_feedback.function(y, gains, memory)[0] + added == pytest.approx(
-            u[first + k], abs=1e-9
-        )
+        command = state_feedback.function(y, gains, memory)[0] + added
+        assert command == pytest.approx(u[first + k], abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -212,96 +193,32 @@ def test_a_part_outside_of_the_record_gets_one_sentence(part, sentence, record):
 
 
 def test_a_replay_is_an_ordinary_scenario(record, tmp_path):
-    """Both loops run it, and a file brings it back with its controller."""
+    """The oracle runs it alike, and a file brings it back with its controller."""
     scenario = QUBE.replay(record, duration=0.2)
     trace = smc.run(scenario)
-    other = reference.run(scenario)
-    for name in ARRAYS:
-        np.testing.assert_allclose(
-            getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name
-        )
+    assert_same(trace, reference.run(scenario))
     again = smc.load(trace.save(tmp_path / "a"))
     assert again.scenario == scenario
     assert again.scenario.law.function is state_feedback.function
 
 
-def without(record, name):
-    return {key: value for key, value in record.items() if key != name}
-
-
-def changed(record, name, at, value):
-    values = np.array(record[name])
-    values[at] = value
-    return record | {name: values}
-
-
 @pytest.mark.parametrize(
-    ("bad", "sentence"),
+    ("bad", "words"),
     [
         (
-            lambda r: without(r, "theta"),
+            lambda r: {k: v for k, v in r.items() if k != "theta"},
             "the record of qube_servo has no column theta (it has t, alpha",
         ),
-        (
-            lambda r: without(without(r, "theta"), "plant_input"),
-            "has no column theta, plant_input (it has",
-        ),
-        (
-            lambda r: changed(r, "alpha", 100, np.nan),
-            "column alpha of qube_servo is nan at sample 100, one of 1",
-        ),
-        (lambda r: r | {"alpha": ["a"] * 3501}, "column alpha of qube_servo is ['a', "),
-        (
-            lambda r: r | {"alpha": r["alpha"][:-1]},
-            "column alpha of qube_servo has 3500 samples and t has 3501",
-        ),
-        (
-            lambda r: changed(r, "t", 7, 0.0),
-            "time of qube_servo runs backward after sample 6, from 0.012 s to 0 s",
-        ),
-        (
-            lambda r: r | {"t": r["t"] * 0.5},
-            "is sampled every 0.001 s and the rig's controller runs every 0.002 s",
-        ),
-        (
-            lambda r: {k: v[::2] for k, v in r.items()},
-            "is sampled every 0.004 s and the rig's controller runs every",
-        ),
-        (
-            lambda r: {k: np.delete(v, 9) for k, v in r.items()},
-            "has a gap after sample 8, from 0.016 s to 0.02 s",
-        ),
-        (
-            lambda r: {k: v[:800] for k, v in r.items()},
-            "lasts 1.6 s, too short to repeat it: give at least 2.1",
-        ),
-        (
-            lambda r: {k: v[:1500] for k, v in r.items()},
-            "lasts 3 s, too short to score it: give at least 4.1 s",
-        ),
-        (
-            lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")},
-            "look like degrees",
-        ),
-        (
-            lambda r: r | {"alpha": np.rad2deg(r["alpha"])},
-            "the values of alpha of the record of qube_servo look like",
-        ),
-        (
-            lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")},
-            "values of theta and target_theta of",
-        ),
-        (
-            lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])},
-            "the values of target_theta of the record of",
-        ),
+        (lambda r: r | {"t": r["t"] * 0.5}, "is sampled every 0.001 s and the rig's controller"),
+        (lambda r: {k: v[:800] for k, v in r.items()}, "too short to repeat it: give at least 2.1"),
+        (lambda r: {k: v[:1500] for k, v in r.items()}, "too short to score it: give at least 4.1"),
         (lambda r: "record.csv", "record is 'record.csv': give a mapping of columns"),
     ],
 )
-def test_bad_data_get_one_sentence(bad, sentence, record):
+def test_what_cannot_be_repeated_is_one_sentence(bad, words, record):
     with pytest.raises(smc.ScenarioError) as error:
         QUBE.fit(bad(record))
-    assert sentence in str(error.value)
+    assert words in str(error.value)
     assert "\n" not in str(error.value)
 
 
@@ -314,8 +231,6 @@ def test_columns_have_the_units_of_the_machine():
 def test_the_delay_is_a_whole_number_of_steps():
     late = smc.rig("qube_servo", delay=1.1e-3).scenario("none")
     assert late.delay_steps * late.resolved.physics_step == pytest.approx(1e-3)
-    assert dataclasses.asdict(QUBE.columns)["x"] == ("theta", "alpha")
-    assert qube_servo.PERIOD == 2e-3
 
 
 def test_a_record_is_a_trace_of_what_was_measured(record):
@@ -331,21 +246,9 @@ def test_a_record_is_a_trace_of_what_was_measured(record):
     assert trace.scenario == QUBE.replay(record, 3.0, 1.0)
 
 
-def test_a_machine_that_does_nothing_follows_its_references(record):
-    idle = QUBE.idle(
-        record | {"theta": record["target_theta"], "alpha": 0.1 * record["target_theta"] + 0.3}
-    )
-    assert idle["theta"] == 100.0
-    assert idle["alpha"] < 0.0
-    assert idle["u"] == pytest.approx(0.0, abs=0.5)
-
-
 def test_records_of_torques_are_not_repeated():
     rig = smc.rig("realaigym_acrobot")
-    with pytest.raises(
-        smc.ScenarioError,
-        match="records of realaigym_acrobot are not replayed, as their torques are",
-    ):
+    with pytest.raises(smc.ScenarioError, match="are not replayed, as their torques are"):
         rig.replay(dict.fromkeys(rig.needed, np.arange(600.0)))
 
 
@@ -358,6 +261,3 @@ def test_the_command_repeats_a_record(record, tmp_path):
     assert re.search(r"twin +(99|100)\.\d +(99|100)\.\d +(99|100)\.\d", done.output)
     assert re.search(r"driver +-?\d", done.output)
     assert (tmp_path / "run.svg").stat().st_size > 1000
-    wrong = CliRunner().invoke(app, [*words[:-1], "drivers"])
-    assert wrong.exit_code == 2
-    assert "unknown parameter set of qube_servo 'drivers': did you mean 'driver'?" in wrong.output

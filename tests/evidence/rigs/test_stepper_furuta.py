@@ -14,9 +14,10 @@ from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs import firmware, predictions, stepper_record
+from benchmarks import stepper_figures as told
+from smc_mujoco.evidence.rigs import firmware
 from smc_mujoco.evidence.rigs.firmware import FOUR_STATES, LINEAR, STEPS, TICK, TWO_STATES
-from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS, PREDICTION
+from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS
 
 RECORDS = (
     Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"
@@ -98,9 +99,7 @@ def test_a_move_is_a_trapezoid_that_ends_at_its_target():
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_the_compiled_run_is_that_of_the_reference_loop(law):
-    fields = {"x0": PREDICTION.start(3), "seed": 3, "duration": 2.5} | {
-        "reference": smc.Step(0.2, 1.0)
-    }
+    fields = {"x0": told.start(3), "seed": 3, "duration": 2.5} | {"reference": smc.Step(0.2, 1.0)}
     one = smc.rig("stepper_furuta").scenario(law, **fields)
     trace = smc.run(one)
     assert_same(trace, reference.run(one))
@@ -115,7 +114,7 @@ def test_a_machine_that_tips_stops_its_motor():
     trace = smc.run(rig.scenario(x0=(0.0, 0.03), duration=2.0))
     assert abs(trace.x[-1, 1]) > 1.0
     assert (trace.u[-100:] == 0.0).all()
-    assert PREDICTION.fallen(stepper_record.figures(record(alpha=lambda t: 40.0 + 0.0 * t)))
+    assert told.fallen(told.figures(record(alpha=lambda t: 40.0 + 0.0 * t)))
 
 
 def record(
@@ -127,7 +126,7 @@ def record(
     rates = ((f(t + h) - f(t - h)) / (2.0 * h) for f in (alpha, theta))
     measured = (alpha(t), next(rates), theta(t), next(rates))
     columns = (1e3 * t, *measured, 10.0 + 0.0 * t, speed(t), STEPS * theta(t), 0.0 * t)
-    return dict(zip(stepper_record.COLUMNS, columns, strict=True))
+    return dict(zip(told.COLUMNS, columns, strict=True))
 
 
 def test_the_figures_of_known_signals_are_theirs():
@@ -136,7 +135,7 @@ def test_the_figures_of_known_signals_are_theirs():
     """
     w = 2.0 * math.pi * 50.0 * 26.0 / 256.0
     lag = math.radians(80.0)
-    found = stepper_record.figures(
+    found = told.figures(
         record(
             lambda t: 2.0 * np.sin(w * t),
             lambda t: -np.sin(w * t),
@@ -163,7 +162,7 @@ def test_rests_count_from_a_fifth_of_a_second():
         phase = np.round(t / 0.02) % 32
         return np.where((phase < 5) | ((phase >= 12) & (phase < 17)), 60.0, 49.0)
 
-    found = stepper_record.figures(record(speed=speed, duration=67.0))
+    found = told.figures(record(speed=speed, duration=67.0))
     assert found["running"] == pytest.approx(10 / 32, abs=0.01)
     assert found["resting"] == pytest.approx(15 / 32, abs=0.01)
     assert found["starts"] == pytest.approx(60.0 * 2 / 0.64, rel=0.02)
@@ -175,7 +174,7 @@ def test_seconds_count_about_their_mean_and_rests_by_their_angle():
     def alpha(t):
         return np.where(t < 43.0, 2.0, np.where(t < 63.0, -4.0, 9.0 * np.sin(math.tau * t)))
 
-    found = stepper_record.figures(
+    found = told.figures(
         record(alpha=alpha, speed=lambda t: np.where(t < 63.0, 0.0, 60.0), duration=73.0)
     )
     assert found["second_50"] == pytest.approx(0.0, abs=1e-9)
@@ -188,9 +187,9 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
     accelerations.
     """
     rig = smc.rig("stepper_furuta")
-    one = rig.scenario(x0=PREDICTION.start(1), seed=1, duration=25.0)
+    one = rig.scenario(x0=told.start(1), seed=1, duration=25.0)
     trace = smc.run(one)
-    rows = stepper_record.logged(trace)
+    rows = told.logged(trace)
     gaps = np.diff(rows["timestamp_ms"])
     assert pytest.approx(np.median(gaps)) == 20.0
     assert np.sum(gaps > 25.0) == pytest.approx(25, abs=2)  # a pause a second
@@ -199,7 +198,7 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
     theta = np.degrees(arm + rig.values["upright_error"])
     assert np.abs(rows["theta_deg"] - theta).max() < 0.5 * 360.0 / 4096 + 0.02
     assert np.abs(rows["vel_cmd_steps_s"]).max() > 50.0
-    loop = stepper_record.figures(rows)
+    loop = told.figures(rows)
     assert loop["alpha_rms"] < 2.0
 
 
@@ -213,76 +212,56 @@ def test_a_recording_is_loaded_and_a_bad_one_refused(tmp_path):
             out.writerow(names)
             out.writerows(np.column_stack([rows[name] for name in names]).tolist())
 
-    write(stepper_record.COLUMNS)
-    loaded = stepper_record.load(path)
+    write(told.COLUMNS)
+    loaded = told.load(path)
     assert all(np.array_equal(loaded[name], rows[name]) for name in rows)
-    write(stepper_record.COLUMNS[:-1])
+    write(told.COLUMNS[:-1])
     with pytest.raises(smc.ScenarioError, match="lacks the column position_clamped"):
-        stepper_record.load(path)
-    path.write_text(",".join(stepper_record.COLUMNS) + "\n" + ",".join("x" * 9) + "\n")
+        told.load(path)
+    path.write_text(",".join(told.COLUMNS) + "\n" + ",".join("x" * 9) + "\n")
     with pytest.raises(smc.ScenarioError, match="no number"):
-        stepper_record.load(path)
+        told.load(path)
     with pytest.raises(smc.ScenarioError, match="5 rows: give at least 1000"):
-        stepper_record.figures({name: values[:5] for name, values in rows.items()})
+        told.figures({name: values[:5] for name, values in rows.items()})
 
 
-@pytest.mark.parametrize("condition", PREDICTION.recorded)
+@pytest.mark.parametrize("condition", told.RECORDED)
 def test_the_recorded_figures_are_those_of_the_machines_file(condition):
     file = RECORDS / f"linear_{condition}.csv"
     if not file.exists():
         pytest.skip("the recordings have no licence, and are not here")
-    found = stepper_record.figures(stepper_record.load(file))
-    for name, value in PREDICTION.recorded[condition].items():
+    found = told.figures(told.load(file))
+    for name, value in told.RECORDED[condition].items():
         assert found[name] == pytest.approx(value, rel=0.05), name
 
 
-def told(by_law, falls=()):
-    """Figures of one set whose laws have these alpha_rms, at all seeds; runs of `falls` fell."""
-    made = {}
-    for law, value in zip(PREDICTION.order, by_law, strict=True):
-        made[("", "set 1", law, "hold")] = [
-            {"alpha_rms": value, "alpha_max": 99.0 if law in falls else 1.0}
-        ] * 3
-    return predictions.Told(prediction=PREDICTION, values=made)
-
-
-def test_laws_are_in_the_machines_order_or_not():
-    assert (told((1, 2, 3)).ordered("hold"), told((1, 2, 3)).correlation("hold")) == ((1, 1), 1.0)
-    assert (told((3, 2, 1)).ordered("hold"), told((3, 2, 1)).correlation("hold")) == ((0, 1), -1.0)
-    assert told((1, 3, 2)).correlation("hold") == pytest.approx(1 / 3)
-    fallen = told((1, 2, 0), falls=PREDICTION.order[2:])
-    assert (fallen.ordered("hold"), fallen.falls(PREDICTION.order[2], "hold")) == (
-        (1, 1),
-        1.0,
-    )  # a fall is the worst
-    assert len(fallen.of(PREDICTION.order[2], "hold", "alpha_rms")) == 0
-    with pytest.raises(smc.ScenarioError, match="emps has no figures to predict: give a record"):
-        predictions.predicted(smc.rig("emps"))
+@pytest.mark.parametrize(
+    ("medians", "fell", "expected"),
+    [
+        ((1, 2, 3), (), (1, 1.0)),
+        ((3, 2, 1), (), (0, -1.0)),
+        ((1, 3, 2), (), (0, 1 / 3)),
+        ((1, 2, 0), ("four_states",), (1, 1.0)),  # a fall is the worst
+        ((1, 1, 2), (), (0, 2 / 3)),
+    ],
+)
+def test_laws_are_in_the_machines_order_or_not(medians, fell, expected):
+    by_law = {}
+    for law, value in zip(told.ORDER, medians, strict=True):
+        run = {"alpha_rms": value, "alpha_max": 99.0 if law in fell else 1.0}
+        by_law[law] = [run] * 3
+        assert len(told.standing([run], "alpha_rms")) == (law not in fell)
+    assert told.ordered({"set 1": by_law}) == (expected[0], pytest.approx(expected[1]))
 
 
 @pytest.mark.slow
-def test_the_plain_twin_has_the_machines_order_reversed():
-    """Every law runs in every condition, without a part only in the first, and from a quarter of
-    the seeds.
-    """
-    plain = "all of these, noise and vibration"
-    short = dataclasses.replace(
-        PREDICTION,
-        conditions={
-            name: {**fields, "duration": 22.0} for name, fields in PREDICTION.conditions.items()
-        },
-        left_out={plain: PREDICTION.left_out[plain]},
-    )
-    rig = dataclasses.replace(smc.rig("stepper_furuta"), prediction=short, ensemble=())
-    done = []
-    found = predictions.predicted(rig, seeds=2, report=done.append)
-    counts = {key: len(values) for key, values in found.values.items()}
-    assert counts == {
-        **{("", "set 1", law, name): 2 for law in short.order for name in ("hold", "nudges")},
-        **{(plain, "set 1", law, "hold"): 1 for law in short.order},
-    }
-    assert done == [12, 3]
-    assert found.correlation("hold", plain) == -1.0
-    alone = {law: found.of(law, "hold", "alpha_rms", plain) for law in short.order}
+def test_the_plain_twin_has_the_machines_order_reversed(monkeypatch):
+    rig = dataclasses.replace(smc.rig("stepper_furuta"), ensemble=())
+    monkeypatch.setitem(told.CONDITIONS, "hold", {"duration": 22.0})
+    plain = told.predicted(rig, "hold", 1, told.PLAIN)
+    assert told.ordered(plain) == (0, -1.0)
+    alone = {law: told.standing(runs, "alpha_rms") for law, runs in plain["set 1"].items()}
     assert alone["linear"] > 100.0 * max(alone["two_states"], alone["four_states"])
-    assert found.of("two_states", "hold", "alpha_rms").min() > 100.0 * alone["two_states"]
+    whole = told.predicted(rig, "hold", 2)["set 1"]
+    assert {law: len(runs) for law, runs in whole.items()} == dict.fromkeys(told.ORDER, 2)
+    assert told.standing(whole["two_states"], "alpha_rms").min() > 100.0 * alone["two_states"]

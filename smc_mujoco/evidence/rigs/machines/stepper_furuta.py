@@ -8,8 +8,6 @@ benchmarks/stepper_furuta.py.
 
 import math
 
-import numpy as np
-
 from smc_mujoco.evidence.rigs.controllers import rotary
 from smc_mujoco.evidence.rigs.firmware import (
     DEGREES,
@@ -19,15 +17,12 @@ from smc_mujoco.evidence.rigs.firmware import (
     TWO_STATES,
     firmware,
 )
-from smc_mujoco.evidence.rigs.predictions import Prediction
 from smc_mujoco.evidence.rigs.records import Columns
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
-from smc_mujoco.evidence.rigs.stepper_record import UNITS, figures, logged
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.simulation.signals import Clock, Noise, OrnsteinUhlenbeck
-from smc_mujoco.simulation.time_series import TimeSeries
 
 MACHINE = "Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa (no licence stated)"
 FORMULA = f"{MACHINE}: from formulas, not identified"
@@ -86,26 +81,6 @@ def machine(q):
         "u_max": math.inf,
         "x0": (0.0, 0.0),
     }
-
-
-def start(seed):
-    """Return where the pendulum is let go, rad: 0.5 to 1 degrees from upright, so that the firmware
-    engages near 2.
-    """
-    random = np.random.default_rng(seed)
-    return 0.0, math.radians(random.uniform(0.5, 1.0)) * random.choice((-1, 1))
-
-
-def steps_of(*targets):
-    """Return a reference that steps to targets, (s, degrees)."""
-    times = [0.0]
-    values = [0.0]
-    before = 0.0
-    for time, target in targets:
-        times += [time, time + 1e-3]
-        values += [before, math.radians(target)]
-        before = math.radians(target)
-    return TimeSeries(times, values)
 
 
 NAMES = (
@@ -168,94 +143,6 @@ QUANTITIES = {
     "queue": Quantity(0.02, "s", LIBRARY, 0.0, 1.0),
     "refill": Quantity(4.096e-3, "s", LIBRARY, 0.0, 1.0),
 }
-STIFF = {"holding_torque": 20.0, "arm_damping": 0.5}  # a spring of 150 Hz
-PLAIN = STIFF | dict.fromkeys(
-    (
-        "steps",
-        "arm_friction",
-        "pivot_friction",
-        "pivot_damping",
-        "upright_error",
-        "sensor_noise",
-        "vibration",
-        "counts",
-        "sensor_delay",
-        "sensor_skew",
-        "pause",
-    ),
-    0.0,
-)
-PREDICTION = Prediction(
-    conditions={
-        "hold": {"duration": 70.0},
-        "nudges": {
-            "duration": 50.3,
-            "reference": steps_of((15.0, 20.0), (24.34, -20.0), (36.73, 0.0)),
-        },
-    },
-    start=start,
-    figures=lambda trace: figures(logged(trace)),
-    units=UNITS,
-    shown=("alpha_rms", "acceleration_rms", "running", "centroid"),
-    recorded={
-        "hold": {
-            "alpha_rms": 0.439,
-            "alpha_max": 3.82,
-            "theta_std": 2.28,
-            "theta_max": 10.8,
-            "alpha_rate_rms": 16.3,
-            "theta_rate_rms": 9.3,
-            "acceleration_rms": 1066.0,
-            "speed_rms": 33.0,
-            "running": 0.064,
-            "resting": 0.80,
-            "resting_50": 0.21,
-            "resting_90": 0.47,
-            "second_25": 0.018,
-            "second_50": 0.064,
-            "second_75": 0.40,
-            "second_90": 0.78,
-            "centroid": 4.73,
-            "ratio": 1.85,
-            "phase": -174.5,
-            "gain": 1.15,
-            "lag": -81.0,
-        },
-        "nudges": {
-            "alpha_rms": 0.844,
-            "alpha_max": 3.65,
-            "theta_std": 12.57,
-            "theta_max": 29.6,
-            "alpha_rate_rms": 31.1,
-            "theta_rate_rms": 18.0,
-            "acceleration_rms": 2005.0,
-            "speed_rms": 57.3,
-            "running": 0.260,
-            "centroid": 4.69,
-            "second_25": 0.47,
-            "second_50": 0.75,
-            "second_75": 1.03,
-            "second_90": 1.27,
-            "ratio": 1.82,
-            "phase": -173.4,
-            "gain": 1.21,
-            "lag": -81.0,
-        },
-    },
-    fitted_on="linear",
-    order=("linear", "two_states", "four_states"),
-    rank="alpha_rms",
-    fallen=lambda found: not found["alpha_max"] < 30.0,
-    left_out={
-        "queue": {"queue": 0.0, "refill": 0.0},
-        "stop band": {"stop_band": 0.0},
-        "motor spring": STIFF,
-        "pivot friction": {"pivot_friction": 0.0, "pivot_damping": 0.0},
-        "all of these, noise and vibration": PLAIN,
-    },
-    about="The figures of the linear law were fitted on; all of the sliding modes are predicted, and their recordings "
-    "were not opened. Only the order of the three laws on the machine is known here.",
-)
 STEPPER_FURUTA = Rig(
     name="stepper_furuta",
     label="Rotary pendulum on a stepper motor",
@@ -263,9 +150,7 @@ STEPPER_FURUTA = Rig(
     machine=machine,
     controller=LAWS[0],
     columns=Columns(x=("theta", "alpha"), u="u", reference="target"),
-    identified_from=tuple(
-        f"{condition}, {PREDICTION.fitted_on}" for condition in PREDICTION.recorded
-    ),
+    identified_from=("hold, linear", "nudges, linear"),
     free=NAMES,
     published={
         "second_search": dict(zip(NAMES, SECOND, strict=True))
@@ -276,7 +161,6 @@ STEPPER_FURUTA = Rig(
     ensemble=tuple(dict(zip(NAMES, values, strict=True)) for values in SETS[1:]),
     laws=(*LAWS, *rotary(ARM_INERTIA, SURFACE)),
     x0=(0.0, 0.75 / DEGREES),
-    prediction=PREDICTION,
     about=(
         f"{MACHINE}. The firmware's laws, its pulse generator's logic and the masses are the machine's facts; the rest "
         "was found from figures of its recordings under the linear law."
