@@ -12,7 +12,7 @@ from typing import Any
 import catalogue
 
 import smc_mujoco as smc
-from smc_mujoco.control.joint_law import catalogue as joint_laws
+from smc_mujoco.control.law import joint_catalogue as joint_laws
 from smc_mujoco.control.properties import families
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.paper import paper

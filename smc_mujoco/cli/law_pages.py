@@ -19,7 +19,7 @@ from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.joint_law import catalogue as joint_laws
+from smc_mujoco.control.law import joint_catalogue as joint_laws
 from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, suitable

@@ -19,16 +19,14 @@ from numba import njit
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
 
-BANDWIDTH = (
-    20.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
-)
+# 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
+BANDWIDTH = 20.0
 # least thrust over weight: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
 LEAST = 0.127
 STEERING = 2  # slots of a law's memory, the first ones, which `steer` keeps
 MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
-MIN_SINE = (
-    1e-6  # chosen: sine of the angle between thrust and heading; below it the heading says nothing
-)
+# chosen: sine of the angle between thrust and heading; below it the heading says nothing
+MIN_SINE = 1e-6
 
 
 @njit(error_model="numpy")
@@ -77,7 +75,7 @@ def rate_of(wanted, F, dF, r, dr):
 
 @njit(error_model="numpy")
 def _ahead(z, heading):
-    """Return the axis that is the heading for `of_thrust`, in the axes of the quaternion `heading`."""
+    """Return the axis that is the heading for `of_thrust`, in those of the quaternion `heading`."""
     y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
     if math.sqrt(_dot(y, y)) >= MIN_SINE:
         return (1.0, 0.0, 0.0)

@@ -1,6 +1,5 @@
-"""Components: pure functions with named gains and a memory.
-
-Laws, surfaces and estimators are components.
+"""Components: pure functions with named gains and a memory. Laws, surfaces and estimators are
+components.
 
 A `Template` is the function with its default gains. Called with gains it returns a `Component`, the
 plain data in a Scenario. The function is called as `function(y, gains, memory)` and reads y and
@@ -9,9 +8,9 @@ change. It is zero at the start of a run.
 """
 
 import dataclasses
-import importlib
 import inspect
 import keyword
+import pkgutil
 import re
 import sys
 import warnings
@@ -23,6 +22,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Each, Number, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.control.outer_law import on_computed_torque
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain, Unit
 
@@ -36,9 +36,8 @@ AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a fun
 class Rest(NamedTuple):
     """The linear part of a law that is linear near s = 0."""
 
-    linear: Callable[
-        [SimpleNamespace], tuple[float, float]
-    ]  # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
+    # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
+    linear: Callable[[SimpleNamespace], tuple[float, float]]
     force: Callable  # (gains, errors at rest, (k,)) -> the force towards 0 at each, (k,)
 
 
@@ -79,10 +78,8 @@ OPTIONS = {  # kind of a component -> options of its decorator
     "surface": OF_SURFACE,
     "estimator": tuple(name for name in OF_SURFACE if name != "relative_degree"),
 }
-OPTION_KEYS = {
-    "accuracy": ("s", "e"),
-    "admits": ("d", "d'"),
-}  # option that is a mapping -> its possible keys
+# option that is a mapping -> its possible keys
+OPTION_KEYS = {"accuracy": ("s", "e"), "admits": ("d", "d'")}
 
 
 class GainWarning(UserWarning):
@@ -97,24 +94,22 @@ class Component:
     name: str
     gains: Mapping[str, Any]  # name -> GainValue
     memory: int  # floats per channel
-    function: (
-        Callable | None
-    )  # None if a loaded trace names one that is not available, and if there is `each`
+    # None if a loaded trace names one that is not available, and if there is `each`
+    function: Callable | None
     relative_degree: int = 1
     plants: tuple[str, ...] = ()
     requires_model: bool = False
     joint: bool = False  # whether it is a law of many joints
     shared: tuple[str, ...] = ()  # gains that are one number for all joints in a law of many joints
     each: "tuple[Component, ...]" = ()  # the laws of the driven channels if they are different laws
-    template: "Template | None" = dataclasses.field(
-        default=None, compare=False, repr=False
-    )  # None if not available
-    source: Source = dataclasses.field(
-        default=Source(), compare=False, repr=False
-    )  # where the gains come from
+    # None if not available
+    template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
+    # where the gains come from
+    source: Source = dataclasses.field(default=Source(), compare=False, repr=False)
 
     def __repr__(self) -> str:
-        return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={gain_text(v)}' for k, v in self.gains.items())])})"
+        gains = "".join(f", {name}={gain_text(value)}" for name, value in self.gains.items())
+        return f"{self.kind}({self.name!r}{gains})"
 
     def __reduce__(self):
         """Pickle the name that its template has in its module: that of the function before it was
@@ -170,12 +165,16 @@ class Component:
         return self.each or (self,)
 
     def on_computed_torque(self) -> "Component":
-        """Return a law of many joints with this law, of one channel, as the outer law of computed
-        torque.
-        """
-        return importlib.import_module("smc_mujoco.control.outer_law").on_computed_torque(
-            self
-        )  # which imports this
+        """Return the law of many joints whose outer law is this one, see `control.outer_law`."""
+        outer = self.template
+        if self.joint or self.each or outer is None or self.plants:
+            raise ScenarioError(
+                f"{self.name} cannot be the outer law of computed torque: "
+                "give one law of one channel, for all plants"
+            )
+        made = outer.on_computed_torque()
+        gains = {name: value for name, value in self.gains.items() if name in made.gains}
+        return made.bind(gains).sourced(self.source.kind, self.source.search)
 
     def of_channel(self, i: int) -> "Component":
         """Return the component of channel i, with one number for each gain."""
@@ -195,21 +194,24 @@ class Component:
         return [self.of_channel(i) for i in range(n)]
 
     def __str__(self):
-        return f"{self.name}({', '.join(f'{k}={gain_text(v)}' for k, v in self.gains.items())})"
+        gains = ", ".join(f"{name}={gain_text(value)}" for name, value in self.gains.items())
+        return f"{self.name}({gains})"
 
 
 def gain_text(value: GainValue) -> str:
     """Return a gain as text, such as 3 or (3, 4.5)."""
     if isinstance(value, tuple):
-        return f"({', '.join(f'{one:g}' for one in value)})"
+        return f"({', '.join(f'{number:g}' for number in value)})"
     return f"{value:g}"
 
 
 def unit_cure(name: str, default: GainValue) -> str:
     """Return how to give a gain a unit, as the end of a refusal."""
     gain = f'gains={{"{name}": Gain({gain_text(default)}, UNIT)}}'
-    units = "FORCE, RATE, SPEED or another of smc_mujoco.control.units, or Unit() for a number without one"
-    return f"write {gain} in its decorator, where UNIT is {units}"
+    return (
+        f"write {gain} in its decorator, where UNIT is FORCE, RATE, SPEED or another of "
+        "smc_mujoco.control.units, or Unit() for a number without one"
+    )
 
 
 def _template_at(module: str, name: str) -> "Template | None":
@@ -223,9 +225,7 @@ def _template_at(module: str, name: str) -> "Template | None":
 def _unpickled(
     module: str, qualname: str, gains: dict[str, float], name: str, source: Source
 ) -> Component:
-    importlib.import_module(module)
-    template = _template_at(module, qualname)
-    assert template is not None
+    template = pkgutil.resolve_name(f"{module}:{qualname}")
     component = dataclasses.replace(template.bind(gains), source=source)
     if name != component.name:
         return component.named(name)
@@ -267,6 +267,28 @@ class Template:
         """Gain -> its default."""
         return {name: gain.default for name, gain in self.gains.items()}
 
+    def on_computed_torque(self) -> "Template":
+        """Return the template of the law of many joints whose outer law this one is."""
+        own = {name: gain for name, gain in self.gains.items() if not gain.plant}
+        values = []
+        for name, gain in self.gains.items():
+            values.append(f"gains.{name}[i]" if name in own else repr(gain.default))
+        function = on_computed_torque(self.function, tuple(self.gains), ", ".join(values))
+        return Template(
+            kind="law",
+            name=function.__name__,
+            function=function,
+            gains=own,
+            memory=self.memory,
+            conditions=self.conditions,
+            requires_model=True,
+            label=f"{self.label or self.function.__name__} on computed torque",
+            family=self.family,
+            continuous=self.continuous,
+            accuracy=self.accuracy,
+            joint=True,
+        )
+
     @property
     def doc(self) -> str:
         """The docstring of the function, or of its module if both have the same name."""
@@ -288,20 +310,19 @@ class Template:
     def unmet(self, gains: Mapping[str, GainValue]) -> list[str]:
         """Return the conditions of the theorem that these gains violate, in words."""
         channels = list(_per_channel(gains))
-        return [
-            words
-            for words, test in self.conditions.items()
-            if not all(_holds(test, g) for g in channels)
-        ]
+        unmet = []
+        for words, test in self.conditions.items():
+            if not all(_holds(test, gains) for gains in channels):
+                unmet.append(words)
+        return unmet
 
     def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
         return self.bind(gains, warn=True)
 
     def bind(self, gains: Mapping[str, float | Sequence[float]], warn: bool = False) -> Component:
-        """Bind the function to these gains and the defaults of others.
-
-        Warn of gains that violate a condition.
+        """Bind the function to these gains and the defaults of others. Warn of gains that violate a
+        condition.
         """
         values: dict[str, GainValue] = {**self.defaults}
         for key, value in gains.items():
@@ -310,30 +331,28 @@ class Template:
             gain = self.gains[key]
             values[key] = gain.constraint(f"{self.name}'s {key}", value)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
-                text = gain_text(values[key])
                 raise ScenarioError(
-                    f"{self.name}'s {key} is {text}: give one number for all channels"
+                    f"{self.name}'s {key} is {gain_text(values[key])}: "
+                    "give one number for all channels"
                 )
-        for words in self.unmet(values) if warn else ():
+        if warn:
             text = ", ".join(f"{name} = {gain_text(value)}" for name, value in values.items())
-            warnings.warn(
-                f"{self.kind} {self.name!r} asks for {words}, but {text}",
-                GainWarning,
-                users_stacklevel(),
-            )
-        same = (
-            "kind",
-            "name",
-            "memory",
-            "function",
-            "relative_degree",
-            "plants",
-            "requires_model",
-            "joint",
+            for words in self.unmet(values):
+                told = f"{self.kind} {self.name!r} asks for {words}, but {text}"
+                warnings.warn(told, GainWarning, users_stacklevel())
+        component = Component(
+            kind=self.kind,
+            name=self.name,
+            gains=values,
+            memory=self.memory,
+            function=self.function,
+            relative_degree=self.relative_degree,
+            plants=self.plants,
+            requires_model=self.requires_model,
+            joint=self.joint,
+            shared=tuple(name for name, gain in self.gains.items() if gain.shared),
+            template=self,
         )
-        shared = tuple(name for name, gain in self.gains.items() if gain.shared)
-        properties = {name: getattr(self, name) for name in same}
-        component = Component(gains=values, shared=shared, template=self, **properties)
         if gains:
             return component
         return component.sourced(DEFAULT)
@@ -351,29 +370,25 @@ def by_channel(laws: "Sequence[Component]") -> Component:
     first = laws[0]
     for i, law in enumerate(laws):
         if law.joint or not law.uniform:
-            if law.joint:
-                fact = "of many joints"
-            else:
-                fact = f"{law}, with gains by channel,"
             raise ScenarioError(
-                f"the law of channel {i} is {law.name!r}, {fact}: give it a law of one channel"
+                f"the law of channel {i} is {law}, of many joints or with gains by channel: "
+                "give it a law of one channel"
             )
     source = combined([law.source for law in laws])
     if all(law.function is first.function and law.name == first.name for law in laws):
-        by_name = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
         gains = {}
-        for name, values in by_name.items():
-            if len(set(values)) > 1:
-                gains[name] = values
-            else:
-                gains[name] = values[0]
+        for name in first.gains:
+            values = tuple(law.gains[name] for law in laws)
+            gains[name] = values if len(set(values)) > 1 else values[0]
         return dataclasses.replace(first, gains=gains, source=source.with_gains(gains))
+    gains = {}
+    for i, law in enumerate(laws):
+        for name, value in law.gains.items():
+            gains[f"{name}[{i}]"] = value
     component = Component(
         kind=first.kind,
         name=" + ".join(dict.fromkeys(law.name for law in laws)),
-        gains={
-            f"{name}[{i}]": value for i, law in enumerate(laws) for name, value in law.gains.items()
-        },
+        gains=gains,
         memory=max(law.memory for law in laws),
         function=None,
         relative_degree=max(law.relative_degree for law in laws),
@@ -384,9 +399,8 @@ def by_channel(laws: "Sequence[Component]") -> Component:
 
 
 def gain_at(value: GainValue, i: int) -> float:
-    """Return a gain's value in channel i.
-
-    A tuple that is too short, which a scenario refuses, gives its last value.
+    """Return a gain's value in channel i. A tuple that is too short, which a scenario refuses,
+    gives its last value.
     """
     if isinstance(value, tuple):
         return value[min(i, len(value) - 1)]
@@ -402,9 +416,8 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
 
 
 def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict[str, Gain]:
-    """Return a decorator's gains, numbers or Gains, as Gains.
-
-    They follow the known ones and can change these.
+    """Return a decorator's gains, numbers or Gains, as Gains. They follow the known ones and can
+    change these.
     """
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(
@@ -412,26 +425,19 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
         )
     checked: dict[str, Gain] = {}
     for key, value in {**known, **(gains or {})}.items():
-        if (
-            not isinstance(key, str)
-            or not key.isidentifier()
-            or key.startswith("_")
-            or keyword.iskeyword(key)
-        ):
+        named = isinstance(key, str) and key.isidentifier() and not keyword.iskeyword(key)
+        if not named or key.startswith("_"):
             raise ScenarioError(
                 f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'"
             )
-        if isinstance(value, Gain):
-            gain = value
-        else:
-            gain = Gain(value)
+        gain = value if isinstance(value, Gain) else Gain(value)
         default = ANY_GAIN(f"default of gain {key}", gain.default)
         checked[key] = dataclasses.replace(gain, default=default)
-    for key, gain in checked.items():
         if not (gain.unit is None or isinstance(gain.unit, Unit) or callable(gain.unit)):
             raise ScenarioError(
                 f"unit of gain {key} is {shown(gain.unit)}: {unit_cure(key, gain.default)}"
             )
+    for key, gain in checked.items():
         if gain.over is not None and gain.over not in checked:
             raise unknown(f"gain that {key} is divided by", gain.over, checked)
     return checked
@@ -475,11 +481,12 @@ def template_decorator(
         raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
     if options.get("finite_time", "") not in FINITE_TIME:
         raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
-    for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
-        for name in names:
-            checked[name] = dataclasses.replace(
-                find(f"gain that is {sign}", name, checked), **{sign: True}
-            )
+    for name in positive:
+        gain = find("gain that is positive", name, checked)
+        checked[name] = dataclasses.replace(gain, positive=True)
+    for name in nonnegative:
+        gain = find("gain that is nonnegative", name, checked)
+        checked[name] = dataclasses.replace(gain, nonnegative=True)
 
     def decorate(function: Callable) -> Template:
         if not callable(function):

@@ -22,13 +22,14 @@ def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
     """
     if plant.unmodelled:
         raise ScenarioError(
-            f"{plant.name} has no nominal model to take {law}'s a1, a2 and b from: {plant.unmodelled}, "
+            f"{plant.name} has no nominal model to take {law}'s a1, a2 and b from: "
+            f"{plant.unmodelled}, "
             f'or give the three, as in smc.law("{law}", a1=0.0, a2=0.0, b=1.0)'
         )
     if plant.underactuated:
         raise ScenarioError(
-            f"{plant.name}'s channel {plant.driven} has no actuator, and {law} does not see such a joint: "
-            "take the law 'hierarchical', which does"
+            f"{plant.name}'s channel {plant.driven} has no actuator, and {law} does not see "
+            "such a joint: take the law 'hierarchical', which does"
         )
     p = SimpleNamespace(**plant.parameters)
     rest = np.zeros(plant.n)

@@ -48,8 +48,7 @@ def catalogue() -> Catalogue[Template]:
 
 
 def estimator(name: str, **gains: float) -> Estimator:
-    """Return the estimator `name` with these gains.
-
-    An unknown name or a gain out of range is a ScenarioError.
+    """Return the estimator `name` with these gains. An unknown name or a gain out of range is a
+    ScenarioError.
     """
     return find("velocity estimator", name, catalogue()).bind(gains, warn=True)

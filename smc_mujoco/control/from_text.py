@@ -25,12 +25,10 @@ from smc_mujoco.control import serialise
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
 
-NAME_AND_GAINS = re.compile(
-    r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL
-)  # pid(kp=50, ki=1)
-LABELLED = re.compile(
-    r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL
-)  # slow: pid(kp=50)
+# pid(kp=50, ki=1)
+NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
+# slow: pid(kp=50)
+LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)
 
 
 def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
@@ -48,21 +46,21 @@ def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
       ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with
         several.
     """
-    if isinstance(text, Law | Template) and text.kind == "law":
-        return _with_gains(text() if isinstance(text, Template) else text, gains)
-    first, *others = (
-        known_laws()[item]() if isinstance(item, str) else item for item in laws(text)
-    )
-    if others:
-        names = ", ".join(law.name for law in (first, *others))
+    if isinstance(text, Template) and text.kind == "law":
+        return _with_gains(text(), gains)
+    if isinstance(text, Law) and text.kind == "law":
+        return _with_gains(text, gains)
+    found = laws(text)
+    if len(found) > 1:
+        names = ", ".join(law if isinstance(law, str) else law.name for law in found)
         raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
-    return _with_gains(first, gains)
+    first = found[0]
+    return _with_gains(known_laws()[first]() if isinstance(first, str) else first, gains)
 
 
 def laws(text: object) -> list[str | Law]:
-    """Return the laws of a text.
-
-    The name of a law of the library stays a name, which sets of gains need.
+    """Return the laws of a text. The name of a law of the library stays a name, which sets of gains
+    need.
     """
     if not isinstance(text, str) or text in known_laws():
         find("law", text, known_laws())
@@ -80,9 +78,8 @@ def laws(text: object) -> list[str | Law]:
 
 
 def component(kind: str, text: str, known: Mapping[str, Template], example: str) -> Component:
-    """Return a component of a catalogue from its name, with gains in brackets or without.
-
-    Errors give the example.
+    """Return a component of a catalogue from its name, with gains in brackets or without. Errors
+    give the example.
     """
     head, gains = _parts(kind, text, example)
     return find(kind, head, known).bind(gains, warn=True)
@@ -98,14 +95,10 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue
         gains: dict[str, GainValue] = {}
         for word in call.keywords:
             if isinstance(word.value, ast.Tuple | ast.List):
-                several = word.value.elts
+                numbers = tuple(float(ast.unparse(number)) for number in word.value.elts)
             else:
-                several = None
-            values = tuple(float(ast.unparse(one)) for one in several or [word.value])
-            if several is None:
-                gains[str(word.arg)] = values[0]
-            else:
-                gains[str(word.arg)] = values
+                numbers = float(ast.unparse(word.value))
+            gains[str(word.arg)] = numbers
         return matched["head"], gains
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
@@ -124,25 +117,24 @@ def _of_python(path: str) -> list[Law]:
     """Return the laws of a Python file: of @smc.law_function, with their default gains, and of
     smc.law_from.
     """
-    values = execute(Path(path)).values()
-    templates = {
-        value.name: value for value in values if isinstance(value, Template) and value.kind == "law"
-    }
+    templates = {}
     bound = {}
-    for value in values:
-        if isinstance(value, Law) and value.kind == "law":
+    for value in execute(Path(path)).values():
+        if isinstance(value, Template) and value.kind == "law":
+            templates[value.name] = value
+        elif isinstance(value, Law) and value.kind == "law":
             bound[value.name] = value
-    made = {
-        template.function for template in (*templates.values(), *known_laws().values())
-    }  # not again where bound
     laws = []
     for name, template in templates.items():
         if template is not known_laws().get(name):
             laws.append(template())
+    # a law that is a template with gains is not one more
+    made = {template.function for template in (*templates.values(), *known_laws().values())}
     laws += [law for law in bound.values() if not made & {part.function for part in law.parts}]
     if not laws:
         raise ScenarioError(
-            f"{path} has no law: write @smc.law_function above a function (y, gains, memory), or law = smc.law_from(..)"
+            f"{path} has no law: write @smc.law_function above a function (y, gains, memory), "
+            "or law = smc.law_from(..)"
         )
     return laws
 
@@ -157,19 +149,27 @@ def _of_tuning(path: str) -> list[Law]:
     if law.function is None:
         gains = ", ".join(f"{name}={value!r}" for name, value in law.gains.items())
         raise ScenarioError(
-            f"law {law.name} of {path} is your own: give its file with its gains, as FILE.py({gains})"
+            f"law {law.name} of {path} is your own: "
+            f"give its file with its gains, as FILE.py({gains})"
         )
     return [law]
 
 
-def _of_annex(kind: str) -> Callable[[str], list[Law]]:
-    """Return the function that reads the law of a file of a kind, "c" or "fmu"."""
-    module = f"smc_mujoco.exchange.{kind}.load"
-    return lambda path: [getattr(annexes.module(module, f"law {path}"), f"law_from_{kind}")(path)()]
+def _of_c(path: str) -> list[Law]:
+    return [annexes.module("smc_mujoco.exchange.c.load", f"law {path}").law_from_c(path)()]
 
 
-READERS = {".py": _of_python, ".json": _of_tuning}  # by suffix
-READERS |= {**dict.fromkeys((".c", ".so"), _of_annex("c")), ".fmu": _of_annex("fmu")}
+def _of_fmu(path: str) -> list[Law]:
+    return [annexes.module("smc_mujoco.exchange.fmu.load", f"law {path}").law_from_fmu(path)()]
+
+
+READERS: dict[str, Callable[[str], list[Any]]] = {  # by suffix
+    ".py": _of_python,
+    ".json": _of_tuning,
+    ".c": _of_c,
+    ".so": _of_c,
+    ".fmu": _of_fmu,
+}
 
 
 def _reader(text: str) -> Callable[[str], list[Any]] | None:
@@ -184,9 +184,8 @@ def _reader(text: str) -> Callable[[str], list[Any]] | None:
 
 
 def parsed_gains(text: str, what: str) -> dict[str, Any]:
-    """Return the gains in a text such as "lam=6,k1=3 5", where k1 is 3 and 5 for two joints.
-
-    Errors call it `what`.
+    """Return the gains in a text such as "lam=6,k1=3 5", where k1 is 3 and 5 for two joints. Errors
+    call it `what`.
     """
     parsed: dict[str, GainValue] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
@@ -199,8 +198,5 @@ def parsed_gains(text: str, what: str) -> dict[str, Any]:
             raise ScenarioError(
                 f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3"
             )
-        if len(values) == 1:
-            parsed[name] = values[0]
-        else:
-            parsed[name] = values
+        parsed[name] = values if len(values) > 1 else values[0]
     return parsed

@@ -1,7 +1,7 @@
 """Sets of gains for the laws that the study compares, on its five plants.
 
-    law("duffing", "classical")                # tuned by the rule of `tuning`, with a cost of the variation of u
-    law("duffing", "classical", "study")       # as first chosen
+    law("duffing", "classical")           # by the rule of `tuning`, with a cost of u's variation
+    law("duffing", "classical", "study")  # as first chosen
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the
   light of results.
@@ -190,30 +190,31 @@ class TunedGains:
 
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
-    """Return the gains of a law on a plant from a set that was tuned, and the search behind them."""
+    """Return the gains of a law on a plant from a tuned set, and the search behind them."""
     find("set of tuned gains", gains, OBJECTIVES)
     plant, name = as_plant(plant), ALIASES.get(name, name)
     if (stored := _stored(plant.name, name, gains)) is not None:
         return stored
     example = next(iter(find_law(name).gains), "k")
-    cure = f"give the law's gains yourself, as {name}({example}=...)"
+    tune = ""
     if not plant.unscaled:
-        cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
-    cure += ", or take the defaults (--gains default)"
-    raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
+        tune = f", or tune them (smc-mujoco tune {plant.argument} {name} --out FILE.json)"
+    raise ScenarioError(
+        f"no gains in set {gains!r} for {name} on {plant.name}: give the law's gains yourself, "
+        f"as {name}({example}=...){tune}, or take the defaults (--gains default)"
+    )
 
 
 def paper_plant(plant: object) -> str:
-    """Return the plant if it is the name of one of the paper's plants.
-
-    Raise ScenarioError otherwise.
+    """Return the plant if it is the name of one of the paper's plants. Raise ScenarioError
+    otherwise.
     """
     if isinstance(plant, str) and (plant in STUDY or plant not in plants_known()):
         find("plant of the paper's study", plant, STUDY)
         return plant
     raise ScenarioError(
-        f"plant is {shown(plant)}, and the paper's study has conditions and gains only for {', '.join(STUDY)}: "
-        "give one of these, or give smc.study your own scenarios"
+        f"plant is {shown(plant)}, and the paper's study has conditions and gains only for "
+        f"{', '.join(STUDY)}: give one of these, or give smc.study your own scenarios"
     )
 
 

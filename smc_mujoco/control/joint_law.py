@@ -18,7 +18,6 @@ measurement's arrays are copies, which a law may overwrite. A law without the mo
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
-import functools
 import math
 from typing import Any, NamedTuple
 
@@ -26,9 +25,7 @@ import numpy as np
 from numba import carray, njit
 from numba.extending import overload
 
-from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.jit import call, floats, pointer, record_at
-from smc_mujoco.control.component import Template
 
 
 class JointMeasurement(NamedTuple):
@@ -55,9 +52,8 @@ class JointMeasurement(NamedTuple):
     g: np.ndarray  # h(x, 0), the forces at rest: gravity and springs
 
 
-ARRAYS = JointMeasurement._fields[
-    4:
-]  # the vectors, M, h and g, in the order in which they are stored
+# the vectors, M, h and g, in the order in which they are stored
+ARRAYS = JointMeasurement._fields[4:]
 # What is stored before the arrays. `dynamics` is 0, or the address of a HANDLE.
 HEAD = floats(("t", "dt", "model", "dynamics", "n"))
 # The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of
@@ -111,9 +107,8 @@ def measurement_at(address):
 
 
 def coriolis(y, w):
-    """Return C(x, v) w, (n,), for a vector w (n,).
-
-    C is made of Christoffel symbols, so M' - 2 C is skew-symmetric.
+    """Return C(x, v) w, (n,), for a vector w (n,). C is made of Christoffel symbols, so M' - 2 C is
+    skew-symmetric.
 
     c(x, v) = C(x, v) v is part of y.h. The product follows from c alone: C(x, v) w = (c(x, v + w) -
     c(x, v - w)) / 4. It is 0 without the model, and for plants with one equation per channel.
@@ -183,9 +178,8 @@ def product(M, w):
 
 @njit
 def inner(a, b):
-    """Return the sum of a_i b_i, added in the same order in Python and compiled.
-
-    `a @ b` does not promise that.
+    """Return the sum of a_i b_i, added in the same order in Python and compiled. `a @ b` does not
+    promise that.
     """
     total = 0.0
     for i in range(len(a)):
@@ -195,9 +189,8 @@ def inner(a, b):
 
 @njit
 def solve(M, b):
-    """Return M^-1 b for a positive definite M, by Cholesky's factors.
-
-    The bits are the same in Python and compiled.
+    """Return M^-1 b for a positive definite M, by Cholesky's factors. The bits are the same in
+    Python and compiled.
     """
     n = len(b)
     L = np.zeros((n, n))
@@ -223,9 +216,8 @@ def solve(M, b):
 
 @njit
 def torque(y, v):
-    """Return the u for the accelerations v of the errors:
-
-    M (v + r'') + h with the model, v without.
+    """Return the u for the accelerations v of the errors: M (v + r'') + h with the model, v
+    without.
     """
     if y.model == 0.0:
         return v
@@ -240,9 +232,8 @@ def saturate(a):
 
 @njit
 def tanh(a):
-    """Return the hyperbolic tangents of a vector.
-
-    The bits are the same in Python and compiled, unlike numpy's.
+    """Return the hyperbolic tangents of a vector. The bits are the same in Python and compiled,
+    unlike numpy's.
     """
     values = np.zeros(len(a))
     for i in range(len(a)):
@@ -254,14 +245,3 @@ def tanh(a):
 def norm(a):
     """Return the Euclidean norm of a vector. The bits are the same in Python and compiled."""
     return math.sqrt(inner(a, a))
-
-
-@functools.cache
-def catalogue() -> Catalogue[Template]:
-    """Return every law of smc_mujoco.control.joint_laws and of other packages, by name."""
-    return catalogue_of(
-        "smc_mujoco.control.joint_laws",
-        Template,
-        "smc_mujoco.joint_laws",
-        lambda law: law.kind == "law" and law.joint,
-    )

@@ -3,7 +3,7 @@
     @law_function(gains={"lam": 6.0, "k1": 3.0})
     def my_law(y, gains, memory):
         s = y.de + gains.k1 * y.e
-        return -gains.lam * math.tanh(s), s        # commanded control before saturation, sliding variable
+        return -gains.lam * math.tanh(s), s  # command before saturation, sliding variable
 
 The law runs once per control sample. Its u is clipped to +-limit and stays until the next sample. A
 law knows nothing of the simulator, and nothing of the plant except the nominal f and g in its
@@ -17,46 +17,21 @@ nominal model if the scenario gives it to the law, otherwise with f = 0 and g = 
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Unpack, overload
+from typing import Any, Unpack, overload
 
 from numba import njit
 
 from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.control import estimator, joint_law, surface
+from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.component import Component, Options, Template, decorated
+from smc_mujoco.control.measurement import Measurement  # noqa: F401
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 Law = Component
-
-
-class Measurement(NamedTuple):
-    """The inputs of a law: its channel at a sample, in SI units."""
-
-    t: float  # time of the sample
-    dt: float  # control period
-    x: float  # measured position
-    v: float  # measured or estimated velocity
-    e: float  # x - r
-    de: float  # v - r'
-    r: float  # reference
-    dr: float
-    ddr: float
-    f: float  # nominal f(x, v) of x'' = f + g u, at the measured x and v
-    g: float
-    a: float = 0.0  # estimated acceleration; r'' if the estimator gives none
-    limit: float = math.inf  # bound on |u|: u_max, or the limit of the channel's motor
-    model: float = 0.0  # 1 if the scenario lets the law use f and g, else 0
-    has_surface: float = 0.0  # 1 if the scenario has a surface, else 0
-    s: float = 0.0  # sliding variable of the scenario's surface
-    v_eq: float = 0.0  # equivalent control: acceleration of the error that keeps s constant
-    # measured position of the joint without actuator that this one moves; 0 without such a joint
-    q: float = 0.0
-    dq: float = 0.0  # its velocity
-    fq: float = 0.0  # its nominal q'' = fq + gq u
-    gq: float = 0.0
+FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channels are a pose
 
 
 @njit
@@ -183,15 +158,25 @@ def catalogue() -> Catalogue[Template]:
 
 
 @functools.cache
+def joint_catalogue() -> Catalogue[Template]:
+    """Return every law of smc_mujoco.control.joint_laws and of other packages, by name."""
+    return catalogue_of(
+        "smc_mujoco.control.joint_laws",
+        Template,
+        "smc_mujoco.joint_laws",
+        lambda law: law.kind == "law" and law.joint,
+    )
+
+
+@functools.cache
 def known_laws() -> Catalogue[Template]:
     """Return every law of one channel and of many joints, by name."""
-    return catalogue() | joint_law.catalogue()
+    return catalogue() | joint_catalogue()
 
 
 def checked_name(law: Law) -> Law:
-    """Return the law.
-
-    Raise ScenarioError if it is a user's with the name of a law of the catalogue.
+    """Return the law. Raise ScenarioError if it is a user's with the name of a law of the
+    catalogue.
     """
     known = known_laws().get(law.name)
     if known is None or law.function is None:
@@ -203,8 +188,9 @@ def checked_name(law: Law) -> Law:
     if len(names) == 1:
         return law
     package = known_laws().package(law.name)
+    owner = f"package {package!r}" if package else "the library"
     raise ScenarioError(
-        f"your law {law.name!r} has the name of a law of {f'package {package!r}' if package else 'the library'}: "
+        f"your law {law.name!r} has the name of a law of {owner}: "
         f"rename its function, or give law.named('my_{law.name}')"
     )
 
@@ -235,12 +221,9 @@ def suits(law: Law | Template, plant: Plant) -> bool:
     return plant.own and plant.underactuated and any(known.underactuated for known in plants)
 
 
-FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channels are a pose
-
-
 KINDS = {  # of laws and of their parts -> the catalogue
     "law": catalogue,
-    "joint": joint_law.catalogue,
+    "joint": joint_catalogue,
     "surface": surface.catalogue,
     "estimator": estimator.catalogue,
 }

@@ -12,51 +12,27 @@ one joint that saturates, and approximate for several.
 
 # pyright: reportCallIssue=false
 # (the fields of a law's gains are known when it is made)
-import dataclasses
+import functools
 from collections.abc import Callable
 
 from numba import njit
 
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import named
-from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.joint_law import torque
-from smc_mujoco.control.law import Measurement, law_function
-
-_templates: dict[Callable, Template] = {}  # function of an outer law -> its law of many joints
+from smc_mujoco.control.measurement import Measurement
 
 
-def on_computed_torque(law: Component) -> Component:
-    """Return the law of many joints with a law of one channel, and its gains, as its outer law."""
-    if law.joint or law.each or law.template is None or law.plants:
-        raise ScenarioError(
-            f"{law.name} cannot be the outer law of computed torque: give one law of one channel, for all plants"
-        )
-    if (
-        law.template.function not in _templates
-    ):  # one function for each law, so that equal laws are equal
-        _templates[law.template.function] = _template(law.template)
-    template = _templates[law.template.function]
-    made = template.bind(
-        {name: value for name, value in law.gains.items() if name in template.gains}
-    )
-    return made.sourced(law.source.kind, law.source.search)
+@functools.cache  # one function for each law, so that equal laws are equal
+def on_computed_torque(function: Callable, gains: tuple[str, ...], values: str) -> Callable:
+    """Return the function of the law of many joints whose outer law is a function of one channel.
 
-
-def _template(outer: Template) -> Template:
-    """Return the template of a law of many joints with this one as its outer law."""
-    inner = njit(outer.function)
-    names = tuple(outer.gains)
-    # the plant is e'' = v
-    own = {}
-    for name, gain in outer.gains.items():
-        if not gain.plant:
-            own[name] = gain
-    values = ", ".join(
-        f"gains.{name}[i]" if name in own else f"{gain.default!r}"
-        for name, gain in outer.gains.items()
-    )
-    space = {"Gains": named(names), "inf": float("inf")}
+    Args:
+      function: of the outer law.
+      gains: the names of its gains.
+      values: what these are for joint i, separated by commas, in terms of `gains` and `i`.
+    """
+    outer = njit(function)
+    space = {"Gains": named(gains), "inf": float("inf")}
     exec(f"def of_joint(gains, i): return Gains({values})", space)
     of_joint = njit(space["of_joint"])
 
@@ -64,7 +40,6 @@ def _template(outer: Template) -> Template:
         v = 0.0 * y.e
         s = 0.0 * y.e
         for i in range(len(v)):
-            bound = max(y.limit[i] - abs(y.h[i]), 0.0) / y.M[i, i]
             seen = Measurement(
                 y.t,
                 y.dt,
@@ -74,12 +49,12 @@ def _template(outer: Template) -> Template:
                 y.de[i],
                 y.r[i],
                 y.dr[i],
-                0.0,
+                0.0,  # r'', f and g: the plant is e'' = v
                 0.0,
                 1.0,
                 y.a[i] - y.ddr[i],
-                bound,
-                1.0,
+                max(y.limit[i] - abs(y.h[i]), 0.0) / y.M[i, i],
+                1.0,  # of the model
                 0.0,
                 0.0,
                 0.0,
@@ -88,18 +63,12 @@ def _template(outer: Template) -> Template:
                 0.0,
                 0.0,
             )
-            v[i], s[i] = inner(seen, of_joint(gains, i), memory[i])
+            v[i], s[i] = outer(seen, of_joint(gains, i), memory[i])
         return torque(y, v), s
 
-    law.__name__ = law.__qualname__ = f"{outer.name}_computed_torque"
-    law.__doc__ = f"Computed torque with {outer.label or outer.name} as its outer law, see smc_mujoco.control.outer_law."
-    made = law_function(
-        joint=True,
-        family=outer.family,
-        continuous=outer.continuous,
-        requires_model=True,
-        gains=own,
-        memory=outer.memory,
-        label=f"{outer.label or outer.name} on computed torque",
-    )(law)
-    return dataclasses.replace(made, conditions=outer.conditions, accuracy=outer.accuracy)
+    law.__name__ = law.__qualname__ = f"{function.__name__}_computed_torque"
+    law.__doc__ = (
+        f"Computed torque with {function.__name__} as its outer law, "
+        "see smc_mujoco.control.outer_law."
+    )
+    return law

@@ -1,26 +1,25 @@
 """A component as JSON data and back."""
 
-import importlib
-import importlib.util
 from collections.abc import Mapping
 from typing import Any
 
+from smc_mujoco.common import annexes
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws
 
-ANNEXES = (
-    "smc_mujoco.evidence",
-    "smc_mujoco.benchmark",
-)  # with laws that are not in the catalogue, as those of rigs
+ANNEXES = ("evidence", "benchmark")  # with laws that are not in the catalogue, as those of rigs
 
 
 def describe(c: Component) -> dict[str, Any]:
     """Return a component as plain data that JSON represents without loss."""
     if c.each:
         return {"name": c.name, "each": [describe(law) for law in c.each]}
-    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory} | {
+    return {
+        "name": c.name,
+        "gains": dict(c.gains),
+        "memory": c.memory,
         "degree": c.relative_degree,
         "module": getattr(c.function, "__module__", ""),
     }
@@ -34,10 +33,7 @@ def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
         made = by_channel([law(item, source) for item in data["each"]])
     else:
         made = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
-    if source is None:
-        restored = sources.Source(kind=sources.YOURS)
-    else:
-        restored = sources.restore(source)
+    restored = sources.Source(kind=sources.YOURS) if source is None else sources.restore(source)
     return made.sourced(restored.kind, restored.search)
 
 
@@ -46,12 +42,9 @@ def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> C
     known ones.
     """
     module = data["module"]
-    template = known.get(data["name"])
-    # a law may have another name, see `named`
-    if template is None:
-        candidates = known.own.values()
-    else:
-        candidates = [template]
+    candidates = known.own.values()  # a law may have another name, see `named`
+    if data["name"] in known:
+        candidates = [known[data["name"]]]
     for template in candidates:
         if template.function.__module__ == module and {*data["gains"]} <= {*template.gains}:
             component = template.bind(data["gains"])
@@ -64,8 +57,9 @@ def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> C
 
 def _laws_of_annex(module: str) -> dict[str, Template]:
     """Return the laws of a module of an annex, by name; none of another module."""
-    annex = ".".join(module.split(".")[:2])
-    if annex not in ANNEXES or not importlib.util.find_spec(annex):
+    package, _, rest = module.partition(".")
+    annex = rest.partition(".")[0]
+    if package != "smc_mujoco" or annex not in ANNEXES or not annexes.installed(annex):
         return {}
-    values = vars(importlib.import_module(module)).values()
+    values = vars(annexes.module(module, "a law")).values()
     return {value.name: value for value in values if isinstance(value, Template)}

@@ -2,7 +2,7 @@
 
     smc.law("classical").source                            # default
     smc.law("classical", k=3).source                       # yours
-    smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA, 12 searches, ...)
+    smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA, ...)
 
 A source belongs to one set of gains. A law whose gains are replaced has the source "yours".
 """
@@ -31,21 +31,14 @@ KINDS = {
     YOURS: "given by the user",
 }
 
-MAX_SPREAD = 1.0  # larger ones are told as a multiple
 
-
-def spread_in_words(searches: int, spread: float, fewest: int = 0) -> str:
-    """Return how far J of searches differ: "12 searches, J up to 4.1 % above the least"; "3 to 12
-    ..." of some laws.
-    """
-    number = f"{fewest} to {searches}" * (fewest not in (0, searches)) or f"{searches}"
-    if number == "1":
+def spread_in_words(searches: int, spread: float) -> str:
+    """Return how far J of searches differ: "12 searches, J up to 4.1 % above the least"."""
+    if searches == 1:
         return "1 search"
-    if spread < MAX_SPREAD:
-        above = f"{100.0 * spread:.2g} % above"
-    else:
-        above = f"{1.0 + spread:.2g} times"
-    return f"{number} searches, J up to {above} the least"
+    if spread < 1.0:
+        return f"{searches} searches, J up to {100.0 * spread:.2g} % above the least"
+    return f"{searches} searches, J up to {1.0 + spread:.2g} times the least"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -57,19 +50,20 @@ class Search:
     searches: int = 1  # their number; each shares nothing with the others
     # by how much the largest J that one of them ended with exceeds the least, as a share of it
     spread: float = 0.0
-    about_defaults: bool = (
-        False  # whether they were drawn about the law's defaults, because a gain has no unit
-    )
+    # whether they were drawn about the law's defaults, because a gain has no unit
+    about_defaults: bool = False
 
     @property
     def name(self) -> str:
         """The name of the rule."""
-        return (
-            re.split("[(,:;]", self.rule)[0].rstrip() + " about the defaults" * self.about_defaults
-        )
+        name = re.split("[(,:;]", self.rule)[0].rstrip()
+        if self.about_defaults:
+            return f"{name} about the defaults"
+        return name
 
     def __str__(self) -> str:
-        return f"{self.name}, {self.evaluations} evaluations, {spread_in_words(self.searches, self.spread)}"
+        spread = spread_in_words(self.searches, self.spread)
+        return f"{self.name}, {self.evaluations} evaluations, {spread}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -115,65 +109,36 @@ def kinds(sources: Iterable[Source]) -> str:
 
 
 def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
-    """Return where the gains of laws come from: "gains: shipped (...)", or "gains: a and b default,
-    c yours".
+    """Return where the gains of laws come from, see `by_words`; of one law with its search.
 
     `sources` maps a law to the sources of its gains; laws without gains are left out.
     """
-    with_gains = {
-        law: [source for source in all_ if source.kind != NONE] for law, all_ in sources.items()
-    }
-    words = {law: kinds(of_law) for law, of_law in with_gains.items()}
-    for kind in dict.fromkeys(words.values()):
-        of_kind = [law for law in words if words[law] == kind]
-        searches = {}
-        for law in of_kind:
-            searches[law] = [source.search for source in with_gains[law] if source.search]
-        if any(searches.values()):
-            words |= {law: f"{kind} ({_search_text(searches)})" for law in of_kind if searches[law]}
+    if len(sources) == 1:
+        words = {law: ", ".join(dict.fromkeys(map(str, its))) for law, its in sources.items()}
+    else:
+        words = {law: kinds(its) for law, its in sources.items()}
     return by_words(words)
 
 
-def _search_text(searches: Mapping[str, Sequence[Search]]) -> str:
-    """Return the searches of several laws in words."""
-    every = []
-    for of_law in searches.values():
-        for search in of_law:
-            every.append(search)
-    evaluations = sorted({search.evaluations for search in every})
-    counts = [search.searches for search in every]
-    text = f"{' or '.join(dict.fromkeys(search.name for search in every))}, "
-    text += (
-        f"{' to '.join(map(str, dict.fromkeys([evaluations[0], evaluations[-1]])))} evaluations, "
-    )
-    return text + spread_in_words(max(counts), max(search.spread for search in every), min(counts))
-
-
 def untuned_laws(words: Mapping[str, str]) -> list[str]:
-    """Return a list of one sentence on laws with default gains that are compared with tuned ones,
-    else [].
+    """Return a list of one sentence if laws with default gains are compared with tuned ones.
 
-    `words` maps a law to where its gains come from, see `kinds`.
+    Otherwise the list is empty. `words` maps a law to where its gains come from, see `kinds`.
     """
     default = [law for law, kind in words.items() if DEFAULT in kind.split(", ")]
     tuned = [law for law, kind in words.items() if kind in (TUNED, SHIPPED)]
     if not default or not tuned:
         return []
-    if len(default) == 1:
-        have = "has its default gains"
-        them = "it"
-    else:
-        have = "have their default gains"
-        them = "them"
-    are = "is" if len(tuned) == 1 else "are"
     return [
-        f"{joined(default)} {have}, {joined(tuned)} {are} tuned: tune {them} too (smc-mujoco tune)"
+        f"default gains: {joined(default)}; tuned: {joined(tuned)}. "
+        "Tune all of them (smc-mujoco tune)"
     ]
 
 
 def by_words(words: Mapping[str, str]) -> str:
-    """Return law -> where its gains come from as one text, see `in_words`; "" stands for a law
-    without gains.
+    """Return "gains: shipped", or "gains: a and b default, c yours", from law -> its gains' source.
+
+    A law without gains has the source "" or "none", and is left out.
     """
     laws: dict[str, list[str]] = {}
     for law, kind in words.items():

@@ -1,7 +1,6 @@
 """Gains and their units.
 
-    @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "order":
-    Gain(2.0, held=True)})
+    @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)})
 
 A unit is a product of powers of force F, position X and time T. Tuning derives the bounds of each
 gain from its unit and from F, X and T of the plant (`smc_mujoco.analysis.tuning.search_space`).
@@ -63,18 +62,15 @@ class Gain:
     nonnegative: bool = False  # whether it must be at least 0
     # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
     held: bool = False
-    over: str | None = (
-        # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
-        None
-    )
+    # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
+    over: str | None = None
     # "a1", "a2" or "b" of x'' = a1 x + a2 x' + b u near the plant's origin, which a scenario puts
     # in place of inf
     plant: str = ""
     # whether it is one number for all joints in a law of many joints, instead of a vector
     shared: bool = False
-    turns: bool = (
-        False  # whether it is of the attitude, in a law of free bodies, and not of the position
-    )
+    # whether it is of the attitude, in a law of free bodies, and not of the position
+    turns: bool = False
 
     @property
     def constraint(self) -> Each:
@@ -92,5 +88,5 @@ class Gain:
 
 
 def force_per(exponent: str) -> Formula:
-    """Return the unit of k in the force k [s]^exponent, where the exponent is a gain of that name."""
+    """Return the unit of k in the force k [s]^exponent; the exponent is a gain of that name."""
     return lambda g: Unit(force=1, position=-getattr(g, exponent), time=getattr(g, exponent))

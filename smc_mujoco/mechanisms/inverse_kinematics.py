@@ -1,10 +1,11 @@
 """Inverse kinematics: positions of joints at which a tip (a site or a body) is where it should be.
 
 Levenberg's method with MuJoCo's Jacobians: dx = J' (J J' + mu)^-1 e, mu = |e|^2 / 100, at most 0.3
-rad or m a step. It converges quadratically where J has full rank, and stays bounded where the arm
-is stretched. MuJoCo's Jacobians are exact and at hand; a package such as mink would add a solver of
-quadratic programs, which this problem does not need. Joints stay within their ranges. Joints
-without a channel stay in the pose in which runs start.
+rad or m a step.
+It converges quadratically where J has full rank, and stays bounded where the arm is stretched.
+MuJoCo's Jacobians are exact and at hand; a package such as mink would add a solver of quadratic
+programs, which this problem does not need. Joints stay within their ranges. Joints without a
+channel stay in the pose in which runs start.
 """
 
 from collections.abc import Sequence
@@ -71,7 +72,8 @@ def solve(
         else:
             there = ", ".join(f"{value:.4g}" for value in point)
             raise ScenarioError(
-                f"the tip of {plant.name} does not reach ({there}) m, point {i} of {len(points)} on its path: it "
+                f"the tip of {plant.name} does not reach ({there}) m, "
+                f"point {i} of {len(points)} on its path: it "
                 f"stays {np.linalg.norm(away):.3g} m away; give points within reach, or another x0"
             )
         path.append(x)

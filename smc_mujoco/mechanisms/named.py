@@ -34,15 +34,15 @@ def as_plant(value: object) -> Plant:
         made = value
     if not isinstance(made, Plant):
         raise ScenarioError(
-            f"plant is {shown(made)}: give a name that smc.plants() lists, smc.plant(...), or FILE.xml:joint,joint"
+            f"plant is {shown(made)}: give a name that smc.plants() lists, smc.plant(...), "
+            "or FILE.xml:joint,joint"
         )
     return made
 
 
 def jointed(value: object, analysis: str) -> Plant:
-    """Return a plant as `as_plant` does.
-
-    Refuse a free body, whose channels are no joints, to an analysis of joints.
+    """Return a plant as `as_plant` does. Refuse a free body, whose channels are no joints, to an
+    analysis of joints.
     """
     made = as_plant(value)
     if made.pose:
@@ -65,7 +65,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         if set(text) & set(":./\\"):
             file = text.partition(":")[0]
             raise ScenarioError(
-                f"plant {text!r}: {file!r} ends in none of .xml, .mjcf and .urdf: give FILE.xml:joint"
+                f"plant {text!r}: {file!r} ends in none of .xml, .mjcf and .urdf: "
+                "give FILE.xml:joint"
             )
         return plant(text, **values)
     from smc_mujoco.mechanisms.custom.plant_from import plant_from

@@ -94,9 +94,9 @@ class Native(NamedTuple):
 
 
 class Dynamics(NamedTuple):
-    """The nominal M x'' + h = force of all channels:
+    """The nominal M x'' + h = force of all channels.
 
-    M (n, n), h (n,), and g (n,), the h at rest.
+    M is (n, n), h (n,), and g (n,), the h at rest.
     """
 
     M: np.ndarray
@@ -199,8 +199,11 @@ class Plant:
             )
 
     def __repr__(self) -> str:
-        values = [f"{name}={value:g}" for name, value in self.parameters.items()]
-        return f"plant({', '.join([repr(self.name), *([f'n={self.n}'] if self.n > 1 else []), *values])})"
+        values = [repr(self.name)]
+        if self.n > 1:
+            values.append(f"n={self.n}")
+        values += [f"{name}={value:g}" for name, value in self.parameters.items()]
+        return f"plant({', '.join(values)})"
 
     @property
     def positive(self) -> frozenset[str]:
@@ -219,9 +222,8 @@ class Plant:
 
     @property
     def driven(self) -> int:
-        """The number of channels with an actuator, which come first.
-
-        Each has at most one partner without actuator.
+        """The number of channels with an actuator, which come first. Each has at most one partner
+        without actuator.
         """
         return self.n // 2 if self.underactuated else self.n
 
@@ -299,9 +301,8 @@ class Plant:
         return model
 
     def change(self, factors: Mapping[str, float]) -> str:
-        """Return a change of the parameters in words: "m × 1.3, payload + 2 kg".
-
-        Factors are those of `values`.
+        """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those
+        of `values`.
         """
         return ", ".join(
             f"{name} {'−' if factor < 0.0 else '+'} {abs(factor):g} {self.added[name]}".rstrip()

@@ -428,7 +428,7 @@ def test_a_table_says_which_law_has_its_defaults_beside_tuned_ones():
     )
     short = smc.Scenario(plant="duffing", duration=0.1, law="none")
     found = [smc.worst_case(dataclasses.replace(short, law=law), budget=1) for law in laws]
-    said = "pid has its default gains, classical is tuned: tune it too (smc-mujoco tune)"
+    said = "default gains: pid; tuned: classical. Tune all of them (smc-mujoco tune)"
     assert WorstCases(found).notes[-1] == said
     assert not any("default" in note for note in WorstCases([found[0], found[2]]).notes)
 

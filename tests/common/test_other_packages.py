@@ -16,7 +16,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import catalogue
 from smc_mujoco.common.errors import find
-from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
+from smc_mujoco.control import estimator, gain_sets, law, surface
 from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
 from smc_mujoco.studies import run_key, scene
@@ -27,7 +27,7 @@ CACHED = (
     catalogue._points,
     law.catalogue,
     law.known_laws,
-    joint_law.catalogue,
+    law.joint_catalogue,
     surface.catalogue,
     estimator.catalogue,
     plant.catalogue,

@@ -13,7 +13,7 @@ import pytest
 from helpers.words import recorded
 
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.control import estimator, joint_law, surface
+from smc_mujoco.control import estimator, surface
 from smc_mujoco.control import law as laws
 from smc_mujoco.control.component import gain_text
 from smc_mujoco.control.estimator import Reading
@@ -23,10 +23,13 @@ from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
 
-KINDS = {"law": laws, "joint law": joint_law, "surface": surface, "estimator": estimator}
-TEMPLATES = {
-    f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room.catalogue().items()
+KINDS = {
+    "law": laws.catalogue,
+    "joint law": laws.joint_catalogue,
+    "surface": surface.catalogue,
+    "estimator": estimator.catalogue,
 }
+TEMPLATES = {f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room().items()}
 COUNT = 60
 DT = 0.05
 JOINTS = 3

@@ -126,21 +126,14 @@ def test_laws_with_equal_gains_are_equal():
     assert default.source != same.source
 
 
-def test_searches_of_several_laws_are_one_phrase():
-    first, other = (
-        source.Search(rule="CMA-ES", evaluations=30 * n, searches=n, spread=n / 100)
-        for n in (3, 12)
-    )
-    laws = {
-        "a": [smc.law("pid").sourced("shipped", first).source],
-        "b": [smc.law("pid").sourced("shipped", other).source],
-    }
-    assert source.in_words(laws) == (
-        "gains: shipped (CMA-ES, 90 to 360 evaluations, 3 to 12 searches, J up to 12 % above the least)"
-    )
-    assert source.in_words({"a": laws["a"]}) == (
+def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their_kind():
+    search = source.Search(rule="CMA-ES", evaluations=90, searches=3, spread=0.03)
+    shipped = [smc.law("pid").sourced("shipped", search).source]
+    assert source.in_words({"a": shipped}) == (
         "gains: shipped (CMA-ES, 90 evaluations, 3 searches, J up to 3 % above the least)"
     )
+    others = {"a": shipped, "b": [smc.law("pid").source], "c": [smc.law("none").source]}
+    assert source.in_words(others) == "gains: a shipped, b default"
 
 
 def test_an_unknown_kind_is_refused():

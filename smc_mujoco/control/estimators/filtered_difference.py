@@ -2,8 +2,8 @@
 dt).
 
 This is tau v' + v = x' discretised by the backward Euler method: a first-order lag. tau = 0 gives
-the plain difference. The first estimate is 0, because there is no earlier position. Gains: tau,
-time constant of the lag [s].
+the plain difference. The first estimate is 0, because there is no earlier position.
+Gains: tau, time constant of the lag [s].
 """
 
 from smc_mujoco.control.estimator import estimator_function

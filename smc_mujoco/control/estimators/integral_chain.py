@@ -7,8 +7,10 @@ filtered by w^3 / (p + w)^3, 3 / w late. For small w h, white noise passes to x2
 sqrt(h w^3) / 4 and to x3 with sqrt(3 h w^5) / 4. All poles are at -w; in the source epsilon is 1 /
 w and the coefficients are 1, 3, 3. The discretisation is exact for readings joined by straight
 lines: the matrix exponential of a triple pole is exp(-w h) (1 + N h + N^2 h^2 / 2) with N = A + w.
-It starts from the first reading, at rest. Gains: w, bandwidth [1/s]. Source: J. Liu & X. Wang,
-Advanced Sliding Mode Control for Mechanical Systems, Springer 2012, section 8.5, eq. 8.37.
+It starts from the first reading, at rest.
+Gains: w, bandwidth [1/s].
+Source: J. Liu & X. Wang, Advanced Sliding Mode Control for Mechanical Systems, Springer 2012,
+section 8.5, eq. 8.37.
 """
 
 import math

@@ -1,20 +1,21 @@
 """Steady Kalman filter of x''' = white noise of density q, x read under noise of standard deviation
 sigma:
 
-    predict z = (1, h, h^2/2; 0, 1, h; 0, 0, 1) z;  z += (alpha, beta / h, 2 gamma / h^2) (x - z_1);
-    gives (z_2, z_3)
+    predict z = (1, h, h^2/2; 0, 1, h; 0, 0, 1) z
+    z += (alpha, beta / h, 2 gamma / h^2) (x - z_1);  gives (z_2, z_3)
 
 This is the linear estimator of least variance for that model. Its gains have a closed form. The
 innovation's spectrum times |z-1|^6 is, up to a factor, P(z) P(1/z) = m^3 + lam (1 - m/4 + m^2/120)
 with m = 2 - z - 1/z and lam = q h^5 / sigma^2. The roots of P are the three roots inside the unit
 circle, and P(z) = (z-1)^3 + alpha (z-1)^2 + beta z (z-1) + gamma z (z+1). For small h they lie on a
 circle of radius (q / (sigma^2 h))^(1/6) rad/s, 100 for the defaults at 1 ms. Parabolas are tracked
-exactly once the start has decayed. The filter starts from the first reading, at rest. Gains: sigma,
-noise of the reading [m]; q, density of the jerk [(m/s^3)^2 s]. Only q / sigma^2 matters. Sources:
-R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82(1):35,
-1960; P. Kalata, "The tracking index: a generalized parameter for alpha-beta and alpha-beta-gamma
-target trackers", IEEE Trans. Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains by one index);
-the factorisation is worked out here.
+exactly once the start has decayed. The filter starts from the first reading, at rest.
+Gains: sigma, noise of the reading [m]; q, density of the jerk [(m/s^3)^2 s]. Only q / sigma^2
+matters.
+Sources: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng.
+82(1):35, 1960; P. Kalata, "The tracking index: a generalized parameter for alpha-beta and
+alpha-beta-gamma target trackers", IEEE Trans. Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains
+by one index); the factorisation is worked out here.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Levant's robust exact differentiator of order n = 1, 2, 3 (with n = 1 the super-twisting one):
 
-    z_i' = -m_i L^((i+1)/(n+1)) [z_0 - x]^((n-i)/(n+1)) + z_(i+1), i = 0 .. n, z_(n+1) = 0;  gives
-    (z_1, z_2)
+    z_i' = -m_i L^((i+1)/(n+1)) [z_0 - x]^((n-i)/(n+1)) + z_(i+1), i = 0 .. n, z_(n+1) = 0
+    gives (z_1, z_2)
 
 The estimates are exact after a finite time if |d^(n+1) x / dt^(n+1)| <= L. Sampled, the error of
 z_i is O(L h^(n+1-i)). Under noise |eta| <= eps it is O(L^(i/(n+1)) eps^((n+1-i)/(n+1))), the best
@@ -16,10 +16,11 @@ from -U to U, 2 g U / tau, for U = 6, g = 8 of the study's lightest plants and t
 of its realistic conditions. A smaller L fails on rougher signals, a larger one amplifies noise. At
 a control period of 20 ms the error O(L h^2) is several units, so choose a smaller L there. If the
 acceleration is used, L should be little above the plant's own largest jerk. Gains: L, bound on the
-derivative of order n + 1 [m/s^(n+1)]; order, n. Sources: A. Levant, "Robust exact differentiation
-via sliding mode technique", Automatica 34(3):379, 1998 (n = 1); A. Levant, "Higher-order sliding
-modes, differentiation and output-feedback control", Int. J. Control 76(9):924, 2003; M. Livne & A.
-Levant, "Proper discretization of homogeneous differentiators", Automatica 50(8):2007, 2014.
+derivative of order n + 1 [m/s^(n+1)]; order, n.
+Sources: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379,
+1998 (n = 1); A. Levant, "Higher-order sliding modes, differentiation and output-feedback control",
+Int. J. Control 76(9):924, 2003; M. Livne & A. Levant, "Proper discretization of homogeneous
+differentiators", Automatica 50(8):2007, 2014.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Savitzky-Golay, causal: derivatives, at the last of `window` readings, of their least-squares
 polynomial of `degree`.
 
-    velocity = sum_i c_i x_i,  c_i = sum_m p_m(t_i) p_m'(t_N) / |p_m|^2,  m = 0 .. degree;
+    velocity = sum_i c_i x_i,  c_i = sum_m p_m(t_i) p_m'(t_N) / |p_m|^2,  m = 0 .. degree
     acceleration with p_m''
 
 p_m are the polynomials orthogonal on the window's N samples (Gram's): p_(m+1) = t p_m - b_m
@@ -9,10 +9,11 @@ p_(m-1), |p_m|^2 = N b_1 .. b_m, b_m = m^2 (N^2 - m^2) / (4 (4 m^2 - 1)). Polyno
 are exact once they fill the window. On smooth signals the error of the velocity is O(h^degree).
 White noise of x passes with the gain |c|, for degree 2 sqrt(12 (2N-1) (8N-11) / (N (N^2-1)
 (N^2-4))) / h. Until the window is full, the first reading fills it. Window and degree are rounded
-down, and limited to 2 .. 128 and 1 .. window - 1. Gains: window, number of readings; degree, of the
-polynomial. Sources: A. Savitzky & M. Golay, "Smoothing and differentiation of data by simplified
-least squares procedures", Anal. Chem. 36(8):1627, 1964; P. Gorry, "General least-squares smoothing
-and differentiation by the convolution (Savitzky-Golay) method", Anal. Chem. 62(6):570, 1990 (Gram
+down, and limited to 2 .. 128 and 1 .. window - 1.
+Gains: window, number of readings; degree, of the polynomial.
+Sources: A. Savitzky & M. Golay, "Smoothing and differentiation of data by simplified least squares
+procedures", Anal. Chem. 36(8):1627, 1964; P. Gorry, "General least-squares smoothing and
+differentiation by the convolution (Savitzky-Golay) method", Anal. Chem. 62(6):570, 1990 (Gram
 polynomials, end points).
 """
 
@@ -20,8 +21,9 @@ from smc_mujoco.control.estimator import estimator_function
 from smc_mujoco.control.units import Gain
 
 MAX_READINGS = 128  # readings in memory
+WHOLE = f"whole window and degree, and 1 <= degree < window <= {MAX_READINGS}"
 CONDITIONS = {
-    f"whole window and degree, and 1 <= degree < window <= {MAX_READINGS}, else rounded down and limited": lambda g: (
+    f"{WHOLE}, else rounded down and limited": lambda g: (
         g.window == int(g.window)
         and g.degree == int(g.degree)
         and 1 <= g.degree < g.window <= MAX_READINGS

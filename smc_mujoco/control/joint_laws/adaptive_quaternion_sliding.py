@@ -1,6 +1,5 @@
-"""Adaptive quaternion sliding mode:
-
-K' = G |s| tanh(rho |s| - eps), for a free body such as a quadrotor.
+"""Adaptive quaternion sliding mode: K' = G |s| tanh(rho |s| - eps), for a free body such as a
+quadrotor.
 
     K' = G |s| tanh(rho |s| - eps) if K > K0, else mu;  K <= K_up;  K = K0 at the start.
 
@@ -8,26 +7,28 @@ It is `quaternion_sliding` whose K, for each axis, grows where |s| is large: of 
 = e' + c e, and of the attitude with s = we + lam sgn(q0) qv. So K falls where |s| is below eps /
 rho, 0.025 rad/s and 0.0011 m/s by default. Steady errors are those of `quaternion_sliding` with the
 K that was reached. K moves slowly: with the published Gx, a payload of 6 g on 32 g still costs 0.34
-m after 10 s. Proved in the source: bounded in the end from every attitude, without unwinding, K
-without overgrowth.
+m after 10 s.
+Proved in the source: bounded in the end from every attitude, without unwinding, K without
+overgrowth.
 The public code differs from its text in six places, and here, one by one:
 (a) it multiplies by the period where it differentiates the path, so that jerk and snap do not
-count: here the jerk is
-    r'' from sample to sample, and the snap, with all of the change of wd, is left out, see
-    control/attitude.py;
+    count: here the jerk is r'' from sample to sample, and the snap, with all of the change of wd,
+    is left out, see control/attitude.py;
 (b) it never stores its acceleration of the sample before: here the filter of e' keeps its state;
 (c) it takes a measured acceleration in g beside one in m/s^2: here all is in SI units;
 (d) it integrates K over 4 times the time that passes, of the position 2.5 times: here G and mu are
-per second, so that
-    K grows more slowly than it flew;
+    per second, so that K grows more slowly than it flew;
 (e) at K_up it puts K back to K0, which lets go when the disturbance is largest: here K stays at
-K_up; (f) its first 10 calls take Rd = 1: here none does. Gains: c and cz [1/s], slopes of the
-position's surface, of x and y and of z; Kx and Kz [m/s^2], its K0; rhox [s/m], its slope in tanh;
-Gx [1/s^2], its rate; mux [m/s^3], its creep; epsx, its dead zone; Kx_up [m/s^2], its bound; lam and
-lamz [rad/s], slopes of the attitude's surface, of roll and pitch and of yaw; K [rad/s^2], its K0;
-rho [s/rad], its slope in tanh; G [1/s^2], its rate; mu [rad/s^3], its creep; eps, its dead zone;
-K_up [rad/s^2], its bound. Defaults of the source's code for a Crazyflie. Source: A. Yazdanshenas &
-R. Faieghi, "Adaptive quaternion sliding mode control", arXiv 2508.06568, and its code.
+K_up;
+(f) its first 10 calls take Rd = 1: here none does.
+Gains: c and cz [1/s], slopes of the position's surface, of x and y and of z; Kx and Kz [m/s^2], its
+K0; rhox [s/m], its slope in tanh; Gx [1/s^2], its rate; mux [m/s^3], its creep; epsx, its dead
+zone; Kx_up [m/s^2], its bound; lam and lamz [rad/s], slopes of the attitude's surface, of roll and
+pitch and of yaw; K [rad/s^2], its K0; rho [s/rad], its slope in tanh; G [1/s^2], its rate; mu
+[rad/s^3], its creep; eps, its dead zone; K_up [rad/s^2], its bound. Defaults of the source's code
+for a Crazyflie.
+Source: A. Yazdanshenas & R. Faieghi, "Adaptive quaternion sliding mode control", arXiv 2508.06568,
+and its code.
 """
 
 import numpy as np

@@ -1,7 +1,8 @@
 """The firmware's cascade of PIDs: torque = J (Pr (w* - w) + Ir int(w* - w) + Dr (w* - w)'), for a
 free body.
 
-    v* = clip(P (r - x) + I int(r - x), speed),    F / m = Pv (v* - v) + Iv int(v* - v) + g,    tilt of F below `tilt`
+    v* = clip(P (r - x) + I int(r - x), speed)
+    F / m = Pv (v* - v) + Iv int(v* - v) + g,    tilt of F below `tilt`
     w* = Pa a + Ia int(a) + Da a'
 
 with a = -2 sgn(q0) qv, which is near the firmware's roll, pitch and yaw where the tilt is small,
@@ -12,21 +13,26 @@ units of its PWM. One of these is 0.12 N / 65535 a motor: 4 of them in thrust, 2
 of them = 1.191e-7 N m in roll, with the lever a = 0.03253 m, 4 c of them = 5.383e-8 N m in yaw, c =
 0.00735 m:
 
-    rate          P 250, I 500, D 2.5      x 180 / pi x 1.191e-7 / 16.57e-6  = 103.0, 206.0, 1.030  up to 33.3 deg
-    rate of yaw   P 120, I 16.7            x 180 / pi x 5.383e-8 / 29.26e-6  = 12.65, 1.760         up to 166.7 deg
-    angle         P 6, I 3; yaw 6, 1, D 0.35, as they are                                      up to 20; 360 deg s
-    velocity      P 25, I 1                x pi / 180 x 9.81                 = 4.280, 0.1712        of degrees of tilt
-    climb         P 25, I 15 thousand      x 4000 x 0.12 / 65535 / 0.0319    = 5.740, 3.444
-    position      P 2; height P 2, I 0.5; speed 1 m/s, tilt 20 degrees, least thrust 20,000 of 42,700 PWM in hover
+    rate         P 250, I 500, D 2.5  x 180 / pi x 1.191e-7 / 16.57e-6 = 103.0, 206.0, 1.030
+    rate of yaw  P 120, I 16.7        x 180 / pi x 5.383e-8 / 29.26e-6 = 12.65, 1.760
+    angle        P 6, I 3; yaw 6, 1, D 0.35, as they are
+    velocity     P 25, I 1            x pi / 180 x 9.81                = 4.280, 0.1712
+    climb        P 25, I 15 thousand  x 4000 x 0.12 / 65535 / 0.0319   = 5.740, 3.444
+    position     P 2; height P 2, I 0.5
+
+The rate's integral is held within 33.3 degrees, that of the yaw's rate within 166.7, that of the
+angle within 20 degrees s, of the yaw 360. The velocity loop gives degrees of tilt. The speed is at
+most 1 m/s, the tilt 20 degrees, and the least thrust 20,000 of the 42,700 PWM in hover.
 
 In the firmware a base of 36,000 PWM and the integral carry the weight, here the model does. There
 the inner loops run at 500 Hz and the outer ones at 100 Hz, here all at each sample. Neither adds w
-x J w. Gains: P and Pz [1/s], of the position, z the height; Iz [1/s^2], of its integral; Pv and Pvz
-[1/s], of the velocity; Iv and Ivz [1/s^2], of its integral; Pa and Paz [1/s], of the attitude, z
-the yaw; Ia and Iaz [1/s^2], of its integral; Daz, of the yaw's rate; Pr and Prz [1/s], of the rate;
-Ir and Irz [1/s^2], of its integral; Dr, of its change; speed [m/s], bound of v*; tilt [rad], bound
-of the tilt. Source: Bitcraze, crazyflie-firmware, controller_pid.c and platform_defaults.h, numbers
-alone.
+x J w.
+Gains: P and Pz [1/s], of the position, z the height; Iz [1/s^2], of its integral; Pv and Pvz [1/s],
+of the velocity; Iv and Ivz [1/s^2], of its integral; Pa and Paz [1/s], of the attitude, z the yaw;
+Ia and Iaz [1/s^2], of its integral; Daz, of the yaw's rate; Pr and Prz [1/s], of the rate; Ir and
+Irz [1/s^2], of its integral; Dr, of its change; speed [m/s], bound of v*; tilt [rad], bound of the
+tilt.
+Source: Bitcraze, crazyflie-firmware, controller_pid.c and platform_defaults.h, numbers alone.
 """
 
 import math

@@ -4,9 +4,11 @@ sat(a) = min(max(a, -1), 1). With the perfect model each joint obeys s' = -k sat
 d_a = M^-1 d, whatever the others do. While |s| > width, |s| falls at the rate k, so it reaches
 width at the time (|s(0)| - width) / k. Then s decays at the rate k / width. If |d_a| <= D < k, then
 |s| <= width D / k and |e| <= width D / (k c) remain. A boundary layer of a width below k dt
-chatters. Gains: k, switching gain [rad/s^2]; c, slope of the surface [1/s]; width, of the boundary
-layer [rad/s]. Source: J.-J. E. Slotine & W. Li, Applied Nonlinear Control, Prentice Hall 1991,
-sections 7.1 and 9.1.
+chatters.
+Gains: k, switching gain [rad/s^2]; c, slope of the surface [1/s]; width, of the boundary layer
+[rad/s].
+Source: J.-J. E. Slotine & W. Li, Applied Nonlinear Control, Prentice Hall 1991, sections 7.1 and
+9.1.
 """
 
 from smc_mujoco.control.joint_law import saturate, torque

@@ -14,13 +14,15 @@ The friction of the wall is a disturbance d = -J' t phi along a direction t with
 cancels it, f = force. Other disturbances along n, such as the friction of the joints, change the
 force for every k, because the law does not measure the force. The law compensates f1 / (1 + exp(-f2
 (v + f3))) - f1 / (1 + exp(-f2 f3)), the friction that C. Gaz et al. identified for a Panda. Without
-contact the tip moves along n at the speed force / B. Gains: force, wanted normal force [N]; nx, ny,
-nz, direction in which the tip presses, in the world's frame; B, damping along n [N s/m]; c, slope
-of the surface [1/s]; k, switching gain [rad/s^2]; width, of the boundary layer [rad/s]; f1, f2, f3,
-of the joints' friction [N m, s/rad, rad/s]. Sources: M. Raibert & J. Craig, "Hybrid position/force
-control of manipulators", J. Dyn. Syst. Meas. Control 102:126, 1981; O. Khatib, "A unified approach
-for motion and force control of robot manipulators", IEEE J. Robotics and Automation 3(1):43, 1987
-(the consistent projection). The sliding mode in the free directions is derived here.
+contact the tip moves along n at the speed force / B.
+Gains: force, wanted normal force [N]; nx, ny, nz, direction in which the tip presses, in the
+world's frame; B, damping along n [N s/m]; c, slope of the surface [1/s]; k, switching gain
+[rad/s^2]; width, of the boundary layer [rad/s]; f1, f2, f3, of the joints' friction [N m, s/rad,
+rad/s].
+Sources: M. Raibert & J. Craig, "Hybrid position/force control of manipulators", J. Dyn. Syst. Meas.
+Control 102:126, 1981; O. Khatib, "A unified approach for motion and force control of robot
+manipulators", IEEE J. Robotics and Automation 3(1):43, 1987 (the consistent projection). The
+sliding mode in the free directions is derived here.
 """
 
 import math

@@ -1,13 +1,14 @@
 """Incremental dynamic inversion (INDI) of the attitude: torque = Mf + J (v - wf'), for a free body.
 
-    v = -kq 2 sgn(q0) qv - kw we - w x wd,    Mf = H(p) A(p) torque,    wf' = p H(p) w,    A = 1 / (lag p + 1)
+    v = -kq 2 sgn(q0) qv - kw we - w x wd,
+    Mf = H(p) A(p) torque,    wf' = p H(p) w,    A = 1 / (lag p + 1)
 
 with H a Butterworth filter of second order of `cutoff` hertz, A what the law takes for the rotors,
 and force, wanted attitude and wd those of `geometric`. It needs J but no model of the torques that
 act: w' = A v + (1 - A H) d, with d the change that anything unknown makes, if A is right. So a
 constant torque leaves no error. With c J in place of J, w' = (c A v + (1 - A H) d) / (1 - A H (1 -
-c)), which in slow motion, A H = 1, is still v. A yaw torque of rotors that
-speed up, M + spin M', is taken into account:
+c)), which in slow motion, A H = 1, is still v. A yaw torque of rotors that speed up, M + spin M',
+is taken into account:
 
     dMz = (Jz (vz - wfz') + spin / dt dMz_) / (1 + spin / dt),    spin = Jr / (2 kf W c)
 
@@ -16,8 +17,9 @@ sample before. By default the rotors have no inertia. s is e' + (kx / kv) e and 
 sgn(q0) qv: the law slides nowhere. Gains: kx [1/s^2] and kv [1/s], of the position; kq [1/s^2] and
 kw [1/s], of the attitude; cutoff [Hz], of the filters; lag [s], of the rotors; spin [s], of their
 inertia. Defaults of the Crazyflie's firmware, which runs at 500 Hz, except kx and kv, which are
-chosen. Source: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion
-for attitude control of micro air vehicles", J. Guidance, Control, and Dynamics 39(3):450, 2016, doi
+chosen.
+Source: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion for
+attitude control of micro air vehicles", J. Guidance, Control, and Dynamics 39(3):450, 2016, doi
 10.2514/1.G001490; without its adaptation.
 """
 

@@ -9,9 +9,10 @@ forces but keeps the mechanism passive. As M' - 2 C is skew-symmetric,
 so that V falls while each |s_i| > width, if k_i > |d_i|. Both are forces: no bound on M^-1 d is
 needed, and M is not inverted. Under a constant d, |s| = |d| / (K + k / width) remains at rest.
 Gains: K, damping of s [N m s/rad]; k, switching gain [N m]; c, slope of the surface [1/s]; width,
-of the boundary layer [rad/s]. Source: J.-J. E. Slotine & W. Li, "On the adaptive control of robot
-manipulators", Int. J. Robotics Research 6(3):49, 1987; the same, Applied Nonlinear Control,
-Prentice Hall 1991, section 9.2. The switching term has a boundary layer here.
+of the boundary layer [rad/s].
+Source: J.-J. E. Slotine & W. Li, "On the adaptive control of robot manipulators", Int. J. Robotics
+Research 6(3):49, 1987; the same, Applied Nonlinear Control, Prentice Hall 1991, section 9.2. The
+switching term has a boundary layer here.
 """
 
 from smc_mujoco.control.joint_law import coriolis, product, saturate

@@ -1,7 +1,8 @@
 """Quaternion sliding mode: s = we + lam sgn(q0) qv, thrust = F^T R e3, for a free body such as a
 quadrotor.
 
-    sx = e' + c e,    F = m (r'' - c e' - Kx tanh(rhox sx)) + h,    thrust = F^T R e3,    Rd e3 = F / |F|,
+    sx = e' + c e,    F = m (r'' - c e' - Kx tanh(rhox sx)) + h,
+    thrust = F^T R e3,    Rd e3 = F / |F|,
     s = we + lam sgn(q0) qv,    torque = J (-lam sgn(q0) qv' - K tanh(rho s) - w x wd) + w x J w,
 
 with e the error of the position, (q0, qv) the quaternion from Rd to the attitude R, we = w - wd,
@@ -9,10 +10,11 @@ and sgn(0) = 1. Rd and wd are those of `geometric`. q and -q are the same attitu
 takes the shorter way, so that nothing unwinds. With K above the bound of the disturbance per
 inertia, s ends where tanh(rho s) holds it: under a constant torque t at s = atanh(t / (J K)) / rho,
 at the angle 2 asin(s / lam); under a constant force f at e = atanh(f / (m Kx)) / (rhox c). The sign
-is where the law is not continuous. Gains: c [1/s], Kx [m/s^2], rhox [s/m], of the position; lam
-[rad/s], K [rad/s^2], rho [s/rad], of the attitude. Defaults of the source for a Crazyflie, in which
-the yaw has K = 500 and rho = 0.5. Source: A. Yazdanshenas & R. Faieghi, "Quaternion-based sliding
-mode control for six degrees of freedom flight control of quadrotors", arXiv 2403.10934.
+is where the law is not continuous.
+Gains: c [1/s], Kx [m/s^2], rhox [s/m], of the position; lam [rad/s], K [rad/s^2], rho [s/rad], of
+the attitude. Defaults of the source for a Crazyflie, in which the yaw has K = 500 and rho = 0.5.
+Source: A. Yazdanshenas & R. Faieghi, "Quaternion-based sliding mode control for six degrees of
+freedom flight control of quadrotors", arXiv 2403.10934.
 """
 
 import numpy as np

@@ -7,9 +7,10 @@ explicitly, s stays within O(dt^2). Without a disturbance, s is 0 for the first 
 |s(0)|^(1/2) / k1, because k1 [s]^(1/2) alone would take that long, and w helps. The bound |w| <=
 w_max stops the wind-up of w while the actuator saturates. The default is infinite, as published.
 Gains: k1, of the square root [rad^1/2/s^3/2]; k2, of the integral [rad/s^3]; c, slope of the
-surface [1/s]; w_max, bound on w [rad/s^2]. Source: A. Levant, "Robust exact differentiation via
-sliding mode technique", Automatica 34(3):379, 1998 (the algorithm and these gains), on the computed
-torque of J.-J. E. Slotine & W. Li, Applied Nonlinear Control, Prentice Hall 1991, section 6.3.
+surface [1/s]; w_max, bound on w [rad/s^2].
+Source: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379,
+1998 (the algorithm and these gains), on the computed torque of J.-J. E. Slotine & W. Li, Applied
+Nonlinear Control, Prentice Hall 1991, section 6.3.
 """
 
 import math

@@ -5,11 +5,12 @@ The control switches on a subspace, s = 0, and not on each joint's surface: it i
 where all s are 0. With the perfect model and eps = 0, s' = -rho s / |s|: s keeps its direction, |s|
 falls at the rate rho, and all joints reach their surfaces together at the time |s(0)| / rho. If
 |d_a| <= D < rho for d_a = M^-1 d, then |s| <= eps D / (rho - D) remains. Joints with different
-units enter one norm, so choose c and rho with care. Gains: rho, switching gain, shared by all
-joints [rad/s^2]; c, slope of the surface [1/s]; eps, which smooths the unit vector, shared by all
-joints [rad/s]. Sources: S. Gutman, "Uncertain dynamical systems - a Lyapunov min-max approach",
-IEEE Trans. Autom. Control 24(3):437, 1979; V. Utkin, J. Guldner & J. Shi, Sliding Mode Control in
-Electro-Mechanical Systems, CRC Press 2009 (unit control).
+units enter one norm, so choose c and rho with care.
+Gains: rho, switching gain, shared by all joints [rad/s^2]; c, slope of the surface [1/s]; eps,
+which smooths the unit vector, shared by all joints [rad/s].
+Sources: S. Gutman, "Uncertain dynamical systems - a Lyapunov min-max approach", IEEE Trans. Autom.
+Control 24(3):437, 1979; V. Utkin, J. Guldner & J. Shi, Sliding Mode Control in Electro-Mechanical
+Systems, CRC Press 2009 (unit control).
 """
 
 from smc_mujoco.control.joint_law import norm, torque

@@ -3,10 +3,11 @@
 K grows until it exceeds the matched disturbance, so a bound k* on the disturbance need not be
 known. The proof uses V = s^2/2 + (K - k*)^2 / (2 gamma). K never falls, so noise and sampling make
 it grow without limit; `adaptive_leak` prevents this. K is integrated by the explicit Euler method.
-Sampled, |s| <= (K + |d|) dt, which is O(dt) while K hardly grows. Gains: gamma, adaptation rate
-[N/m]; c, slope of the surface [1/s]; k0, initial K [N]. Source: Slotine & Li, Applied Nonlinear
-Control, Prentice Hall 1991, chapter 8; Plestan, Shtessel, Bregeault & Poznyak, "New methodologies
-for adaptive sliding mode control", Int. J. Control 83(9):1907, 2010.
+Sampled, |s| <= (K + |d|) dt, which is O(dt) while K hardly grows.
+Gains: gamma, adaptation rate [N/m]; c, slope of the surface [1/s]; k0, initial K [N].
+Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8; Plestan, Shtessel,
+Bregeault & Poznyak, "New methodologies for adaptive sliding mode control", Int. J. Control
+83(9):1907, 2010.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding

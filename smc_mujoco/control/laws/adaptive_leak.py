@@ -4,10 +4,12 @@
 [|s| > deadzone] is 1 outside the dead zone and 0 inside. The dead zone and the leak (sigma
 modification) keep K bounded under noise and sampling. The price is a residual s, whatever the
 control period. K is integrated by the explicit Euler method and kept from falling below 0, which it
-would do if leak dt > 1. Gains: gamma, adaptation rate [N/m]; c, slope of the surface [1/s]; leak,
-rate at which K decays [1/s]; deadzone, half its width [m/s]; k0, initial K [N]. Source: P. Ioannou
-& P. Kokotovic, "Instability analysis and improvement of robustness of adaptive control", Automatica
-20(5):583, 1984 (leak); Plestan et al., Int. J. Control 83(9), 2010 (in a switching gain).
+would do if leak dt > 1.
+Gains: gamma, adaptation rate [N/m]; c, slope of the surface [1/s]; leak, rate at which K decays
+[1/s]; deadzone, half its width [m/s]; k0, initial K [N].
+Source: P. Ioannou & P. Kokotovic, "Instability analysis and improvement of robustness of adaptive
+control", Automatica 20(5):583, 1984 (leak); Plestan et al., Int. J. Control 83(9), 2010 (in a
+switching gain).
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding

@@ -5,11 +5,13 @@ K starts at k0. Below `least`, K' = rate. K grows outside the layer |s| <= mu an
 so neither a bound on d nor a bound on d' need be known. |s| ends in a layer of the order of mu,
 with K about as large as d requires. If s starts outside the layer, K grows until s is inside. If mu
 is too small for the noise or the control period, K grows without limit. w and K are integrated by
-the explicit Euler method. Gains: rate, of K, w1 sqrt(g1/2) in the source [N m^-1/2 s^-1/2]; eps,
-ratio of the two gains [m^1/2 s^-3/2]; mu, half-width of the layer [m/s]; least and k0, of K [N
-(s/m)^1/2]; c, slope of the surface [1/s]. Source: Y. Shtessel, M. Taleb & F. Plestan, "A novel
-adaptive-gain supertwisting sliding mode controller: methodology and application", Automatica
-48(5):759, 2012 (its beta is 2 eps K; the conference version halves it).
+the explicit Euler method.
+Gains: rate, of K, w1 sqrt(g1/2) in the source [N m^-1/2 s^-1/2]; eps, ratio of the two gains [m^1/2
+s^-3/2]; mu, half-width of the layer [m/s]; least and k0, of K [N (s/m)^1/2]; c, slope of the
+surface [1/s].
+Source: Y. Shtessel, M. Taleb & F. Plestan, "A novel adaptive-gain supertwisting sliding mode
+controller: methodology and application", Automatica 48(5):759, 2012 (its beta is 2 eps K; the
+conference version halves it).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn, sliding

@@ -5,12 +5,10 @@ extended-state observer.
 
 d = e'' - b u is the total disturbance: friction, gravity, the reference, and an input gain g other
 than b. A constant d leaves no error; if |d'| <= J, b = g and the rate of e is not used, |d - z3| <=
-3 J / w in the end. In continuous time
-the law is a PID controller with a filter of second order:
+3 J / w in the end. In continuous time the law is a PID controller with a filter of second order:
 
     u = -(wc^2 w^3 + (3 wc^2 w^2 + 2 wc w^3) p + (3 w wc^2 + 6 wc w^2 + w^3) p^2) / (b p (p^2 + (3 w
-    + 2 wc) p + 3 w^2
-        + 6 w wc + wc^2)) e
+        + 2 wc) p + 3 w^2 + 6 w wc + wc^2)) e
 
 with p = d/dt. On e'' = g u it is stable for 0.245 < g / b < 4.05 if w = 2 wc, and for 0.11 < g / b
 < 6.2 if w = 10 wc; a delay times wc must stay below 0.39 and 0.19. The observer uses u after

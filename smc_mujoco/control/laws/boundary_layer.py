@@ -2,9 +2,10 @@
 
 The law is linear inside the layer |s| <= phi. Under a matched disturbance |d| <= D < k the ultimate
 bound is |s| <= phi D / k for s' = u + d. Sampled, the layer must be wider than one step, phi > g k
-dt / 2; otherwise the law chatters like `classical`. Gains: k, bound of u [N]; c, slope of the
-surface [1/s]; phi, half-width of the layer [m/s]. Source: J.-J. Slotine, "Sliding controller design
-for non-linear systems", Int. J. Control 40(2):421, 1984.
+dt / 2; otherwise the law chatters like `classical`.
+Gains: k, bound of u [N]; c, slope of the surface [1/s]; phi, half-width of the layer [m/s].
+Source: J.-J. Slotine, "Sliding controller design for non-linear systems", Int. J. Control
+40(2):421, 1984.
 """
 
 import numpy as np

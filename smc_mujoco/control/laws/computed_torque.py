@@ -3,10 +3,11 @@
 With the nominal model the error obeys e'' + kd de + kp e = g d exactly. kp = w^2 and kd = 2 w give
 critical damping. Without the model the law is PD control, u = -kp e - kd de. It is a baseline
 without a sliding mode: a constant disturbance leaves the error g d / kp. The trace's s is kp e + kd
-de. Gains: kp, stiffness [N/m]; kd, damping [N s/m]. Source: B. R. Markiewicz, Analysis of the
-Computed Torque Drive Method, JPL Technical Memorandum 33-601, 1973; J. Y. S. Luh, M. W. Walker & R.
-P. C. Paul, "Resolved-acceleration control of mechanical manipulators", IEEE Trans. Automatic
-Control 25(3):468, 1980.
+de.
+Gains: kp, stiffness [N/m]; kd, damping [N s/m].
+Source: B. R. Markiewicz, Analysis of the Computed Torque Drive Method, JPL Technical Memorandum
+33-601, 1973; J. Y. S. Luh, M. W. Walker & R. P. C. Paul, "Resolved-acceleration control of
+mechanical manipulators", IEEE Trans. Automatic Control 25(3):468, 1980.
 """
 
 from smc_mujoco.control.law import command, law_function

@@ -8,7 +8,8 @@ overshoots 0 by at most U^2 / (2 k2) and at most (U / k1)^2 (derived here: w the
 the rate k2). w is integrated by the explicit Euler method, so that |s| = O(dt^2), as of plain
 super-twisting. With the nominal model, u in w - u is the acceleration that the saturated u gives.
 Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface
-[1/s]. Source: R. Seeber & M. Reichhartinger, "Conditioned super-twisting algorithm for systems with
+[1/s].
+Source: R. Seeber & M. Reichhartinger, "Conditioned super-twisting algorithm for systems with
 saturated control action", Automatica 116:108921, 2020.
 """
 

@@ -3,10 +3,9 @@
 u solves s+ = (1 - q dt) s - eps dt sgn(s) for the sampled double integrator, whose s+ is s + c dt
 de + (dt + c dt^2/2) u. Without the model the term c de is left out. With a surface of the scenario
 the divisor is 1. For 0 < q dt < 1, |s| falls in each sample until s changes sign in each: a
-quasi-sliding mode. Then |s| <= eps dt, inside the band eps dt / (1
-- q dt) of the source, and s ends in the cycle +-eps dt / (2 - q dt). A disturbance |d| <= D widens
-  this to (eps + D) dt
-and requires eps > D.
+quasi-sliding mode. Then |s| <= eps dt, inside the band eps dt / (1 - q dt) of the source, and s
+ends in the cycle +-eps dt / (2 - q dt). A disturbance |d| <= D widens this to (eps + D) dt and
+requires eps > D.
 Gains: eps, switching gain [N]; q, reaching rate [N s/m]; c, slope of the surface [1/s].
 Source: W. Gao, Y. Wang & A. Homaifa, "Discrete-time variable structure control systems", IEEE
 Trans. Ind. Electron. 42(2):117, 1995 (law and band); the narrower band: A. Bartoszewicz, "Remarks

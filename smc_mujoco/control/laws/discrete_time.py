@@ -6,10 +6,11 @@ s+ = dt (d - d_) after one sample (deadbeat). For |d'| <= L the residual is |s| 
 order, without chattering. u_ is the saturated command, limited by k and by the actuator's bound, so
 nothing winds up. The law needs to know g, because d_ contains (g - 1) u_ too: the linear loop z^2 +
 2 (g - 1) z + 1 - g is stable only for 0 < g < 4/3. For larger g, u swings between its bounds.
-Gains: k, bound of u [N]; c, slope of the surface [1/s]. Source: W.-C. Su, S. V. Drakunov & U.
-Ozguner, "An O(T^2) boundary layer in sliding mode for sampled-data systems", IEEE Trans. Autom.
-Control 45(3):482, 2000 (law and order); V. Utkin & S. Drakunov, "On discrete-time sliding modes",
-IFAC Nonlinear Control Systems Design 1989 (bounded u); the condition on g: Jury's, derived here.
+Gains: k, bound of u [N]; c, slope of the surface [1/s].
+Source: W.-C. Su, S. V. Drakunov & U. Ozguner, "An O(T^2) boundary layer in sliding mode for
+sampled-data systems", IEEE Trans. Autom. Control 45(3):482, 2000 (law and order); V. Utkin & S.
+Drakunov, "On discrete-time sliding modes", IFAC Nonlinear Control Systems Design 1989 (bounded u);
+the condition on g: Jury's, derived here.
 """
 
 from smc_mujoco.control.law import command, input_gain, law_function, sliding

@@ -8,13 +8,13 @@ exceed only this error, not |d|, to keep s = 0, so k can be small, and the chatt
 Without the model b is a gain, and the loop of d^ alone is stable for 0 < g / b < 2 / (1 - exp(-l
 dt)). With the model b = g, and f and r'' are known to the observer and fed forward, so d is the
 error of the model. The observer uses u after saturation, so d^ does not wind up. It is discretised
-exactly for u and d constant over the period. Gains: k, switching gain [m/s^2]; c, slope of the
-surface [1/s]; l, bandwidth of the observer [1/s]; b, assumed input gain [1/kg], by default between
-the 1 / kg and 8 / (kg m^2) of the plants. Sources: W.-H. Chen, D. Ballance, P. Gawthrop & J.
-O'Reilly, "A nonlinear disturbance observer for robotic manipulators", IEEE Trans. Ind. Electron.
-47(4):932, 2000 (observer, with its gain constant); S. Li, J. Yang, W.-H. Chen & X. Chen,
-Disturbance Observer-Based Control, CRC Press 2014, theorem 9.1 (k need only exceed the estimate's
-error).
+exactly for u and d constant over the period.
+Gains: k, switching gain [m/s^2]; c, slope of the surface [1/s]; l, bandwidth of the observer [1/s];
+b, assumed input gain [1/kg], by default between the 1 / kg and 8 / (kg m^2) of the plants.
+Sources: W.-H. Chen, D. Ballance, P. Gawthrop & J. O'Reilly, "A nonlinear disturbance observer for
+robotic manipulators", IEEE Trans. Ind. Electron. 47(4):932, 2000 (observer, with its gain
+constant); S. Li, J. Yang, W.-H. Chen & X. Chen, Disturbance Observer-Based Control, CRC Press 2014,
+theorem 9.1 (k need only exceed the estimate's error).
 """
 
 import math

@@ -4,10 +4,11 @@ u' switches, and u is its integral: continuous, with |u'| = k. sigma = 0 is reac
 |d'| + q |s'| for s' = u + d (local in s'). Then s decays as exp(-q t) even under a varying
 disturbance, and u does not chatter. s' is the backward difference of s, one sample late, so sigma
 and s are O(dt), and noise in s is amplified by 1 / dt. u is held while the next value would leave
-the actuator's bound, so it does not wind up. Gains: k, rate of u [N/s]; q, decay rate of s [1/s];
-c, slope of the surface [1/s]. Source: H. Sira-Ramirez, "On the dynamical sliding mode control of
-nonlinear systems", Int. J. Control 57(5):1039, 1993; A. Koshkouei, K. Burnham & A. Zinober,
-"Dynamic sliding mode control design", IEE Proc. Control Theory Appl. 152(4):392, 2005.
+the actuator's bound, so it does not wind up.
+Gains: k, rate of u [N/s]; q, decay rate of s [1/s]; c, slope of the surface [1/s].
+Source: H. Sira-Ramirez, "On the dynamical sliding mode control of nonlinear systems", Int. J.
+Control 57(5):1039, 1993; A. Koshkouei, K. Burnham & A. Zinober, "Dynamic sliding mode control
+design", IEE Proc. Control Theory Appl. 152(4):392, 2005.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding

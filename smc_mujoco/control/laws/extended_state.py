@@ -4,22 +4,21 @@ estimate of d.
     z1' = z2 + 3 w (e - z1);  z2' = z3 + b u + 3 w^2 (e - z1);  z3' = w^3 (e - z1)
 
 d = e'' - b u is the total disturbance: friction, coupling, gravity, the reference, and an input
-gain g other than b. If
-|d'| <= J and b = g, then |d - z3| <= 3 J / w in the end (continuous time). k has to exceed only
-  this error, not |d|, to
-keep s = 0, so k can be small, and the chattering k dt with it. Unlike `adrc`, it feeds back the
-position by the sign of s alone. Without the model b is a gain, and the loop of z3 alone is stable
-for 0 < g / b < 9 at small w dt, 6.6 at w dt = 0.8, 3.9 at 2. With the model b = g, and f and r''
-are known to the observer and fed forward, so d is the error of the model. The observer uses u after
-saturation, so z3 does not wind up. It is discretised exactly for u constant over the period, with
-all poles at exp(-w dt). It needs e of relative degree 2, so the law takes no surface. Gains: k,
-switching gain [m/s^2]; c, slope of the surface [1/s]; w, bandwidth of the observer [1/s]; b,
-assumed input gain [1/kg], by default between the 1 / kg and 8 / (kg m^2) of the plants. Sources: J.
-Han, "From PID to active disturbance rejection control", IEEE Trans. Ind. Electron. 56(3):900, 2009
-(observer); Z. Gao, "Scaling and bandwidth-parameterization based controller tuning", American
-Control Conference 2003 (poles); R. Miklosovic, A. Radke & Z. Gao, "Discrete implementation and
-generalization of the extended state observer", American Control Conference 2006. The bound is
-worked out here.
+gain g other than b. If |d'| <= J and b = g, then |d - z3| <= 3 J / w in the end (continuous time).
+k has to exceed only this error, not |d|, to keep s = 0, so k can be small, and the chattering k dt
+with it. Unlike `adrc`, it feeds back the position by the sign of s alone. Without the model b is a
+gain, and the loop of z3 alone is stable for 0 < g / b < 9 at small w dt, 6.6 at w dt = 0.8, 3.9 at
+2. With the model b = g, and f and r'' are known to the observer and fed forward, so d is the error
+of the model. The observer uses u after saturation, so z3 does not wind up. It is discretised
+exactly for u constant over the period, with all poles at exp(-w dt). It needs e of relative degree
+2, so the law takes no surface.
+Gains: k, switching gain [m/s^2]; c, slope of the surface [1/s]; w, bandwidth of the observer [1/s];
+b, assumed input gain [1/kg], by default between the 1 / kg and 8 / (kg m^2) of the plants.
+Sources: J. Han, "From PID to active disturbance rejection control", IEEE Trans. Ind. Electron.
+56(3):900, 2009 (observer); Z. Gao, "Scaling and bandwidth-parameterization based controller
+tuning", American Control Conference 2003 (poles); R. Miklosovic, A. Radke & Z. Gao, "Discrete
+implementation and generalization of the extended state observer", American Control Conference 2006.
+The bound is worked out here.
 """
 
 import math
@@ -42,9 +41,8 @@ def corrections(w, h):
 
 @njit
 def observe(y, l1, l2, l3, memory):
-    """Bring the observer in memory to this sample's reading, with its `corrections`.
-
-    Return z3, the estimate of d.
+    """Bring the observer in memory to this sample's reading, with its `corrections`. Return z3, the
+    estimate of d.
 
     The memory holds whether it has started, z1, z2, z3, and the known acceleration of the last
     period, which the law writes.

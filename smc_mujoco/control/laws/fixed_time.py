@@ -3,10 +3,11 @@
 s' = u + d with |d| <= D <= k reaches s = 0 before 1 / (k1 (1 - a)) + 1 / (k2 (b - 1)), whatever s0.
 With explicit sampling this holds only below |s0| = (2 / (k2 dt))^(1/(b - 1)). Above it k2 [s]^b
 overshoots more at each sample, and diverges unless u is bounded. After reaching, the residual is
-that of `classical` with this k. With k = 0, |d| <= D leaves |s| <= (D / k1)^(1/a). Gains: k1 [N
-(s/m)^a] and k2 [N (s/m)^b], of the powers; a and b, exponents; k, switching gain [N]; c, slope of
-the surface [1/s]. Source: A. Polyakov, "Nonlinear feedback design for fixed-time stabilization of
-linear control systems", IEEE Trans. Autom. Control 57(8):2106, 2012 (Lemma 1: the bound).
+that of `classical` with this k. With k = 0, |d| <= D leaves |s| <= (D / k1)^(1/a).
+Gains: k1 [N (s/m)^a] and k2 [N (s/m)^b], of the powers; a and b, exponents; k, switching gain [N];
+c, slope of the surface [1/s].
+Source: A. Polyakov, "Nonlinear feedback design for fixed-time stabilization of linear control
+systems", IEEE Trans. Autom. Control 57(8):2106, 2012 (Lemma 1: the bound).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn, sliding

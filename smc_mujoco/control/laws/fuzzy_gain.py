@@ -12,9 +12,11 @@ Memberships are triangles that add up to 1, centred at 0, 1/2, 1 for |s| / width
 its rate. Conclusions are numbers. So K is interpolated in the table, and k_min <= K <= k_max. The
 theorem of `classical` holds with k_min: for |d| <= D < k_min, s' = u + d reaches s = 0 by |s0| /
 (k_min - D). In the band the law chatters with the small gain K there, |s| <= dt (K + D). The rate
-is the difference of |s| over one sample. Gains: k_min and k_max, smallest and largest K [N]; width,
-of a large |s| [m/s]; rate, of a rising |s| [m/s^2]; c, slope of the surface [1/s]. Source: after R.
-Palm, "Robust control by fuzzy sliding mode", Automatica 30(9):1429, 1994; this table is ours.
+is the difference of |s| over one sample.
+Gains: k_min and k_max, smallest and largest K [N]; width, of a large |s| [m/s]; rate, of a rising
+|s| [m/s^2]; c, slope of the surface [1/s].
+Source: after R. Palm, "Robust control by fuzzy sliding mode", Automatica 30(9):1429, 1994; this
+table is ours.
 """
 
 from numba import njit

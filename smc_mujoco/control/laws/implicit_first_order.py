@@ -6,7 +6,8 @@ This is the backward Euler method for s' = u with the sign at the end of the per
 `classical` would chatter. Under |d| <= D < k the residual is |s| <= dt D, and u is -d of the sample
 before, with the total variation of d. It is a boundary layer of width k dt, the smallest that does
 not chatter. The law needs to know g: without the model it assumes g = 1, and for a true g of 2 or
-more it chatters as `classical` does. Gains: k, switching gain [N]; c, slope of the surface [1/s].
+more it chatters as `classical` does.
+Gains: k, switching gain [N]; c, slope of the surface [1/s].
 Source: V. Acary, B. Brogliato & Y. Orlov, "Chattering-free digital sliding-mode control with state
 observer and disturbance rejection", IEEE Trans. Autom. Control 57(5):1087, 2012.
 """

@@ -2,16 +2,16 @@
 period ahead.
 
 The equations have a closed solution. Let b = s + dt w. If |b| <= dt^2 k2, then z = 0 and u = w+ =
--s/dt. Otherwise u =
--k1 r sgn(b) + w+ and w+ = w - dt k2 sgn(b), with r = sqrt(|z|) = sqrt(dt^2 k1^2/4 + |b| - dt^2 k2)
-- dt k1/2. Sampling causes no chattering. But a constant d leaves s = dt d whatever the gains,
-because w tends to -d and u to the deadbeat value -s/dt; `proper_super_twisting` removes this error.
-The law assumes s' = u + d: if g is above 2 and unknown to the law, the deadbeat part overshoots,
-and the law chatters like the explicit one. Condition: k2 > L and k1 > sqrt(k2 + L) for |d'| <= L.
-Under saturation w winds up as in the explicit law. Gains: k1, of the square root [N (s/m)^1/2]; k2,
-of the integral [N/s]; c, slope of the surface [1/s]. Source: B. Brogliato, A. Polyakov & D. Efimov,
-"The implicit discretization of the supertwisting sliding-mode control algorithm", IEEE Trans.
-Autom. Control 65(8):3707, 2020, eq. 7 to 11.
+-s/dt. Otherwise u = -k1 r sgn(b) + w+ and w+ = w - dt k2 sgn(b), with r = sqrt(|z|) = sqrt(dt^2
+k1^2/4 + |b| - dt^2 k2) - dt k1/2. Sampling causes no chattering. But a constant d leaves s = dt d
+whatever the gains, because w tends to -d and u to the deadbeat value -s/dt; `proper_super_twisting`
+removes this error. The law assumes s' = u + d: if g is above 2 and unknown to the law, the deadbeat
+part overshoots, and the law chatters like the explicit one. Condition: k2 > L and k1 > sqrt(k2 + L)
+for |d'| <= L. Under saturation w winds up as in the explicit law.
+Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface
+[1/s].
+Source: B. Brogliato, A. Polyakov & D. Efimov, "The implicit discretization of the supertwisting
+sliding-mode control algorithm", IEEE Trans. Autom. Control 65(8):3707, 2020, eq. 7 to 11.
 """
 
 import math

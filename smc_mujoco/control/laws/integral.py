@@ -7,7 +7,8 @@ nominal loop from the start if M exceeds every force that v0 leaves out. The law
 Without one it takes f = 0 and g = 1, so M must cover the true g too: g M > |f + (g - 1) v0 + d|. If
 u saturates, s leaves 0, and a reaching phase follows. s is integrated by the explicit Euler method,
 which costs |s| = O(dt), as sampling does. With a surface of the scenario as s0 the nominal loop is
-s0' = -q s0 too. Gains: M, switching gain [N]; c, slope of s0 [1/s]; q, decay rate of s0 [1/s].
+s0' = -q s0 too.
+Gains: M, switching gain [N]; c, slope of s0 [1/s]; q, decay rate of s0 [1/s].
 Source: V. Utkin & J. Shi, "Integral sliding mode in systems operating under uncertainty
 conditions", Proc. 35th IEEE Conf. Decision and Control 4591, 1996.
 """

@@ -14,12 +14,13 @@ the u that acts before it enters the observer and w, and x^ starts at the readin
 same controller swings after a large start. A constant disturbance leaves no error. It is a linear
 law with a guarantee, and loses where signals are large. The observer is discretised exactly for v
 and e constant over the period. With the nominal model f and g are cancelled and the law regulates
-e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the v asked for, over F's factor of e. Gains: k,
-of the shaped loop [N/m]; wi, of the integral [1/s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default
-those of the plant at its origin. Sources: D. McFarlane & K. Glover, "A loop shaping design
-procedure using H-infinity synthesis", IEEE Trans. Automat. Contr. 37(6):759, 1992; K. Glover & D.
-McFarlane, "Robust stabilization of normalized coprime factor plant descriptions with
-H-infinity-bounded uncertainty", IEEE Trans. Automat. Contr. 34(8):821, 1989.
+e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the v asked for, over F's factor of e.
+Gains: k, of the shaped loop [N/m]; wi, of the integral [1/s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by
+default those of the plant at its origin.
+Sources: D. McFarlane & K. Glover, "A loop shaping design procedure using H-infinity synthesis",
+IEEE Trans. Automat. Contr. 37(6):759, 1992; K. Glover & D. McFarlane, "Robust stabilization of
+normalized coprime factor plant descriptions with H-infinity-bounded uncertainty", IEEE Trans.
+Automat. Contr. 34(8):821, 1989.
 """
 
 import math
@@ -40,7 +41,7 @@ PHI, GAMMA, SLOTS = 12, 21, 30  # 3 x 3 matrices in the memory, by rows
 
 @njit
 def design(a1, a2, b, k, wi):
-    """Return F and Hs, three numbers each, in the observable form of the shaped plant, and gamma."""
+    """Return F and Hs, three numbers each, in observable form of the shaped plant, and gamma."""
     n0, n1, d1, d2 = (
         b * k * wi,
         b * k,
@@ -139,7 +140,6 @@ def design(a1, a2, b, k, wi):
 @njit
 def start(y, a1, a2, b, k, wi, memory):
     """Write F, Hs, the observer's matrices over one period and x^ at the reading into the memory.
-
     Return 1.
     """
     # 0, started; 1, w; 2 to 4, x^; 5 to 7, F; 8 to 10, Hs; then exp(M h) and its integral, M = A +
@@ -165,9 +165,8 @@ def start(y, a1, a2, b, k, wi, memory):
 
 @njit
 def observe(v, e, n0, n1, memory):
-    """Bring x^ to the next sample under v and the reading e.
-
-    Return its last state, the error that it predicts.
+    """Bring x^ to the next sample under v and the reading e. Return its last state, the error that
+    it predicts.
     """
     q1, q2, q3 = n0 * v - memory[8] * e, n1 * v - memory[9] * e, -memory[10] * e
     x1, x2, x3 = memory[2], memory[3], memory[4]

@@ -4,18 +4,21 @@
 It minimises the integral of q0 w^2 + q1 e^2 + q2 de^2 + u^2 on e'' = a1 e + a2 de + b u. The closed
 loop s^3 + alpha s^2 + beta s + gamma has
 
-    gamma = b sqrt(q0), alpha^2 = 2 beta + a2^2 + 2 a1 + b^2 q2, beta^2 = 2 gamma alpha + a1^2 + b^2
-    q1
+    gamma = b sqrt(q0)
+    alpha^2 = 2 beta + a2^2 + 2 a1 + b^2 q2
+    beta^2 = 2 gamma alpha + a1^2 + b^2 q1
 
 (spectral factorisation, worked out here), with ki = gamma / b, k1 = (beta + a1) / b and k2 = (alpha
 + a2) / b. A constant disturbance leaves no error, and q0 = 0 gives the gains of `lqr`.
 Back-calculation prevents wind-up: while u is beyond the bound, w tends with the time constant tt to
 the value that brings u back to it. As a PID controller it overshoots after saturation. With the
 nominal model f and g are cancelled and the law regulates e'' = v, so a1, a2, b are 0, 0, 1. The
-trace's s is k1 e + k2 de. Gains: q0 [N^2/(m^2 s^2)], q1 [N^2/m^2] and q2 [N^2 s^2/m^2], weights of
-the integral, the error and the rate; tt, of the anti-windup [s]; a1 [1/s^2], a2 [1/s] and b [1/kg],
-by default those of the plant at its origin. Source: P. C. Young & J. C. Willems, "An approach to
-the linear multivariable servomechanism problem", Int. J. Control 15(5):961, 1972.
+trace's s is k1 e + k2 de.
+Gains: q0 [N^2/(m^2 s^2)], q1 [N^2/m^2] and q2 [N^2 s^2/m^2], weights of the integral, the error and
+the rate; tt, of the anti-windup [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the
+plant at its origin.
+Source: P. C. Young & J. C. Willems, "An approach to the linear multivariable servomechanism
+problem", Int. J. Control 15(5):961, 1972.
 """
 
 import math

@@ -8,9 +8,10 @@ those of the double integrator; `smc.design.lqr` computes those of a plant. With
 and g are cancelled and the law regulates e'' = v, so a1, a2, b are 0, 0, 1. It is a baseline
 without a sliding mode: a constant disturbance leaves an error. The trace's s is k1 e + k2 de.
 Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; a1 [1/s^2], a2
-[1/s] and b [1/kg], of the plant. Source: R. E. Kalman, "Contributions to the theory of optimal
-control", Bol. Soc. Mat. Mexicana 5:102, 1960; margins: B. D. O. Anderson & J. B. Moore, Optimal
-Control: Linear Quadratic Methods, Prentice Hall 1990, section 5.4.
+[1/s] and b [1/kg], of the plant.
+Source: R. E. Kalman, "Contributions to the theory of optimal control", Bol. Soc. Mat. Mexicana
+5:102, 1960; margins: B. D. O. Anderson & J. B. Moore, Optimal Control: Linear Quadratic Methods,
+Prentice Hall 1990, section 5.4.
 """
 
 import math

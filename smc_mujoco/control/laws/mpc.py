@@ -1,8 +1,8 @@
 """Model-predictive control without offset: u = v + us, the first move of the best plan of N moves
 of H each.
 
-    minimise  sum of (q1 e^2 + q2 de^2 + r v^2) over the moves, + x' P x at the end,  with  |v + us|
-    <= u_max
+    minimise  sum of (q1 e^2 + q2 de^2 + r v^2) over the moves, + x' P x at the end,
+    with  |v + us| <= u_max
 
 on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of the observer of
 `adrc`, which knows a1 e + a2 de, and us = -d / b, so a constant disturbance leaves no error. P is
@@ -17,16 +17,17 @@ plan keeps the bounds. Of 24,000 jumps to a random state 10 were not solved, one
 64 % too large, the others 4 % at most. H must be long against the control period, and N H as long
 as the loop takes to come to rest. With the nominal model f and g are cancelled and the law
 regulates e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the
-first move. Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w,
-bandwidth of the observer [1/s]; N, number of moves, at most 20; H, time of a move [s]; a1 [1/s^2],
-a2 [1/s] and b [1/kg], by default those of the plant at its origin. Sources: D. P. Bertsekas,
-"Projected Newton methods for optimization problems with simple constraints", SIAM J. Control Optim.
-20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin & C.-S. Wang, "Structure-preserving
-algorithms for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004
-(doubling, for P); U. Maeder, F. Borrelli & M. Morari, "Linear offset-free model predictive
-control", Automatica 45(10):2214, 2009; J. A. De Dona, G. C. Goodwin & M. M. Seron, "Anti-windup and
-model predictive control: reflections and connections", Eur. J. Control 6(5):467, 2000 (where it is
-the clipped regulator).
+first move.
+Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the
+observer [1/s]; N, number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b
+[1/kg], by default those of the plant at its origin.
+Sources: D. P. Bertsekas, "Projected Newton methods for optimization problems with simple
+constraints", SIAM J. Control Optim. 20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin
+& C.-S. Wang, "Structure-preserving algorithms for periodic discrete-time algebraic Riccati
+equations", Int. J. Control 77(8):767, 2004 (doubling, for P); U. Maeder, F. Borrelli & M. Morari,
+"Linear offset-free model predictive control", Automatica 45(10):2214, 2009; J. A. De Dona, G. C.
+Goodwin & M. M. Seron, "Anti-windup and model predictive control: reflections and connections", Eur.
+J. Control 6(5):467, 2000 (where it is the clipped regulator).
 """
 
 import math
@@ -159,9 +160,8 @@ def prepare(n, a1, a2, b, H, q1, q2, memory):
 
 @njit
 def residual(n, e, de, low, high, memory):
-    """Write the gradient of the plan into the memory.
-
-    Return the largest of the free moves, over the linear term.
+    """Write the gradient of the plan into the memory. Return the largest of the free moves, over
+    the linear term.
     """
     for i in range(n):
         memory[GRADIENT + i] = memory[BY_E + ROW * i] * e + memory[BY_DE + ROW * i] * de
@@ -230,9 +230,8 @@ def substitute(n, memory):
 
 @njit
 def newton(n, low, high, memory):
-    """Write Newton's step of the free moves into the memory; those that are held stay.
-
-    Return the whole share, 1.
+    """Write Newton's step of the free moves into the memory; those that are held stay. Return the
+    whole share, 1.
     """
     memory[6] = factor(n, low, high, memory)
     for i in range(n):
@@ -242,9 +241,8 @@ def newton(n, low, high, memory):
 
 @njit
 def move(n, share, low, high, memory):
-    """Write how a share of the step changes the moves, each clipped to its bounds.
-
-    Return whether none is clipped.
+    """Write how a share of the step changes the moves, each clipped to its bounds. Return whether
+    none is clipped.
     """
     whole = True
     for i in range(n):
@@ -257,9 +255,8 @@ def move(n, share, low, high, memory):
 
 @njit
 def advance(n, low, high, memory):
-    """Move the plan by a share of Newton's step that lowers the cost enough, 1 or less.
-
-    Return it; 0 for none.
+    """Move the plan by a share of Newton's step that lowers the cost enough, 1 or less. Return it;
+    0 for none.
     """
     share = newton(n, low, high, memory)
     for _ in range(MOST_HALVINGS):
@@ -351,9 +348,8 @@ def tabulated(i, e, de, middle, reach, memory):
 
 @njit
 def recall(n, e, de, middle, reach, memory):
-    """Write the tabulated plan, clipped, and where that was.
-
-    Return how far all moves are from the function's end.
+    """Write the tabulated plan, clipped, and where that was. Return how far all moves are from the
+    function's end.
 
     At the end a free move is at a bound, or the gradient of a held one is 0; below 0, a move is
     beyond.
@@ -384,9 +380,8 @@ def room(e, de, middle, reach, memory):
 
 @njit
 def planned(n, e, de, middle, reach, memory):
-    """Write the best plan: the tabulated one, or else a new one, which is then tabulated.
-
-    Return its `recall`.
+    """Write the best plan: the tabulated one, or else a new one, which is then tabulated. Return
+    its `recall`.
     """
     left = recall(n, e, de, middle, reach, memory)
     if left < 0.0:

@@ -6,10 +6,11 @@ w. At w = 1 only a has to be tuned. A larger w converges w times as fast and nee
 the control. Sampled with exact derivatives, |e| = O(dt^3), |de| = O(dt^2) and |e''| = O(dt). The
 law is for a plant with an actuator lag and an estimator that gives the acceleration. If the
 estimator gives none, e'' counts as 0, and the law switches on de + w [e]^(2/3). The trace's s is e,
-of relative degree 3. Gains: a, switching gain [N]; w, speed of convergence [1/s]. Source: A.
-Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control
-76(9/10):924, 2003 (law); A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE
-Trans. Autom. Control 50(11):1812, 2005 (w).
+of relative degree 3.
+Gains: a, switching gain [N]; w, speed of convergence [1/s].
+Source: A. Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int.
+J. Control 76(9/10):924, 2003 (law); A. Levant, "Quasi-continuous high-order sliding-mode
+controllers", IEEE Trans. Autom. Control 50(11):1812, 2005 (w).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn

@@ -6,10 +6,12 @@ reached in finite time for e'' = u + d, |d| <= D < k, and sooner from far away b
 rate s. On s = 0, de = -[(e + a [e]^q) / b]^(1/p), so e reaches 0 in finite time, faster from far
 away than with a = 0. Sampled, |de| = O(dt), and so |s| and |e| are O(dt^p) (derived here). Without
 the model, e'' = f + g u + d contains (g - 1) v_eq too: the condition is k g > |f + d| + |g - 1|
-|v_eq|, with the de above on s = 0. Gains: k, switching gain [N]; rate, reaching rate [N/m]; a
-[m^(1-q)] and b [m^(1-p) s^p], of the surface; p and q, exponents. Source: L. Yang & J. Yang,
-"Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems", Int. J. Robust
-Nonlinear Control 21(16):1865, 2011, with k sgn(s) for k2 [s]^rho of its reaching law.
+|v_eq|, with the de above on s = 0.
+Gains: k, switching gain [N]; rate, reaching rate [N/m]; a [m^(1-q)] and b [m^(1-p) s^p], of the
+surface; p and q, exponents.
+Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical
+systems", Int. J. Robust Nonlinear Control 21(16):1865, 2011, with k sgn(s) for k2 [s]^rho of its
+reaching law.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn

@@ -5,10 +5,10 @@ s = 0 is reached in finite time for e'' = u + d, |d| <= D < k. From there e = 0 
 (B^(1/p) (1-1/p)). u is finite everywhere. s' = (p/B) |de|^(p-1) (e'' - v_eq), so s does not move
 while the joint is at rest, until the law has accelerated it. Sampled, |de| = O(dt), and so |s| and
 |e| are O(dt^p) (derived here). Without the model, e'' = f + g u + d contains (g - 1) v_eq too: the
-condition is k g > |f + d| + |g - 1| |v_eq|, where |v_eq| is (B/p) |B e|^((2-p)/p) on s = 0. Gains:
-k, switching gain [N]; B, of the surface [m^(p-1)/s^p]; p, exponent. Source: Y. Feng, X. Yu & Z.
-Man, "Non-singular terminal sliding mode control of rigid manipulators", Automatica 38(12):2159,
-2002.
+condition is k g > |f + d| + |g - 1| |v_eq|, where |v_eq| is (B/p) |B e|^((2-p)/p) on s = 0.
+Gains: k, switching gain [N]; B, of the surface [m^(p-1)/s^p]; p, exponent.
+Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of rigid manipulators",
+Automatica 38(12):2159, 2002.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn

@@ -2,10 +2,11 @@
 
 A smooth boundary layer with a fixed width of 1 in the unit of s. |u| <= lam. On J x'' + D x' + K x
 = u the origin is locally stable for lam > -D and lam k1 > -K (linearisation tanh(s) ~ s,
-Routh-Hurwitz). Gains: lam, bound of u [N]; k1, slope of the surface [1/s]. Source: J. Gaber,
-"Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4. The paper writes its
-sliding variable as s - u/g. The law uses neither g nor that variable, so the trace holds the s
-above (the paper's alpha).
+Routh-Hurwitz).
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s].
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4. The
+paper writes its sliding variable as s - u/g. The law uses neither g nor that variable, so the trace
+holds the s above (the paper's alpha).
 """
 
 import math

@@ -9,10 +9,11 @@ with linear interpolation. If the words hold the gains exactly, |u + lam tanh(s)
 ds) + u_range / 2^16, where 1.6e-4 is the error of the table and ds = (k1 e_range + de_range + 16) /
 2^16 the rounding of e, de and s. Values beyond their range saturate. Stability is that of
 `observer_free`, up to an equilibrium within the steps of e and de. With the nominal model, f and g
-are added in double precision. The trace's s is the word's. Gains: lam, bound of u [N]; k1, slope of
-the surface [1/s]; e_range [m], de_range [m/s] and u_range [N], ranges of the words. Source: J.
-Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the law); Q
-notation: ARM, Application Note 33, Fixed Point Arithmetic on the ARM, 1996.
+are added in double precision. The trace's s is the word's.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; e_range [m], de_range [m/s] and u_range
+[N], ranges of the words.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the
+law); Q notation: ARM, Application Note 33, Fixed Point Arithmetic on the ARM, 1996.
 """
 
 import math

@@ -6,9 +6,11 @@ For controllers without a mathematical library. The table is fixed, as it would 
 that make at least `size` steps. Between nodes |T - tanh| <= 0.0963 (5 / size)^2, because max
 |tanh''| = 0.77. The step to T = 1 at s = 5 is 9.1e-5. So the error is 9.5e-3 for 16 steps, 5.9e-4
 for 64 (the default) and 9.1e-5 for 256. Stability is that of `observer_free`, because T'(0) = 1 to
-0.3 %. Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; size, number of steps. Source: J.
-Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the law); linear
-interpolation error: M. Abramowitz & I. Stegun, Handbook of Mathematical Functions, 1964, 25.2.
+0.3 %.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; size, number of steps.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the
+law); linear interpolation error: M. Abramowitz & I. Stegun, Handbook of Mathematical Functions,
+1964, 25.2.
 """
 
 import math

@@ -6,10 +6,11 @@ and is cut after `terms` terms. |s| is limited to 8, so |a| = |s| / 8 <= 1. The 
 doubled three times, tanh 2a = 2 tanh a / (1 + tanh^2 a). So the law needs no exponential, only
 three divisions. With 1 to 5 terms |P - tanh| is at most 3.3e-3, 9.1e-5, 5.5e-6, 6e-7, 2.3e-7
 (measured; the last is the effect of limiting |s| to 8). Without this reduction the series would
-diverge from s = pi/2 on. Stability is that of `observer_free`. Gains: lam, bound of u [N]; k1,
-slope of the surface [1/s]; terms, of the series, 1 to 5. Source: J. Gaber, "Observer-Free Sliding
-Mode Control via Structured Decomposition", eq. 4 (the law); M. Abramowitz & I. Stegun, Handbook of
-Mathematical Functions, 1964, 4.5.64 (series) and 4.5 (double argument).
+diverge from s = pi/2 on. Stability is that of `observer_free`.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; terms, of the series, 1 to 5.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the
+law); M. Abramowitz & I. Stegun, Handbook of Mathematical Functions, 1964, 4.5.64 (series) and 4.5
+(double argument).
 """
 
 from smc_mujoco.control.law import command, law_function, sliding

@@ -5,8 +5,10 @@ tau F' = u - F, the origin is locally stable if and only if a3 p^3 + a2 p^2 + a1
 coefficients and a2 a1 > a3 a0, where a3 = tau J, a2 = J + tau D + lam, a1 = D + tau K + lam k2, a0
 = K + lam k1 (linearisation tanh(s) ~ s, Routh-Hurwitz). The law needs an acceleration, from a
 second-order differentiator, so it is observer-free in name only. If the estimator gives none, e''
-counts as 0. Gains: lam, bound of u [N]; k1 [1/s^2] and k2 [1/s], of the surface. Source: J. Gaber,
-"Observer-Free Sliding Mode Control via Structured Decomposition", section 3, alpha for r = 3.
+counts as 0.
+Gains: lam, bound of u [N]; k1 [1/s^2] and k2 [1/s], of the surface.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", section 3,
+alpha for r = 3.
 """
 
 import math

@@ -1,9 +1,8 @@
 """PD with a disturbance observer: u = -(wc^2 e + 2 wc de + z) / b, z' = l (de' - b u - z).
 
 z estimates the total disturbance d = e'' - b u of the last period from the difference of two rates,
-through a filter of
-first order with the bandwidth l. A constant d leaves no error. Three laws of other names are this
-one:
+through a filter of first order with the bandwidth l. A constant d leaves no error. Three laws of
+other names are this one:
 
 - Incremental nonlinear dynamic inversion, u = F(u) + (v - F(e'')) / b, with one synchronised filter
   F of first order on both and v = -wc^2 e - 2 wc de. Time-delay control and the incremental PID are
@@ -17,14 +16,15 @@ On e'' = g u with l = 2 wc it is stable for 0.10 < g / b; sampled, g / b must al
 / (1 - exp(-l dt)). A delay times wc must stay below 0.31. It needs a good rate: it loses its margin
 with an encoder's differences, delays and slow drives, and is at home under loads that change. With
 the model b = g, and f and r'' are known and fed forward. With a switching term in place of wc^2 e
-it is `disturbance_observer`. The trace's s is wc^2 e + 2 wc de. Gains: wc, bandwidth of the loop
-[1/s]; l, bandwidth of the observer [1/s]; b, assumed input gain [1/kg]. Sources: E. Smeur, Q. Chu &
-G. de Croon, "Adaptive incremental nonlinear dynamic inversion for attitude control of micro air
-vehicles", J. Guid. Control Dyn. 39(3):450, 2016 (synchronised filters); P. Acquatella, W. van
-Ekeren & Q. P. Chu, "PI(D) tuning for flight control systems via incremental nonlinear dynamic
-inversion", arXiv 1701.08981; H. Shim & N. H. Jo, "An almost necessary and sufficient condition for
-robust stability of closed-loop systems with disturbance observer", Automatica 45(1):296, 2009. The
-identities and margins are worked out here.
+it is `disturbance_observer`. The trace's s is wc^2 e + 2 wc de.
+Gains: wc, bandwidth of the loop [1/s]; l, bandwidth of the observer [1/s]; b, assumed input gain
+[1/kg].
+Sources: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion for
+attitude control of micro air vehicles", J. Guid. Control Dyn. 39(3):450, 2016 (synchronised
+filters); P. Acquatella, W. van Ekeren & Q. P. Chu, "PI(D) tuning for flight control systems via
+incremental nonlinear dynamic inversion", arXiv 1701.08981; H. Shim & N. H. Jo, "An almost necessary
+and sufficient condition for robust stability of closed-loop systems with disturbance observer",
+Automatica 45(1):296, 2009. The identities and margins are worked out here.
 """
 
 import math

@@ -5,10 +5,11 @@ derivative. Back-calculation prevents wind-up: while u is beyond the bound +-u_m
 time constant tt to the value that brings u back to its bound. On x'' = u the loop is stable if and
 only if kp kd > ki (Routh, tau = 0), and a constant disturbance leaves no error. D is computed by
 the implicit (backward) Euler method, starting at the first de, and w by the explicit one. The
-trace's s is kp e + kd D. Gains: kp, proportional [N/m]; ki, integral [N/(m s)]; kd, derivative [N
-s/m]; tau, of the filter [s]; tt, of the anti-windup [s]. Source: K. J. Astrom & T. Hagglund, PID
-Controllers: Theory, Design, and Tuning, 2nd ed., ISA 1995, sections 3.4 (derivative) and 3.5
-(integrator windup).
+trace's s is kp e + kd D.
+Gains: kp, proportional [N/m]; ki, integral [N/(m s)]; kd, derivative [N s/m]; tau, of the filter
+[s]; tt, of the anti-windup [s].
+Source: K. J. Astrom & T. Hagglund, PID Controllers: Theory, Design, and Tuning, 2nd ed., ISA 1995,
+sections 3.4 (derivative) and 3.5 (integrator windup).
 """
 
 from smc_mujoco.control.law import command, input_gain, law_function

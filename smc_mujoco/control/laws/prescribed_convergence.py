@@ -2,10 +2,11 @@
 
 The state converges along a prescribed curve (2-sliding). For e'' = g u + d, |d| <= D and a g - D >
 b^2/2 the state comes to de = -b [e]^(1/2), and along it to e = 0 in 2 sqrt(|e|) / b. Sampled, |e| =
-O(dt^2) and |de| = O(dt). The trace's s is e, of relative degree 2. Gains: a, switching gain [N]; b,
-of the curve [m^1/2/s]. Source: A. Levant, "Sliding order and sliding accuracy in sliding mode
-control", Int. J. Control 58(6):1247, 1993, section 5 (the algorithm with a prescribed law of
-variation), following S. Emelyanov, S. Korovin & L. Levantovsky, 1986.
+O(dt^2) and |de| = O(dt). The trace's s is e, of relative degree 2.
+Gains: a, switching gain [N]; b, of the curve [m^1/2/s].
+Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control
+58(6):1247, 1993, section 5 (the algorithm with a prescribed law of variation), following S.
+Emelyanov, S. Korovin & L. Levantovsky, 1986.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn

@@ -2,15 +2,16 @@
 
 This is `proper_super_twisting` for a saturated input, without wind-up. U is the actuator's bound.
 Then w+ = (u + w) / 2 if |u - w| <= 2 dt k2, and w+ = w + dt k2 sgn(u - w) otherwise. While u is not
-saturated this is
-`proper_super_twisting`. While it is, w tends to u and stays there. Theorem for s' = u + d with |d'|
-<= L and |d| < U: k2 > L and k1 > sqrt(k2 + L) suffice for |s| <= L dt^2 after a finite time,
-without chattering. No sampled law can guarantee less. The law assumes s' = u + d: without the model
-it chatters if g is far from 1. With the nominal model, u in u - w is the acceleration that the
-saturated u gives. Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope
-of the surface [1/s]. Source: R. Seeber & B. Andritsch, "Proper implicit discretization of the
-super-twisting controller - without and with actuator saturation", Automatica 173:112027, 2025, eq.
-17 and 18 (numbers of the preprint arXiv:2406.16094v1).
+saturated this is `proper_super_twisting`. While it is, w tends to u and stays there. Theorem for s'
+= u + d with |d'| <= L and |d| < U: k2 > L and k1 > sqrt(k2 + L) suffice for |s| <= L dt^2 after a
+finite time, without chattering. No sampled law can guarantee less. The law assumes s' = u + d:
+without the model it chatters if g is far from 1. With the nominal model, u in u - w is the
+acceleration that the saturated u gives.
+Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface
+[1/s].
+Source: R. Seeber & B. Andritsch, "Proper implicit discretization of the super-twisting controller -
+without and with actuator saturation", Automatica 173:112027, 2025, eq. 17 and 18 (numbers of the
+preprint arXiv:2406.16094v1).
 """
 
 import math

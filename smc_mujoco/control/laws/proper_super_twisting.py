@@ -6,10 +6,12 @@ The equations have a closed solution. If |s| <= dt^2 k2, then z = 0 and w+ = w -
 Theorem for s' = u + d with |d'| <= L, k2 > L and k1 > sqrt(k2 + L): |s| <= L dt^2 after a finite
 time, without chattering. No sampled law can guarantee less. Like every deadbeat law it assumes s' =
 u + d: without the model it chatters if g is far from 1. Under saturation w winds up as in the
-explicit law. Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of
-the surface [1/s]. Source: R. Seeber & B. Andritsch, "Proper implicit discretization of the
-super-twisting controller - without and with actuator saturation", Automatica 173:112027, 2025, eq.
-11 to 13 and theorem 3.4 (numbers of the preprint arXiv:2406.16094v1).
+explicit law.
+Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface
+[1/s].
+Source: R. Seeber & B. Andritsch, "Proper implicit discretization of the super-twisting controller -
+without and with actuator saturation", Automatica 173:112027, 2025, eq. 11 to 13 and theorem 3.4
+(numbers of the preprint arXiv:2406.16094v1).
 """
 
 import math

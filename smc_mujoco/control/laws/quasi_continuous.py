@@ -4,10 +4,11 @@ u is continuous except at e = de = 0, which is reached in finite time (2-sliding
 = g u + d, |d| <= D: some r > b satisfies a g (r - b) / (r + b) > D + r^2/2. Then the state comes
 between de = -b [e]^(1/2) and de = -r [e]^(1/2), and from there to the origin in at most 2 sqrt(|e|)
 / b. For D = 0 and g = 1 the condition is r^3 + b r^2 - 2 a r + 2 a b < 0. Sampled, |e| = O(dt^2)
-and |de| = O(dt). The trace's s is e, of relative degree 2. Gains: a, bound of u [N]; b, of the
-curve [m^1/2/s]. Source: A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE
-Trans. Autom. Control 50(11):1812, 2005; condition: A. Levant, "Principles of 2-sliding mode
-design", Automatica 43(4):576, 2007.
+and |de| = O(dt). The trace's s is e, of relative degree 2.
+Gains: a, bound of u [N]; b, of the curve [m^1/2/s].
+Source: A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE Trans. Autom.
+Control 50(11):1812, 2005; condition: A. Levant, "Principles of 2-sliding mode design", Automatica
+43(4):576, 2007.
 """
 
 import math

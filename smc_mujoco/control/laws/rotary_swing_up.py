@@ -12,13 +12,14 @@ at the upright equilibrium: with V = z'P z, V' = -z'Q z on s = 0, whatever u is.
 1) is the linear quadratic regulator, k > 0 with a small phi almost a relay, k1 and k2 > 0
 super-twisting. u is continuous at s = 0, as phi > 0. c1 .. c4 are by default those of the library's
 Furuta pendulum for Q = diag(1, 10, 0.05, 0.05), R = 2000. q counts from the nearest upright
-position. Gains: k, bound of the relay [N m]; phi, half-width of its layer [N m]; k1 [(N m)^(1/2)]
-and k2 [N m/s], of super-twisting; w_max, bound of w [N m]; c1 and c2 [N m/rad], c3 and c4 [N m
-s/rad], of s; pump and most [rad/s^2], of the pumping and its bound; w0, of small oscillations when
-hanging [1/s]; J, inertia of the arm [kg m^2]; catch, |s| where the catch begins [N m]. Sources: K.
-J. Astrom & K. Furuta, "Swinging up a pendulum by energy control", Automatica 36(2):287, 2000 (the
-pumping); S. Gutman, "Uncertain dynamical systems: a Lyapunov min-max approach", IEEE Trans.
-Automatic Control 24(3):437, 1979 (the surface b'P z = 0).
+position.
+Gains: k, bound of the relay [N m]; phi, half-width of its layer [N m]; k1 [(N m)^(1/2)] and k2 [N
+m/s], of super-twisting; w_max, bound of w [N m]; c1 and c2 [N m/rad], c3 and c4 [N m s/rad], of s;
+pump and most [rad/s^2], of the pumping and its bound; w0, of small oscillations when hanging [1/s];
+J, inertia of the arm [kg m^2]; catch, |s| where the catch begins [N m].
+Sources: K. J. Astrom & K. Furuta, "Swinging up a pendulum by energy control", Automatica 36(2):287,
+2000 (the pumping); S. Gutman, "Uncertain dynamical systems: a Lyapunov min-max approach", IEEE
+Trans. Automatic Control 24(3):437, 1979 (the surface b'P z = 0).
 """
 
 import math

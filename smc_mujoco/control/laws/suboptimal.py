@@ -4,10 +4,11 @@ A 2-sliding law that needs only the zeros of de, not its value. A zero lies betw
 whose de differ in sign. Conditions for e'' = g u + d, |d| <= D: r1 > r2, 2 ((r1 + r2) g - D) > (r1
 - r2) g + D and (r1 - r2) g > D. The law brakes half-way: from rest and without d, the next extremum
 of e is r2 / (r1 + r2) of the last one, without overshoot. Before the first zero of de, m is 0 and u
-= -r1 sgn(e). Sampled, |e| = O(dt^2). The trace's s is e, of relative degree 2. Gains: r1 and r2, of
-the two switching terms [N]. Source: G. Bartolini, A. Ferrara & E. Usai, "Chattering avoidance by
-second-order sliding mode control", IEEE Trans. Autom. Control 43(2):241, 1998; form and conditions
-of A. Levant, "Principles of 2-sliding mode design", Automatica 43(4):576, 2007.
+= -r1 sgn(e). Sampled, |e| = O(dt^2). The trace's s is e, of relative degree 2.
+Gains: r1 and r2, of the two switching terms [N].
+Source: G. Bartolini, A. Ferrara & E. Usai, "Chattering avoidance by second-order sliding mode
+control", IEEE Trans. Autom. Control 43(2):241, 1998; form and conditions of A. Levant, "Principles
+of 2-sliding mode design", Automatica 43(4):576, 2007.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn

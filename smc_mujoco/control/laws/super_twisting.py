@@ -6,13 +6,14 @@ study's first gains miss it). Sampled with the explicit Euler method the residua
 
 With w_max = inf, the default, the law is as published: while the actuator saturates, w winds up,
 and may swing the plant from bound to bound. With w_max at the actuator's bound, w stops there. s =
-0 requires w = -d, so a constant d beyond w_max leaves |s| = ((|d| - w_max) / k1)^2. Gains: k1, of
-the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s]; w_max,
-bound on w [N]. Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control",
-Int. J. Control 58(6):1247, 1993 (law and accuracy); A. Levant, "Robust exact differentiation via
-sliding mode technique", Automatica 34(3):379, 1998 (these gains); R. Seeber & M. Horn, "Stability
-proof for a well-established super-twisting parameter setting", Automatica 84:241, 2017 (the
-condition); the clamp is a common anti-windup, its residual derived here.
+0 requires w = -d, so a constant d beyond w_max leaves |s| = ((|d| - w_max) / k1)^2.
+Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface
+[1/s]; w_max, bound on w [N].
+Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control
+58(6):1247, 1993 (law and accuracy); A. Levant, "Robust exact differentiation via sliding mode
+technique", Automatica 34(3):379, 1998 (these gains); R. Seeber & M. Horn, "Stability proof for a
+well-established super-twisting parameter setting", Automatica 84:241, 2017 (the condition); the
+clamp is a common anti-windup, its residual derived here.
 """
 
 import math

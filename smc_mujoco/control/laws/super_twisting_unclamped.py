@@ -2,9 +2,11 @@
 sgn(s), s = de + c e.
 
 `super_twisting` with w_max = inf, under its own name, so that a comparison can contain both. w
-winds up while the actuator saturates. Gains: k1, of the square root [N (s/m)^1/2]; k2, of the
-integral [N/s]; c, slope of the surface [1/s]. Source: A. Levant, "Sliding order and sliding
-accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993.
+winds up while the actuator saturates.
+Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface
+[1/s].
+Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control
+58(6):1247, 1993.
 """
 
 import math

@@ -10,11 +10,12 @@ that bound, within 1 rad (chosen), and ends beyond it. Angles count from the nea
 position. From rest the law first pushes upwards.
 
 J = m l^2 and w = sqrt(grav / l) are gains; the defaults are those of the library's pendulum. With
-the nominal model J is 1 / g. During the swing-up the trace's s is E sgn(x'). Gains: k, of the
-energy [1/rad]; q, of the catch [N m s/rad]; J, inertia [kg m^2]; w, rate of the unstable mode
-[1/s]; part, of the catchable set. Source: K. J. Astrom & K. Furuta, "Swinging up a pendulum by
-energy control", Automatica 36(2):287, 2000, eq. 8, with the torque at the pivot in place of the
-pivot's acceleration; the catch is derived.
+the nominal model J is 1 / g. During the swing-up the trace's s is E sgn(x').
+Gains: k, of the energy [1/rad]; q, of the catch [N m s/rad]; J, inertia [kg m^2]; w, rate of the
+unstable mode [1/s]; part, of the catchable set.
+Source: K. J. Astrom & K. Furuta, "Swinging up a pendulum by energy control", Automatica 36(2):287,
+2000, eq. 8, with the torque at the pivot in place of the pivot's acceleration; the catch is
+derived.
 """
 
 import math

@@ -3,9 +3,10 @@
 e = de = 0 is reached in finite time (2-sliding) for e'' = g u + d, |d| <= D, if (r1 + r2) g - D >
 (r1 - r2) g + D and (r1 - r2) g > D. Without d each peak of e is q = (r1 - r2) / (r1 + r2) of the
 last. For g = 1 the time from rest at e is sqrt(2 |e| / (r1 - r2)) (1 + q) / (1 - sqrt(q)). Sampled,
-|e| = O(dt^2) and |de| = O(dt). The trace's s is e, of relative degree 2. Gains: r1 and r2,
-switching gains of position and velocity [N]. Source: A. Levant, "Sliding order and sliding accuracy
-in sliding mode control", Int. J. Control 58(6):1247, 1993.
+|e| = O(dt^2) and |de| = O(dt). The trace's s is e, of relative degree 2.
+Gains: r1 and r2, switching gains of position and velocity [N].
+Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control
+58(6):1247, 1993.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn

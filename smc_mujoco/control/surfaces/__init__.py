@@ -1,4 +1,3 @@
-"""Sliding surfaces, one per file.
-
-Every module of this package is searched for surfaces. Notation as in laws.
+"""Sliding surfaces, one per file. Every module of this package is searched for surfaces. Notation
+as in laws.
 """

@@ -1,13 +1,12 @@
 """Fast terminal: s = de + a e + b [e]^p, 1/2 < p < 1.
 
 On s = 0 a large error decays exponentially, a small one as on a terminal surface. It vanishes at
-the time ln(1 + a
-|e(0)|^(1-p) / b) / (a (1-p)). As on `terminal`, v_eq is singular at e = 0 away from the surface,
-  and `bound` limits its
-singular part.
+the time ln(1 + a |e(0)|^(1-p) / b) / (a (1-p)). As on `terminal`, v_eq is singular at e = 0 away
+from the surface, and `bound` limits its singular part.
 Gains: a [1/s] and b [m^(1-p)/s], of the surface; p, exponent; bound, on the singular part of v_eq
-[m/s^2]. Source: X. Yu & Z. Man, "Fast terminal sliding-mode control design for nonlinear dynamical
-systems", IEEE Trans. Circuits Syst. I 49(2):261, 2002.
+[m/s^2].
+Source: X. Yu & Z. Man, "Fast terminal sliding-mode control design for nonlinear dynamical systems",
+IEEE Trans. Circuits Syst. I 49(2):261, 2002.
 """
 
 from smc_mujoco.control.law import power

@@ -1,9 +1,10 @@
 """Global: s = de + c e - (de(0) + c e(0)) exp(-q t); s(0) = 0: no reaching phase.
 
 The offset that makes s(0) = 0 decays and leaves the linear surface. On s = 0, with s0 = de(0) + c
-e(0), e = e(0) exp(-c t) + s0 (exp(-q t) - exp(-c t)) / (c - q). Gains: c, slope of the surface
-[1/s]; q, decay rate of the offset [1/s]. Source: Y.-S. Lu & J.-S. Chen, "Design of a global
-sliding-mode controller for a motor drive with bounded control", Int. J. Control 62(5):1001, 1995.
+e(0), e = e(0) exp(-c t) + s0 (exp(-q t) - exp(-c t)) / (c - q).
+Gains: c, slope of the surface [1/s]; q, decay rate of the offset [1/s].
+Source: Y.-S. Lu & J.-S. Chen, "Design of a global sliding-mode controller for a motor drive with
+bounded control", Int. J. Control 62(5):1001, 1995.
 """
 
 import math

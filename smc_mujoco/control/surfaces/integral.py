@@ -2,9 +2,11 @@
 
 On s = 0 the error follows e'' + k2 e' + k1 e = 0 from the first sample on, under any matched
 disturbance. The integral of k2 de is exact, k2 (e - e(0)); that of k1 e is computed by the explicit
-Euler method. Gains: k1 [1/s^2] and k2 [1/s], of the nominal loop. Source: V. Utkin & J. Shi,
-"Integral sliding mode in systems operating under uncertainty conditions", Proc. 35th IEEE CDC,
-4591, 1996, with s0 = de and the nominal control that gives e'' = -k1 e - k2 de.
+Euler method.
+Gains: k1 [1/s^2] and k2 [1/s], of the nominal loop.
+Source: V. Utkin & J. Shi, "Integral sliding mode in systems operating under uncertainty
+conditions", Proc. 35th IEEE CDC, 4591, 1996, with s0 = de and the nominal control that gives e'' =
+-k1 e - k2 de.
 """
 
 from smc_mujoco.control.surface import surface_function

@@ -2,9 +2,10 @@
 
 On s = 0, de = -[(e + a [e]^q) / b]^(1/p): the error vanishes in finite time, and falls faster from
 far away than on `nonsingular_terminal`. v_eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p) is finite
-everywhere. Gains: a [m^(1-q)] and b [m^(1-p) s^p], of the surface; p and q, exponents. Source: L.
-Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems",
-Int. J. Robust Nonlinear Control 21(16):1865, 2011.
+everywhere.
+Gains: a [m^(1-q)] and b [m^(1-p) s^p], of the surface; p and q, exponents.
+Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical
+systems", Int. J. Robust Nonlinear Control 21(16):1865, 2011.
 """
 
 from smc_mujoco.control.law import power

@@ -3,9 +3,10 @@
 
 This is the terminal surface solved for e, so that v_eq = -(B/p) [de]^(2-p) is finite everywhere. s'
 = (p/B) |de|^(p-1) (e'' - v_eq): the smaller the velocity, the less the law acts on s. At rest it
-has no effect on s, but the state cannot stay there. Gains: B, of the surface [m^(p-1)/s^p]; p,
-exponent. Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of rigid
-manipulators", Automatica 38(12):2159, 2002.
+has no effect on s, but the state cannot stay there.
+Gains: B, of the surface [m^(p-1)/s^p]; p, exponent.
+Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of rigid manipulators",
+Automatica 38(12):2159, 2002.
 """
 
 from smc_mujoco.control.law import power

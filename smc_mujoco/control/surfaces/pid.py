@@ -2,9 +2,10 @@
 
 The poles are the roots of p^2 + kp p + ki. I starts at 0, so s(0) = de + kp e and there is a
 reaching phase, during which I winds up. The overshoot this causes is the price of no steady error
-under a law that leaves a constant s. I is integrated by the explicit Euler method. Gains: kp [1/s]
-and ki [1/s^2], of the surface. Source: J.-J. Slotine & W. Li, Applied Nonlinear Control, Prentice
-Hall 1991, section 7.1.1 (s with the integral of e).
+under a law that leaves a constant s. I is integrated by the explicit Euler method.
+Gains: kp [1/s] and ki [1/s^2], of the surface.
+Source: J.-J. Slotine & W. Li, Applied Nonlinear Control, Prentice Hall 1991, section 7.1.1 (s with
+the integral of e).
 """
 
 from smc_mujoco.control.surface import surface_function

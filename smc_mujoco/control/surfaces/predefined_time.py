@@ -3,7 +3,8 @@ before T from anywhere.
 
 It ends at T (1 - exp(-|e(0)|^p)): the bound T is itself a gain. v_eq is singular at e = 0 away from
 the surface. On the surface it is of order |e|^(1-2p), so that `bound` acts on large errors alone
-there. Gains: T, bound on the time of convergence [s]; p, exponent; bound, on |v_eq| [m/s^2].
+there.
+Gains: T, bound on the time of convergence [s]; p, exponent; bound, on |v_eq| [m/s^2].
 Source: J. Sanchez-Torres, E. Sanchez & A. Loukianov, "Predefined-time stability of dynamical
 systems with sliding modes", Proc. American Control Conf., 5842, 2015.
 """

@@ -1,11 +1,11 @@
 """Terminal: s = de + b [e]^p, 1/2 < p < 1; on s = 0 the error ends at |e(0)|^(1-p) / (b (1-p)).
 
 v_eq = -b p |e|^(p-1) de is singular at e = 0 away from the surface. On the surface it is b^2 p
-[e]^(2p-1), finite for p > 1/2, so that `bound` acts on large errors alone there. Gains: b, of the
-surface [m^(1-p)/s]; p, exponent; bound, on |v_eq| [m/s^2]. Sources: S. Venkataraman & S. Gulati,
-"Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas. Control 115(3):554,
-1993 (surface); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
-systems", Automatica 49(6):1715, 2013 (bound).
+[e]^(2p-1), finite for p > 1/2, so that `bound` acts on large errors alone there.
+Gains: b, of the surface [m^(1-p)/s]; p, exponent; bound, on |v_eq| [m/s^2].
+Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes",
+J. Dyn. Syst. Meas. Control 115(3):554, 1993 (surface); Y. Feng, X. Yu & F. Han, "On nonsingular
+terminal sliding-mode control of nonlinear systems", Automatica 49(6):1715, 2013 (bound).
 """
 
 from smc_mujoco.control.law import power

@@ -86,7 +86,7 @@ def coerce(channels: object) -> Pairs:
         channels, Iterable
     ):  # sets have no order
         raise ScenarioError(
-            f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']"
+            f"channels is {shown(channels)}: give joints' names, such as ['elbow', 'wrist']"
         )
     named = isinstance(channels, Mapping)
     if named:
@@ -173,11 +173,13 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
             continue
         if kind == FREE:
             raise ScenarioError(
-                f"joint {joint!r} of {label} is a free joint: give it as the only channel, without fields of a Channel"
+                f"joint {joint!r} of {label} is a free joint: give it as the only channel, "
+                "without fields of a Channel"
             )
         if kind not in UNIT_OF_JOINT:
             raise ScenarioError(
-                f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
+                f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: "
+                "give one that is a hinge or slide"
             )
         if joints.count(joint) > 1:
             raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
@@ -254,7 +256,8 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
     if not 0 < len(drives) <= len(PLACES):
         cure = "give it one to six"
         raise ScenarioError(
-            f"{len(drives)} actuators of {label} act at sites of the body of joint {joint!r}: {cure}"
+            f"{len(drives)} actuators of {label} act at sites of the body of joint {joint!r}: "
+            f"{cure}"
         )
     plain = (NO_DYNAMICS, mujoco.mjtDyn.mjDYN_FILTER.value, mujoco.mjtDyn.mjDYN_FILTEREXACT.value)
     for i in drives:
@@ -266,7 +269,8 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
             or model.actuator_biastype[i] != NO_BIAS
         ):
             raise ScenarioError(
-                f"actuator {name!r} of {label} is more than a force behind a lag: make it a <general>"
+                f"actuator {name!r} of {label} is more than a force behind a lag: "
+                "make it a <general>"
             )
     ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[drives]
     ends[model.actuator_ctrllimited[drives] == 0] = math.inf
@@ -288,7 +292,10 @@ def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "
     forces = exerted(model, model.joint(joint).id, thrusters(model, joint))
     rank = np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max())
     if rank < FLIES:
-        text = f"the actuators of {label} give {rank} independent forces and torques, and {FLIES} are to hold a heading"
+        text = (
+            f"the actuators of {label} give {rank} independent forces and torques, "
+            f"and {FLIES} are to hold a heading"
+        )
         warnings.warn(
             f"{text}: give them other places, or gears of other signs",
             ScenarioWarning,

@@ -68,10 +68,7 @@ class Source:
         return f"{(roots and roots[0].get('model')) or 'model'}.xml"
 
     def read(self) -> mujoco.MjSpec:
-        """Return the model as an editable MjSpec.
-
-        A free joint without a name has that of its body.
-        """
+        """Return the model as an editable MjSpec; a free joint without a name has its body's."""
         try:
             if not self.path:
                 included = {}
@@ -158,7 +155,8 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
         return _of_text(str(model), {} if assets is None else assets)
     if not isinstance(model, str | os.PathLike):
         raise ScenarioError(
-            f"path is {shown(model)}: give the path of an MJCF file (.xml), its text, an MjSpec or a mjcf.RootElement"
+            f"path is {shown(model)}: give the path of an MJCF file (.xml), its text, "
+            "an MjSpec or a mjcf.RootElement"
         )
     path = Path(os.path.abspath(os.fspath(model)))  # pyright: ignore[reportArgumentType]
     try:
@@ -207,7 +205,8 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
     made = _of_text(text, _assets(spec, text))
     if lost := _difference(model, made.compiled(made.read())):
         raise ScenarioError(
-            f"the MjSpec loses its {lost} when it is written as XML: write the file, and give its path"
+            f"the MjSpec loses its {lost} when it is written as XML: "
+            "write the file, and give its path"
         )
     return made
 
@@ -239,7 +238,7 @@ def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
 
 
 def _full_precision_xml(spec: mujoco.MjSpec) -> str:
-    """Return the XML of a compiled spec, with all digits if this version of MuJoCo can write them."""
+    """Return the XML of a compiled spec, with all digits if this MuJoCo can write them."""
     library = libmujoco.library()
     try:
         get = library._mjPRIVATE__get_xml_precision
@@ -345,7 +344,6 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
 
 def digest(path: Path) -> str:
     """Hash the file and every file that it names (includes, attached models, meshes, textures):
-
     SHA-256, 64 hex digits.
 
     If a name fits files in several folders, all of them are hashed.
@@ -381,7 +379,7 @@ def _sha256(parts: Iterable[bytes]) -> str:
 
 
 def _elements(model: Path | str | bytes) -> list[ET.Element]:
-    """Return the elements of an XML file or text; [] if it cannot be parsed, which MuJoCo reports."""
+    """Return the elements of an XML file or text; [] if it cannot be parsed: MuJoCo says so."""
     try:
         return list(ET.fromstring(model.read_bytes() if isinstance(model, Path) else model).iter())
     except (OSError, ValueError, ET.ParseError):

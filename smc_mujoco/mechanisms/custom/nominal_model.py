@@ -4,7 +4,8 @@ measured state.
 With M the mass matrix and tau what gravity, gyration, springs, dampers and the model's other
 actuators exert, MuJoCo's x'' = M^-1 (tau + u). The nominal model of channel i is
 
-    x_i'' = f_i + g_i u_i,    g_i = (M^-1)_ii,    f_i = (M^-1 tau)_i + sum over j != i of (M^-1)_ij u_j,
+    x_i'' = f_i + g_i u_i,    g_i = (M^-1)_ii,
+    f_i = (M^-1 tau)_i + sum over j != i of (M^-1)_ij u_j,
 
 with u_j the latest command of channel j: that of this sample for j < i, that of the sample before
 for j > i. The laws of the channels run one after the other, so each sample is one Gauss-Seidel
@@ -12,7 +13,8 @@ sweep on the equations of all channels. The sweeps converge for every positive d
 without an actuator that moves with channel i has g = (M^-1)_qi.
 
 The compiled path calls MuJoCo's own functions by name, with a copy of the model that has the
-nominal parameters and an mjData for each simulation.
+nominal parameters and
+an mjData for each simulation.
 
 Laws of many joints see the mechanism as a whole instead,
 
@@ -22,7 +24,8 @@ and C(x, v) w = (qfrc_bias(x, v + w) - qfrc_bias(x, v - w)) / 4: gravity cancels
 quadratic in v.
 
 Constraints are left out: contacts, limits, dry friction. Joints that are not measured, all in other
-kinematic trees, are assumed to be in the model's initial state.
+kinematic
+trees, are assumed to be in the model's initial state.
 """
 
 import contextlib
@@ -221,9 +224,8 @@ class NominalModel:
     def native_dynamics(
         self, parameters: Mapping[str, float], tip: str, at_rest: bool = True
     ) -> Native:
-        """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest.
-
-        The tip is a site or "".
+        """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest. The tip
+        is a site or "".
         """
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
@@ -245,9 +247,8 @@ class NominalModel:
 
 @dataclasses.dataclass(eq=False)
 class BorrowedData:
-    """An MjData borrowed from a pool, to which it returns when this is deleted.
-
-    A new one costs a run 0.7 ms.
+    """An MjData borrowed from a pool, to which it returns when this is deleted. A new one costs a
+    run 0.7 ms.
     """
 
     data: mujoco.MjData
@@ -290,9 +291,8 @@ def driven(places: np.ndarray) -> np.ndarray:
 
 
 def _mujoco(name: str, more: int = 0) -> Callable:
-    """Return a function of MuJoCo's library for compiled code.
-
-    It takes the addresses of model, data and `more`.
+    """Return a function of MuJoCo's library for compiled code. It takes the addresses of model,
+    data and `more`.
 
     Compiled code has its name, not its address, so that another process can load the code from the
     disk.
@@ -321,9 +321,8 @@ def passive_alone(model: mujoco.MjModel) -> bool:
 
 @functools.cache
 def native_dynamics() -> Function:
-    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN.
-
-    Without `at_rest` g is NaN.
+    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN. Without `at_rest`
+    g is NaN.
 
     If h is of passive forces alone, it computes no more than M and h need. With that and without g,
     it takes a law on the Panda three quarters of the time.
@@ -400,9 +399,8 @@ def native_dynamics() -> Function:
 
 @functools.cache
 def native_coriolis() -> Function:
-    """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`.
-
-    Its input is w, (n,).
+    """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its
+    input is w, (n,).
     """
     rates = _mujoco("mj_comVel")
     newton_euler = _mujoco("mj_rne", 2)
@@ -465,9 +463,8 @@ def native_jacobian() -> Function:
 
 @functools.cache
 def native() -> Function:
-    """Return the C function of the nominal model.
-
-    Its input is a record SEEN, its outputs are f and g of channel i.
+    """Return the C function of the nominal model. Its input is a record SEEN, its outputs are f and
+    g of channel i.
     """
     positions, velocities = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity"))
     actuation, accelerations, solve = map(

@@ -2,8 +2,8 @@
 the rest.
 
     arm = smc.plant_from("arm.xml", channels=["shoulder", "elbow"])
-    trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0),
-    model="nominal"))
+    law = smc.law("computed_torque", kp=100.0, kd=20.0)
+    trace = smc.run(smc.Scenario(plant=arm, law=law, model="nominal"))
 
 A channel's command u is the force on its joint, N m or N. Its motor gets gear 1. |u| is bounded by
 the scenario's u_max and by what the motor's ranges and the joint's actuatorfrcrange allow in both
@@ -124,9 +124,8 @@ class UserModel:
 
 @dataclasses.dataclass(frozen=True)
 class UserFields:
-    """The fields that m and grav set:
-
-    Plant.fields. They scale all masses and inertias, and gravity.
+    """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and
+    gravity.
     """
 
     mass: float
@@ -351,6 +350,7 @@ def restored(data: Mapping, name: str) -> Plant:
         source = mjcf.source(model)
         if source.sha256 != data["sha256"]:
             raise ScenarioError(
-                f"its model {model}, or a file that it names, has changed since the run: put it back"
+                f"its model {model}, or a file that it names, has changed since the run: "
+                "put it back"
             )
     return _plant(source, own.coerce(data["channels"]), name, data["keyframe"], data.get("tip"))

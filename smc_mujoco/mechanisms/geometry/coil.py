@@ -1,6 +1,5 @@
-"""Drawings of springs and dampers: a helix of wire or a tube whose ends follow two bodies.
-
-No mass, no force.
+"""Drawings of springs and dampers: a helix of wire or a tube whose ends follow two bodies. No mass,
+no force.
 """
 
 import numpy as np

@@ -2,8 +2,10 @@
 springs.
 
 Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs
-are fixed tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are
-free; the shaft that carries the pendulums transmits nothing.
+are fixed
+tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the
+shaft that
+carries the pendulums transmits nothing.
 
 Contact `bobs` puts the pivots side by side in the plane of motion: hanging bobs nearly touch, as in
 Newton's cradle. The torsion springs still act, with torques carried from pivot to pivot.
@@ -170,9 +172,8 @@ def pendulum_fields(model, p):
 
 
 def size(model):
-    """Return the number of pendulums in a chain's model.
-
-    It counts bodies, because a Backlash adds joints.
+    """Return the number of pendulums in a chain's model. It counts bodies, because a Backlash adds
+    joints.
     """
     return sum(model.body(i).name.endswith("/pendulum") for i in range(model.nbody))
 

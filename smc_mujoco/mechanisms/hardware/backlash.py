@@ -1,6 +1,5 @@
-"""Backlash: play between a rotor, which the actuator drives, and the channel's joint.
-
-Its stops are MuJoCo's limits.
+"""Backlash: play between a rotor, which the actuator drives, and the channel's joint. Its stops are
+MuJoCo's limits.
 """
 
 import dataclasses

@@ -1,8 +1,7 @@
 """Contact: obstacles that a mechanism hits, falls on or slides over, with friction and restitution.
 
 A plant offers kinds of contact; each is an edit of its MjSpec that brings obstacles and explicit
-contact pairs, made
-with the helpers below. Two sorts of pair:
+contact pairs, made with the helpers below. Two sorts of pair:
 
 - `hit:...`: a blow along the normal. MuJoCo's contact with constant impedance is a spring and
   dashpot that only push: r'' = -2 zeta w r' - w^2 r, with r the depth, as long as this pushes. The
@@ -144,18 +143,17 @@ def _takes(
 
 def damping_ratio(restitution: float) -> float:
     """Return the damping ratio zeta of a spring and dashpot with this restitution, 0.01 .. 1."""
-    aim = -0.5 * math.log(
-        max(restitution, MIN_RESTITUTION)
-    )  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
+    # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
+    aim = -0.5 * math.log(max(restitution, MIN_RESTITUTION))
     low = 0.0
     high = 1.0 + aim
     high *= high
     while high - low > 1e-12 * high:
         zeta = 0.5 * (low + high)
         if _loss(zeta) < aim:
-            low, high = (zeta, high)
+            low = zeta
         else:
-            low, high = (low, zeta)
+            high = zeta
     return 0.5 * (low + high)
 
 
@@ -225,7 +223,7 @@ def _pair(
 
 
 def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float]) -> None:
-    """Add an invisible box to hit, behind a visible face: so deep that no blow passes through it."""
+    """Add an invisible box behind a visible face: so deep that no blow passes through it."""
     block = box(body, name, low, high, "ink")
     block.group = 5
     block.rgba = (0.0, 0.0, 0.0, 0.0)

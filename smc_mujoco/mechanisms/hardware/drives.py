@@ -7,8 +7,8 @@ The callback simulates Lag, RateLimit and the winding of a DCMotor (`DriveStep`)
 the mean of their force over each physics step. So the velocities at the ends of the steps are those
 of the equations, whatever the step is, and any integrator may be used; only a RateLimit behind a
 Lag is not exact, see there. A state that MuJoCo integrates would give each step the force of its
-end. This lead of half a step would take away a part of the delay that a limit cycle depends on:
-behind one lag, most of it.
+end. This lead of half a step would take away a part
+of the delay that a limit cycle depends on: behind one lag, most of it.
 
 A winding also feels the joint's speed, which only MuJoCo knows within a step. `winding_step` is
 exact for a speed that changes linearly there.
@@ -176,9 +176,9 @@ class DCMotor(Actuator):
             not self.constant >= MIN_CONSTANT
             or not self.resistance / self.constant <= MAX_PARAMETER
         ):
-            weak = f"gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak"
             raise ScenarioError(
-                f"DCMotor's {weak} for a resistance of {self.resistance:g} ohm: give a stronger motor"
+                f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} "
+                f"N m/A is too weak for a resistance of {self.resistance:g} ohm: give a stronger motor"
             )
 
     @property
@@ -420,8 +420,9 @@ def winding_step(b: float, rk4: bool) -> tuple[float, float]:
     The first number is the weight of a constant speed in the mean torque, and of the speed's change
     in the torque at the end. The second is the share of the drag of a motor without inductance that
     MuJoCo gets, so that the speed's change in the step has its effect on the mean torque. A change
-    by 1 has the effect `late` there. RK4 applies a drag at the mean speed, so at half of the
-    change, and implicit integrators at the speed at the end.
+    by 1 has the effect `late` there. RK4 applies a
+    drag at the mean speed, so at half of the change, and implicit integrators at the speed at the
+    end.
     """
     drag = 1.0 - _mean(b)
     if b < SHORT_STEP:
@@ -441,7 +442,8 @@ def _rise(a: float) -> float:
     .. a.
 
     With mean m and moment p = integral of (1 - s) f over the step s = 0 .. 1, stages of m - b, m,
-    m, m + b with b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
+    m, m + b with
+    b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
     """
     if a < SHORT_STEP:
         return -a / 2.0 + a**2 / 4.0 - 3.0 * a**3 / 40.0

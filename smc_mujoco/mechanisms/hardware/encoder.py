@@ -95,7 +95,10 @@ class Encoder(Part):
         ):
             count = time / step
             if math.isinf(count) or abs(count - round(count)) > 1e-6 or 0.0 < count < 0.5:
-                steps = f"a whole number of physics steps of {step:g} s: give a physics_step that divides it"
+                steps = (
+                    f"a whole number of physics steps of {step:g} s: "
+                    "give a physics_step that divides it"
+                )
                 raise ScenarioError(f"Encoder's {name} {time:g} s is not {steps}")
 
     def fields(self, model):

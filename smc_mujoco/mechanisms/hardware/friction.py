@@ -172,7 +172,8 @@ class LuGre(Friction):
         super().__post_init__()
         if self.static < self.coulomb:
             raise ScenarioError(
-                f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: give static >= coulomb"
+                f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: "
+                "give static >= coulomb"
             )
 
     def structure(self) -> Hashable:

@@ -83,7 +83,8 @@ class Friction(Part):
         """Return this friction with a factor on its force."""
         if not self.forces:
             raise ScenarioError(
-                f"{type(self).__name__} cannot be scaled: name its fields that are forces in `forces`"
+                f"{type(self).__name__} cannot be scaled: "
+                "name its fields that are forces in `forces`"
             )
         values = {name: getattr(self, name) for name in self.forces}
         given = {name: np.asarray(value) for name, value in values.items() if value is not None}

@@ -2,8 +2,8 @@
 MX-106 as presets.
 
     servo = smc.hardware.servo("mx106", "m4")
-    scenario = smc.Scenario(plant="pendulum", law=..., actuator=servo.motor,
-    friction=servo.friction)
+    parts = {"actuator": servo.motor, "friction": servo.friction}
+    scenario = smc.Scenario(plant="pendulum", law=..., **parts)
 
 The load of a gearbox is the two torques on its sides, that of its motor and that from outside, and
 not their sum: if a motor holds a weight, the sum is 0 and the gearbox is loaded. The callback reads
@@ -34,15 +34,17 @@ class ServoFriction(Sliding):
 
     Models M1 to M5 are M6 with some numbers 0, or equal to each other.
 
-        F(v) = (kc + |km m - ke e| + w (kcs + |kms m - kes e| + q)) sgn(v) + kv v,    w = exp(-|v/vs|^alpha)
+        F(v) = (kc + |km m - ke e| + w (kcs + |kms m - kes e| + q)) sgn(v) + kv v
+        w = exp(-|v/vs|^alpha)
         q = keq e^2 if |m| > |e|,  kmq m^2 if |m| < |e|,  0 if m and e have the same sign or size
 
     m is the motor's torque, e that from outside: see the module's docstring. Friction differs
     between a servo that drives its load against e and one that e drives back. At rest, friction
     holds up to |F| for v to 0.
 
-        M1  kc, kv                M3  M1 and km = ke                    M5  km, ke, kms and kes differ
-        M2  M1 and kcs, vs, alpha M4  M2 and km = ke, kms = kes         M6  M5 and kmq, keq
+        M1  kc, kv                    M2  M1 and kcs, vs, alpha
+        M3  M1 and km = ke            M4  M2 and km = ke, kms = kes
+        M5  km, ke, kms, kes differ   M6  M5 and kmq, keq
 
     Source: M. Duclusaud, G. Passault, V. Padois and O. Ly, Extended friction models for the physics
     simulation of servo actuators, arXiv 2410.08650, 2024; signs and q as in their code, Rhoban/bam

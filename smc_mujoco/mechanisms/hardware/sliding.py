@@ -4,12 +4,11 @@ evaluates it.
 A formula gives the force F that resists a joint sliding at the speed v, and the bounds [low, high]
 of the force that holds the joint at rest. The bounds are needed because a fit to records of moving
 joints is a smooth F with F(0) = 0. By F alone, a joint under a load would never rest: it would
-creep at the speed at which F equals the load. So a joint
-slides or sticks:
+creep at the speed at which F equals the load. So a joint slides or sticks:
 
     slides:  friction = -F(v, motor, load)
-    sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high), like a LuGre bristle that
-    does not slip
+    sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high),
+             like a LuGre bristle that does not slip
 
 A joint sticks when its speed changes sign or is small (STICKING_SPEED); x_s is its position at that
 time. It slides again when stiffness (x - x_s) leaves the bounds. So friction is F to the last bit
@@ -102,7 +101,8 @@ class Sliding(Friction):
         """
         if not inertia > 0.0:
             raise ScenarioError(
-                f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: give others"
+                f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: "
+                "give others"
             )
         stiffness = inertia * BRISTLE_FREQUENCY**2
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
@@ -116,7 +116,7 @@ class Sliding(Friction):
 
 
 def _of(value: Any, i: int) -> Any:
-    """Return the value of channel i, from one value for all channels or a tuple with one for each."""
+    """Return the value of channel i, from one value for all or a tuple with one for each."""
     return value[i] if isinstance(value, tuple) else value
 
 

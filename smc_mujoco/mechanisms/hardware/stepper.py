@@ -1,8 +1,8 @@
 """A stepper motor behind a pulse generator: the command is an acceleration, and the motor follows a
 field that steps.
 
-    u, in rad/s^2 -> speed -> rate of steps -> queue of steps -> the motor's field -> torque ~
-    sin(field - shaft)
+    u, in rad/s^2 -> speed -> rate of steps -> queue of steps
+      -> the motor's field -> torque ~ sin(field - shaft)
 
 Three functions simulate it, compiled in the callback and as they are in the reference loop:
 `command` is the firmware's part at a control sample, `advance` fills the queue, and `field` turns
@@ -101,7 +101,8 @@ class Stepper(Actuator):
         if self.queued > MAX_QUEUED:
             long = f"queue {self.queue:g} s at a speed of {self.speed:g} is {self.queued:,} steps"
             raise ScenarioError(
-                f"Stepper's {long}: give at most {MAX_QUEUED:,}, by a shorter queue or a lower speed"
+                f"Stepper's {long}: "
+                f"give at most {MAX_QUEUED:,}, by a shorter queue or a lower speed"
             )
         if self.steps < math.inf and self.speed * self.per_unit > MAX_RATE:
             fast = f"speed {self.speed:g} is {self.speed * self.per_unit:g} steps/s"

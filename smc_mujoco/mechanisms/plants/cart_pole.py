@@ -5,10 +5,10 @@
 
 Channel 0 is the cart's position x in m. Channel 1, which has no actuator, is the angle q in rad of
 the pole from upright, positive to the right. The pole is uniform, and l is half its length. b and
-bq, the viscous friction of rail and hinge, are 0 by default. Source: A. G. Barto, R. S. Sutton and
-C. W. Anderson, Neuronlike adaptive elements that can solve difficult learning control problems,
-IEEE Trans. Systems, Man, and Cybernetics 13(5):834, 1983, appendix: masses and length. Its friction
-(5e-4 N on the rail, 2e-6 N m s at the hinge) is left out.
+bq, the viscous friction of rail and hinge, are 0 by default.
+Source: A. G. Barto, R. S. Sutton and C. W. Anderson, Neuronlike adaptive elements that can solve
+difficult learning control problems, IEEE Trans. Systems, Man, and Cybernetics 13(5):834, 1983,
+appendix: masses and length. Its friction (5e-4 N on the rail, 2e-6 N m s at the hinge) is left out.
 """
 
 from math import cos, sin

@@ -7,16 +7,17 @@
     G = [(m1 r1 + m2 l1) grav sin(q1) + m2 r2 grav sin(q1 + q2), m2 r2 grav sin(q1 + q2)]
 
 Channel 0 is the shoulder's angle q1 in rad from hanging, channel 1 the elbow's angle q2 of the
-lower link from the
-upper one. Seen from the front, both are counter-clockwise; (pi, 0) is upright. The disturbances are
-external torques: d1 of the shoulder acts on the upper link, d2 of the elbow on the lower link. d2
-turns the shoulder, too, so that d = (d1 + d2, d2). `pendubot` drives only the shoulder, `acrobot`
-only the elbow. I1 and I2 are about the joints, Ir is a motor's rotor before its gear, B = (b1, b2)
-and F = (cf1, cf2). A motor gives at most 6 N m. Each channel's nominal f has the effect of the
-other's command. MuJoCo computes it, without the dry friction. Source:
-dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), design C.1: model 1.1, the default here,
-is model 1.0 without friction and rotors. `MODEL_1_0` has these. Its published dry friction is cf
-arctan(100 q'), which reaches cf pi/2 at speed: F here.
+lower link from the upper one. Seen from the front, both are counter-clockwise; (pi, 0) is upright.
+The disturbances are external torques: d1 of the shoulder acts on the upper link, d2 of the elbow on
+the lower link. d2 turns the shoulder, too, so that
+d = (d1 + d2, d2). `pendubot` drives only the shoulder, `acrobot` only the elbow. I1 and I2 are
+about the joints, Ir is a motor's rotor before its gear, B = (b1, b2) and F = (cf1, cf2). A motor
+gives at most 6 N m. Each channel's nominal f has the effect of the other's command. MuJoCo computes
+it, without the dry friction.
+Source: dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), design C.1: model 1.1, the
+default here, is model 1.0 without friction and rotors. `MODEL_1_0` has these. Its published dry
+friction is cf arctan(100 q'), which reaches
+cf pi/2 at speed: F here.
 """
 
 from math import cos, pi, sin

@@ -2,7 +2,8 @@
 
 The joint's polynomial spring is the restoring force, exactly. Wells at +-sqrt(-alpha/beta).
 Source: G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz, 1918. Numbers: chosen
-for the paper study, so that the wells lie at +-1 m.
+for the
+paper study, so that the wells lie at +-1 m.
 
 Mechanism `springs`: two springs of stiffness k and rest length L from the cart to anchors at a
 distance a on either side, V = k (sqrt(x^2 + a^2) - L)^2, which snaps through. L^2 = a^2 -

@@ -13,12 +13,12 @@ inertia of arm and rotor about the vertical, L the arm's length, l the pendulum'
 from its hinge and Jc its inertia about this centre. It has none about its length. tx and ty are the
 slopes of the table on which the base stands: gravity pulls the pendulum towards growing x at x = 0
 by tx, and at x = 90 degrees by ty. k is the spring of a cable between base and arm, unbent at x =
-0. Slopes, spring and the friction b, bq, cf, cfq are 0 by default. The dry friction is left out of
-the nominal f and g. Source: Quanser's QUBE-Servo 2 with the rotary pendulum, its published numbers:
-rotor 4e-6 kg m^2, arm 0.095 kg of 0.085 m, pendulum 0.024 kg of 0.129 m, uniform. The arm's inertia
-is m r^2/12 as in BlueRiverTech's quanser-openai-driver; Quanser's own file for the QUBE-Servo 3 has
-m r^2/3. The motor gives at most k V / R = 0.05 N m at rest, with k = 0.042 N m/A, R = 8.4 ohm and V
-= 10 V.
+0. Slopes, spring and the friction b, bq, cf, cfq are 0 by default.
+The dry friction is left out of the nominal f and g.
+Source: Quanser's QUBE-Servo 2 with the rotary pendulum, its published numbers: rotor 4e-6 kg m^2,
+arm 0.095 kg of 0.085 m, pendulum 0.024 kg of 0.129 m, uniform. The arm's inertia is m r^2/12 as in
+BlueRiverTech's quanser-openai-driver; Quanser's own file for the QUBE-Servo 3 has m r^2/3. The
+motor gives at most k V / R = 0.05 N m at rest, with k = 0.042 N m/A, R = 8.4 ohm and V = 10 V.
 """
 
 from math import cos, sin, sqrt

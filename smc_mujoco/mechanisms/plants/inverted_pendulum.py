@@ -1,7 +1,8 @@
 """Inverted pendulum: m l^2 x'' = m grav l sin x - b x' + u + d, x the angle from upright.
 
 A point mass on a massless rod, driven at the pivot: the pendulum of H. K. Khalil, Nonlinear
-Systems, 2002, section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
+Systems, 2002,
+section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
 
 Contacts, with a geometry for l = 0.5 m: the `floor` that a failed pendulum falls on, padded
 `stops`, a hard `wall` on the right, and a `peg` on the dial that the rod hits on its way up from

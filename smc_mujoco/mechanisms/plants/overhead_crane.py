@@ -6,9 +6,10 @@
 Channel 0 is the trolley's position x in m. Channel 1, which has no actuator, is the angle q in rad
 of the rope from the vertical, with the direction of cart_pole's: the load is at x - l sin(q), to
 the left of the trolley if q > 0. The rope is a massless rod and the load a point. b and bq, the
-viscous friction of rail and hinge, are 0 by default. Source: Y. Fang, W. E. Dixon, D. M. Dawson and
-E. Zergeroglu, Nonlinear coupling control laws for an underactuated overhead crane system, IEEE/ASME
-Trans. Mechatronics 8(3):418, 2003: its equation in a plane, and numbers like those of its testbed.
+viscous friction of rail and hinge, are 0 by default.
+Source: Y. Fang, W. E. Dixon, D. M. Dawson and E. Zergeroglu, Nonlinear coupling control laws for an
+underactuated overhead crane system, IEEE/ASME Trans. Mechatronics 8(3):418, 2003: its equation in a
+plane, and numbers like those of its testbed.
 """
 
 from math import cos, sin

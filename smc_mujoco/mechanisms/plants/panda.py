@@ -5,8 +5,7 @@ to press on.
 
 Channel i, from 0, is the angle of the maker's joint i + 1, rad; u is the torque of its motor after
 the gear. M, C and G are those of seven rigid links on the maker's modified Denavit-Hartenberg
-frames. The z axis of a frame is the axis of
-its joint:
+frames. The z axis of a frame is the axis of its joint:
 
     joint        1      2      3      4       5       6      7      flange
     a, m         0      0      0      0.0825  -0.0825 0      0.088  0
@@ -36,13 +35,14 @@ and by up to 7 %, and their inertias of joints 5, 6 and 7 are smaller by factors
 c6z m6 that it gives, 0.0679 kg m, is printed as 0.0824 (other fits: 0.0771 to 0.0817). The effect
 is at most 0.14 N m on joint 5. It is kept as published. The printed digits of delta leave link 2
 with a principal inertia of -2.2e-5 kg m^2; M stays positive definite. Off-diagonal inertias of
-delta's links 3 to 7, below 2e-8 kg m^2, are left out. Source: masses, centres and inertias of the
-links: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca, Dynamic identification of
-the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based optimization,
-IEEE Robotics and Automation Letters 4(4), 2019, with its supplement. mujoco_menagerie (Apache-2.0)
-also has the maker's limits of positions and torques. Steel: 7850 kg/m^3. lp, the probe, and the
-places of table and wall are chosen. Left out: the maker's bounds on speed, 2.175 rad/s (joints 1 to
-4) and 2.61 rad/s, and contacts between links.
+delta's links 3 to 7, below 2e-8 kg m^2, are left out.
+Source: masses, centres and inertias of the links: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo
+Giordano and A. De Luca, Dynamic identification of the Franka Emika Panda robot with retrieval of
+feasible parameters using penalty-based optimization, IEEE Robotics and Automation Letters 4(4),
+2019, with its supplement. mujoco_menagerie (Apache-2.0) also has the maker's limits of positions
+and torques. Steel: 7850 kg/m^3. lp, the probe, and the places of table and wall are chosen. Left
+out: the maker's bounds on speed, 2.175 rad/s (joints 1 to 4) and 2.61 rad/s, and contacts between
+links.
 """
 
 import math

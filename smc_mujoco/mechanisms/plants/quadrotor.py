@@ -25,16 +25,16 @@ h, sag and fade are in no law, and a payload is not if a mismatch adds it.
 Published sets, `smc.plant("quadrotor", set="gym")`; those of the Crazyflie differ by 7.6 in c and
 by 2.6 in D:
   crazyflie, the default: crazyflow with a lag of 0.0625 s, which the firmware's INDI takes the
-  rotors to have. crazyflow: cf2x_L250 of crazyflow and drone-models, identified in flight; lag of a
-  speed-up 0.136 s, of a small
-    slow-down at hover 0.108 s. Behind it the gains of `geometric`, the firmware's, leave a limit
-    cycle that loses metres of height: so its lag is not the default. c is that at hover. Its Jr is
-    marked there as doubtful.
+    rotors to have.
+  crazyflow: cf2x_L250 of crazyflow and drone-models, identified in flight; lag of a speed-up
+    0.136 s, of a small slow-down at hover 0.108 s. Behind it the gains of `geometric`, the
+    firmware's, leave a limit cycle that loses metres of height: so its lag is not the default. c is
+    that at hover. Its Jr is marked there as doubtful.
   gym: cf2x of gym-pybullet-drones; no lag. Drag at the rotors' speed at hover, as in the next two.
   rotorpy: the Crazyflie of RotorPy, whose c is of unknown origin; lag 0.072 s.
   crazys: the Crazyflie of CrazyS; lag 0.0125 s up, 0.025 s down.
   hummingbird: the 0.5 kg vehicle of RotorPy, for scale, with its arms of 0.17 m taken as diagonal;
-  lag 0.005 s.
+    lag 0.005 s.
 A battery of the Crazyflie has sag 0.32: U = 4.046 V - 0.175 I, 2.39 A at 0.322 N (Bitcraze's thrust
 stand, 2015). Sources: crazyflow and drone-models 0.1.0, gym-pybullet-drones, RotorPy (MIT licence),
 CrazyS (Apache-2.0). The sign of the gyroscopic torque follows from the balance of angular momentum;
@@ -162,7 +162,8 @@ def build(n):
 def fields(model, p):
     if p.fade > 1.0:
         raise ScenarioError(
-            f"quadrotor's fade is {p.fade:g}: give the share of its thrust that rotor 1 loses, 0 to 1"
+            f"quadrotor's fade is {p.fade:g}: "
+            "give the share of its thrust that rotor 1 loses, 0 to 1"
         )
     for name in ("rise", "fall", "fall2", "Jr", "Dx", "Dy", "Dz", "lift"):
         if getattr(p, name) < 0.0:

@@ -2,9 +2,10 @@
 
 The friction has a viscous part b, a dry one cf and a constant one, `offset`, as of an axis that is
 not level. The dry friction is left out of the nominal f; at rest it holds the carriage against
-whatever is less than cf. Source: A. Janot, M. Gautier & M. Brunot, "Data set and reference models
-of EMPS", Workshop on Nonlinear System Identification Benchmarks, 2019: its four identified
-parameters. The drive gives 35.1507 N/V at up to 10 V.
+whatever is less than cf.
+Source: A. Janot, M. Gautier & M. Brunot, "Data set and reference models of EMPS", Workshop on
+Nonlinear System Identification Benchmarks, 2019: its four identified parameters. The drive gives
+35.1507 N/V at up to 10 V.
 """
 
 import mujoco

@@ -1,8 +1,8 @@
 """Van der Pol oscillator: M x'' = mu (1 - x^2) x' - k x + u + d  (a limit cycle of amplitude 2 m).
 
 The joint gives -k x + mu x', a damper across the rail gives -mu x^2 x' to 4e-12: see
-models/van_der_pol.xml. Source: B. van der Pol, On relaxation-oscillations, 1926. Numbers: chosen
-for the paper study.
+models/van_der_pol.xml.
+Source: B. van der Pol, On relaxation-oscillations, 1926. Numbers: chosen for the paper study.
 
 Mechanism `springs`: two springs of stiffness k/2 along the rail, a motor in the cart that pushes
 with +mu x', and a damper c to an anchor at a distance h to the side, which pushes with -c x^2/(x^2

@@ -10,7 +10,7 @@ from helpers.flights import MEASUREMENT, recorded, scenarios
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.control.joint_law import catalogue
+from smc_mujoco.control.law import joint_catalogue
 from smc_mujoco.control.law import FREE_BODY
 from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.mechanisms.rotation import quaternion, rotation_vector
@@ -18,7 +18,7 @@ from smc_mujoco.mechanisms.rotation import quaternion, rotation_vector
 pytestmark = needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
-LAWS = [name for name, law in catalogue().items() if FREE_BODY in law.plants]
+LAWS = [name for name, law in joint_catalogue().items() if FREE_BODY in law.plants]
 # Firmware: reads quaternions and measurements, of which it computes the errors itself.
 FIRMWARE = """#include "law.c"
 #include <stdio.h>
