@@ -19,9 +19,9 @@ from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.law import joint_catalogue as joint_laws
 from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.law import joint_catalogue as joint_laws
 from smc_mujoco.control.properties import PROPERTIES, reads, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.plant import Plant

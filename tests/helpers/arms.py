@@ -3,8 +3,7 @@
 import functools
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import joint_catalogue
-from smc_mujoco.control.law import FREE_BODY
+from smc_mujoco.control.law import FREE_BODY, joint_catalogue
 
 # laws that an arm can have; those of a free body take parts of arrays, which have no translation
 # into C

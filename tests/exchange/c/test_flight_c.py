@@ -10,8 +10,7 @@ from helpers.flights import MEASUREMENT, recorded, scenarios
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.control.law import joint_catalogue
-from smc_mujoco.control.law import FREE_BODY
+from smc_mujoco.control.law import FREE_BODY, joint_catalogue
 from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.mechanisms.rotation import quaternion, rotation_vector
 
