@@ -32,9 +32,8 @@ import numpy as np
 LEVEL = 0.95  # of confidence, of every interval and verdict; chosen
 # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
 RESAMPLES = 1999
-MIN_INTERVAL_SAMPLES = (
-    6  # with fewer, no interval of a median covers 95 %; their range is given instead
-)
+# with fewer, no interval of a median covers 95 %; their range is given instead
+MIN_INTERVAL_SAMPLES = 6
 
 
 class Interval(NamedTuple):
@@ -72,18 +71,16 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
         order = np.argsort(block)[: (~np.isnan(block)).sum()]
         counts = drawn[order]
         ordered = block[order]
-        counts[:, ~counts.any(axis=0)] = (
-            1  # a resample that draws no run of the block takes each of them once
-        )
+        # a resample that draws no run of the block takes each of them once
+        counts[:, ~counts.any(axis=0)] = 1
         counted = 2 * np.cumsum(counts, axis=0, dtype=drawn.dtype)
         total = counted[-1] // 2
         lower[:, k] = ordered[(counted < total).sum(axis=0)]
         upper[:, k] = ordered[(counted <= total).sum(axis=0)]
     # T. C. Hesterberg's expanded percentile, with Student's t of n - 1 degrees of freedom
     tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2))
-    at = max(
-        1, math.floor(tail * (RESAMPLES + 1))
-    )  # index of the resample at which the interval ends, from either end
+    # index of the resample at which the interval ends, from either end
+    at = max(1, math.floor(tail * (RESAMPLES + 1)))
     lower, upper = np.sort(middle(lower)), np.sort(middle(upper))
     return Interval(centre, float(lower[at - 1]), float(upper[RESAMPLES - at]), n)
 
@@ -112,9 +109,8 @@ def share_interval(share: float, n: int) -> Interval:
     centre = share + z * z / (2 * n)
     half = z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((centre + side * half) / (1 + z * z / n) for side in (-1, 1))
-    return Interval(
-        share, max(min(low, share), 0.0), min(max(high, share), 1.0), n
-    )  # rounding aside, it has it
+    # rounding aside, it has it
+    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)
 
 
 @functools.lru_cache(maxsize=8)

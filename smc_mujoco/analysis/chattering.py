@@ -35,34 +35,27 @@ from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
-GRID_FREQUENCIES, GRID_AMPLITUDES = (
-    59,
-    35,
-)  # cells of the coarse grid on which cycles are sought: chosen
+# cells of the coarse grid on which cycles are sought: chosen
+GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35
 # parts of a coarse cell's sides: a cell of the finest grid is 11 % in amplitude, about 1.5 % in
 # frequency
 CUTS = 8
-CELL_MARGIN = (
-    0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
-)
+# of a cell's range of N L, by which N L may be outside that of the corners: chosen
+CELL_MARGIN = 0.5
 # samples of a period on the grid; not whole, so that they move from period to period; chosen
 COARSE_SAMPLES = 60.618
 MAX_OTHER_CYCLES = 3  # stable ones beside the predicted; more are artefacts of the sampling: chosen
 COARSE_NOISE = 0.1  # error of the log of N L with few samples a period: chosen
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # of a cell, in order
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
-SAME_CYCLE_TOLERANCE = (
-    0.02  # of the logs of amplitude and omega, below which two cycles are one: chosen
-)
-MAX_SHIFT = (
-    1.0  # of these logs, from a cell to its cycle, or from that to the cycle with harmonics: chosen
-)
-BALANCE_TOLERANCE = (
-    0.01  # of the log of N L at a cycle: the places of the samples make N jump; chosen
-)
-MAX_NYQUIST_SHARE = (
-    2.0 / 3.0
-)  # of half the sampling frequency: runs lock faster waves to two samples a period
+# of the logs of amplitude and omega, below which two cycles are one: chosen
+SAME_CYCLE_TOLERANCE = 0.02
+# of these logs, from a cell to its cycle, or from that to the cycle with harmonics: chosen
+MAX_SHIFT = 1.0
+# of the log of N L at a cycle: the places of the samples make N jump; chosen
+BALANCE_TOLERANCE = 0.01
+# of half the sampling frequency: runs lock faster waves to two samples a period
+MAX_NYQUIST_SHARE = 2.0 / 3.0
 SMALLEST = 1e-300  # for the log of 0
 MIN_GAIN_GROWTH = 3.0  # of a law that switches, from an amplitude to a thousandth of it: chosen
 CYCLE_TOLERANCE = 1e-4  # of the logs of amplitude and omega of a cycle: the last step of the search
@@ -74,15 +67,13 @@ STABILITY_STEP = 0.1  # relative, in Loeb's criterion: smaller ones see these ju
 AMPLITUDE_FACTOR = 1.01
 FREQUENCY_FACTOR = 1.01
 MAX_GAIN_DRIFT = 0.05  # relative: a law whose gain drifts more gets a remark; chosen
-RESONANCE_DAMPING = (
-    0.01  # imaginary part of frequencies over the real one, so that resonances have a width; chosen
-)
+# imaginary part of frequencies over the real one, so that resonances have a width; chosen
+RESONANCE_DAMPING = 0.01
 PHASE_STEP = 0.005  # of the log of omega, along the curve of phase over frequency; chosen
 
 Balance = tuple[float, float]  # amplitude of e, rad or m, and omega, rad/s, where N L = 1
-Cell = tuple[
-    np.ndarray, np.ndarray
-]  # the lowest and the highest logs of amplitude and omega, (2,) each
+# the lowest and the highest logs of amplitude and omega, (2,) each
+Cell = tuple[np.ndarray, np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -101,19 +92,16 @@ class Chattering:
     amplitude_x: float = math.nan  # of the position, rad or m
     amplitude_u: float = math.nan  # of the command, half its range: N m, N or V
     frequency: float = math.nan  # Hz
-    power: float = (
-        math.nan
-    )  # mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s
+    # mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s
+    power: float = math.nan
     # amplitude of x, rad or m, of the largest unstable cycle within this one; 0 without one
     threshold_x: float = 0.0
-    third_harmonic: float = (
-        math.nan
-    )  # of s over its first; if large, the prediction is rough; NaN for two samples
+    # of s over its first; if large, the prediction is rough; NaN for two samples
+    third_harmonic: float = math.nan
     amplitude_range: tuple[float, float] = (math.nan, math.nan)
     frequency_range: tuple[float, float] = (math.nan, math.nan)  # Hz
-    coupling: float = (
-        math.nan
-    )  # amplitude of another driven channel's x over amplitude_x; if large, prediction fails
+    # amplitude of another driven channel's x over amplitude_x; if large, prediction fails
+    coupling: float = math.nan
     gain: complex = complex(math.nan)  # N at the cycle
     response: complex = complex(math.nan)  # L at the cycle
     assumptions: tuple[str, ...] = ()  # what was left out or is doubtful, in sentences
@@ -269,10 +257,8 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
         return np.array([product(i, k) for i, k in places]).reshape(-1, len(CORNERS))
 
-    cells, side = (
-        CUTS * np.argwhere(np.ones(count)),
-        CUTS,
-    )  # each by the indices of its lowest omega and amplitude
+    # each by the indices of its lowest omega and amplitude
+    cells, side = CUTS * np.argwhere(np.ones(count)), CUTS
     while side > 1:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2

@@ -37,9 +37,8 @@ DIFFERENCE_STEP = 1e-6  # SI units, of finite differences
 CHUNK_SAMPLES = 50_000  # samples for which a law is called at once
 MAX_SAMPLES = 10**9  # in a period, for a describing function
 MAX_SAMPLES_PER_PERIOD = 1000  # of an excitation: a law that would take more is called this often
-EXCITATION_SAMPLES = (
-    3  # times the largest number in a period: about as many samples has an excitation
-)
+# times the largest number in a period: about as many samples has an excitation
+EXCITATION_SAMPLES = 3
 MIN_PERIODS, MAX_PERIODS = 12, 600  # of an excitation
 SETTLING_SHARE = 0.4  # of an excitation, while memories settle: left out
 REST_SAMPLES = 1000  # samples before an encoder's reading moves by one count, and as many after it
@@ -98,9 +97,8 @@ class Loop:
                 moves = f"joint {joint!r} of {plant.name} moves from {low:g} to {high:g}"
                 cure = "measure it in a run, with smc.score, or choose another plant"
                 raise ScenarioError(f"chattering is predicted about x = 0, and {moves}: {cure}")
-        free = (
-            channel + plant.driven
-        )  # the joint without an actuator that the channel moves, if there is one
+        # the joint without an actuator that the channel moves, if there is one
+        free = channel + plant.driven
         if free < plant.n:
             self.joints = [channel, free]
         else:
@@ -244,9 +242,8 @@ class Loop:
         earlier or later than in the mean.
         """
         h = max(self.scenario.control_period, math.tau / omega / MAX_SAMPLES_PER_PERIOD)
-        locked = (
-            math.tau / h / (2 * max(round(math.pi / omega / h), 2))
-        )  # of an even number of samples, four or more
+        # of an even number of samples, four or more
+        locked = math.tau / h / (2 * max(round(math.pi / omega / h), 2))
         mean = self.gain(amplitude, 1.001 * locked)
         shifts = []
         for position in (np.arange(SAMPLE_POSITIONS) + 0.5) / SAMPLE_POSITIONS:
@@ -259,9 +256,8 @@ class Loop:
 
     def _gain_of(self, first: complex, amplitude: float, omega: float) -> complex:
         two_samples = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
-        images = (
-            2.0 if two_samples else 1.0
-        )  # with two samples a period a wave and its image are the same
+        # with two samples a period a wave and its image are the same
+        images = 2.0 if two_samples else 1.0
         return first / (1j * amplitude * images) * play(amplitude, self.gap)
 
     def _joint_gap(self, gear: Backlash, model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -25,10 +25,8 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 
 LONGEST = 2.0  # s of a run, with the approach and some rest of most; chosen
-COPIES, MOST_NUMBERS = (
-    256,
-    32768,
-)  # of a law at once; numbers of their memories, which fit a processor's second cache
+# of a law at once; numbers of their memories, which fit a processor's second cache
+COPIES, MOST_NUMBERS = 256, 32768
 ROUNDS = 5
 
 

@@ -37,9 +37,8 @@ from smc_mujoco.mechanisms.plant import Plant
 
 EQUALITY_TOLERANCE = 1e-6  # relative: smaller differences count as none
 MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first maximum of every restoring force here
-DISPLACEMENTS = np.geomspace(
-    1e-7, MAX_DISPLACEMENT, 4000
-)  # rad or m, of `restoring_force`: steps of 0.5 %
+# rad or m, of `restoring_force`: steps of 0.5 %
+DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)
 
 
 # linearisation
@@ -179,10 +178,8 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
     row = lam * np.array([k1, 1.0])
     adjugate = np.array([[e[1, 1], -e[0, 1]], [-e[1, 0], e[0, 0]]])
     n1, n0 = row @ gamma, -row @ adjugate @ gamma  # adj(w - E) = w - adj(E)
-    trace, determinant = (
-        t - n1,
-        d + n0,
-    )  # of the change of the loop without delay over a sample: Jury's conditions
+    # of the change of the loop without delay over a sample: Jury's conditions
+    trace, determinant = t - n1, d + n0
     if min(determinant, -trace - determinant, 4.0 + 2.0 * trace + determinant) <= 0.0:
         return 0.0
     if n0 - 2.0 * n1 >= 4.0 + 2.0 * t + d:

@@ -46,9 +46,8 @@ from smc_mujoco.simulation.signals import Constant, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
-VELOCITY_NOISE_RATIO = (
-    5.0  # 1/s, noise of the velocity over that of the position: that of the study's sensor
-)
+# 1/s, noise of the velocity over that of the position: that of the study's sensor
+VELOCITY_NOISE_RATIO = 5.0
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
 FORCES, NOISES = (
@@ -58,10 +57,8 @@ MASS_RATIOS = tuple(np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:].tolist())
 JITTERS = tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES))  # of the control period
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # resolution of a full and of a quick search, of the level
-QUANTA = {
-    FINE: 1,
-    COARSE: 5,
-}  # the same in quanta, for levels that are multiples of one, such as control periods
+# the same in quanta, for levels that are multiples of one, such as control periods
+QUANTA = {FINE: 1, COARSE: 5}
 QUICK_DURATION = 5.0  # s, of a quick search's runs
 EXPECTED_HALVINGS = 6  # of an interval between two levels, for the progress bar
 
@@ -75,12 +72,10 @@ Key = TypeVar("Key")
 class Search:
     """The search for the largest tolerated level below the first one that is not tolerated."""
 
-    levels: Sequence[
-        float
-    ]  # tried first, from small to large, up to the first that is not tolerated
-    resolution: Callable[
-        [float], float
-    ]  # largest tolerated level -> the interval at which the search ends
+    # tried first, from small to large, up to the first that is not tolerated
+    levels: Sequence[float]
+    # largest tolerated level -> the interval at which the search ends
+    resolution: Callable[[float], float]
     rounded: Callable[[float], float] = float  # level -> the nearest one that a run can have
     low: float = 0.0  # largest level known to be tolerated; at first the level without any effect
     high: float = math.inf  # smallest level known not to be tolerated; inf until there is one
@@ -128,12 +123,10 @@ class Kind:
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
     signed: bool = False  # whether a level is tolerated only if its negative is, too
-    quantum: Callable[[Scenario], float] = lambda base: (
-        0.0
-    )  # of which a level is a multiple; 0: any level
-    theory: Callable[[Scenario], float | None] = lambda base: (
-        None
-    )  # largest level by linear theory, if there is any
+    # of which a level is a multiple; 0: any level
+    quantum: Callable[[Scenario], float] = lambda base: 0.0
+    # largest level by linear theory, if there is any
+    theory: Callable[[Scenario], float | None] = lambda base: None
 
     def scenarios(self, base: Scenario, level: float) -> list[Scenario]:
         """Return the scenarios that tell whether a level is tolerated."""
@@ -271,13 +264,8 @@ MARGIN_KINDS: dict[str, Kind] = {
         put=_with_missed,
     ),
 }
-KINDS = (
-    "delay",
-    "disturbance",
-    "friction",
-    "mass",
-    "noise",
-)  # those of the report, and the default
+# those of the report, and the default
+KINDS = "delay", "disturbance", "friction", "mass", "noise"
 
 
 # margins of laws on plants

@@ -25,17 +25,11 @@ EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have fou
 ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are compared
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
-UNITS = {SETTLES: "", OBJECTIVE: "s^2"} | {
-    metric.name: metric.unit for metric in metrics()
-}  # of what boards compare
+# of what boards compare
+UNITS = {SETTLES: "", OBJECTIVE: "s^2"} | {metric.name: metric.unit for metric in metrics()}
 GROUPS = ("plant", "condition")
-LAW_ENTRIES = (
-    "law",
-    "model",
-    "surface",
-    "velocity",
-    "versions",
-)  # of a description; they may differ within a cell
+# of a description; they may differ within a cell
+LAW_ENTRIES = "law", "model", "surface", "velocity", "versions"
 GAIN_ENTRIES = ("law", "surface", "velocity")  # those of them that have gains
 
 
@@ -80,9 +74,8 @@ class ByRow(NamedTuple):
     """A metric of the rows of a table, each (rows,)."""
 
     values: np.ndarray  # see `values`
-    halves: (
-        np.ndarray
-    )  # y', the same at half the physics step: inf for a run that then failed, NaN for none
+    # y', the same at half the physics step: inf for a run that then failed, NaN for none
+    halves: np.ndarray
     trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
 
 
@@ -148,9 +141,8 @@ class Scores(NamedTuple):
     """
 
     blocks: list[int]  # the numbers of these blocks in the group
-    values: dict[
-        str, np.ndarray
-    ]  # NaN where not all laws ran, or every law did the same as with an earlier seed
+    # NaN where not all laws ran, or every law did the same as with an earlier seed
+    values: dict[str, np.ndarray]
     outcomes: dict[str, np.ndarray]  # as `Group.outcome`
     sets: dict[str, np.ndarray]  # as `Group.sets`
     halves: dict[str, np.ndarray]  # as `ByRow.halves`
@@ -169,10 +161,8 @@ class Group:
         self.name = name  # the plant that they share, or plant and condition, as column -> value
         laws, law = np.unique(columns["law"], return_inverse=True)
         keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
-        self.laws, self.blocks = (
-            tuple(laws.tolist()),
-            tuple(dict.fromkeys(keys)),
-        )  # names; (plant, condition)
+        # names; (plant, condition)
+        self.laws, self.blocks = tuple(laws.tolist()), tuple(dict.fromkeys(keys))
         index = {key: i for i, key in enumerate(self.blocks)}
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
         cells = law, np.array([index[key] for key in keys]), seed
@@ -264,9 +254,8 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
                 json.dumps({name: of_law[name] for name in GAIN_ENTRIES}), len(known_gains)
             )
         )
-        conditions["plant"].get("mjcf", {}).pop(
-            "path", None
-        )  # models are identified by their contents
+        # models are identified by their contents
+        conditions["plant"].get("mjcf", {}).pop("path", None)
         first_law, expected = first.setdefault(cell, (law, conditions))
         if differing := [
             name for name in expected if expected[name] != conditions.get(name, expected[name])
@@ -285,9 +274,8 @@ def _outcomes(table: Columns) -> np.ndarray:
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that is newer than the table
             columns.append(np.array(table.column(name), float))
-    share, exponent = np.frexp(
-        np.stack(columns, axis=1)
-    )  # to 20 binary digits, and below 1e-9 to 0
+    # to 20 binary digits, and below 1e-9 to 0
+    share, exponent = np.frexp(np.stack(columns, axis=1))
     with np.errstate(over="ignore", invalid="ignore"):
         numbers = np.ascontiguousarray(np.ldexp(np.round(share * 2**20), exponent - 20))
     numbers[np.abs(numbers) < ROUNDING] = 0.0

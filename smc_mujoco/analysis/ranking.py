@@ -68,15 +68,13 @@ from smc_mujoco.common.constraints import Number, constrained
 MAX_EXACT = 60  # samples; with more the normal approximation of the rank sum is used
 RELEVANT = 0.03  # r, default share of the larger value that is relevant; chosen
 Relevant = Annotated[float, Number(low=0.0, high=0.5)]
-TREND_POWER = (
-    5  # the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
-)
+# the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
+TREND_POWER = 5
 LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
 MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
 MAX_WIDENING = 1e3  # of a logarithm: more than the range of floating-point numbers, but finite
-MAX_RISE = (
-    60.0  # of log rho: a value that has vanished within the last fifth of a run has fallen enough
-)
+# of log rho: a value that has vanished within the last fifth of a run has fallen enough
+MAX_RISE = 60.0
 POWER = 0.8  # with which the least visible lead is seen
 # median of the absolute difference of two draws from a normal law, over its standard deviation
 NORMAL_SPREAD = 0.954
@@ -410,9 +408,8 @@ def bounds(
     change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
     widening = np.zeros(cells.shape[:2])
     known = repeated.any(axis=2)
-    widening[known] = np.minimum(
-        np.nanmedian(change[known], axis=1), MAX_WIDENING
-    )  # of a law in a block
+    # of a law in a block
+    widening[known] = np.minimum(np.nanmedian(change[known], axis=1), MAX_WIDENING)
     low = np.where(repeated, np.fmin(whole, half), whole - widening[..., None])
     high = np.where(repeated, np.fmax(whole, half), whole + widening[..., None])
     rising = _rises(trends, relevant)[..., None]
@@ -542,9 +539,8 @@ def _linked(*sets: bytes) -> tuple[int, ...] | None:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    count = nodes = (
-        len(sets[0]) // 8
-    )  # a node for each run, then one for each set of gains; no matrix of pairs of runs
+    # a node for each run, then one for each set of gains; no matrix of pairs of runs
+    count = nodes = len(sets[0]) // 8
     runs = []
     their_sets = []
     for numbers in (np.frombuffer(one, np.int64) for one in sets):
@@ -670,9 +666,8 @@ def _positive_pairs(values: np.ndarray) -> int:
     have none.
     """
     ordered = np.sort(values)
-    above = values.size - np.searchsorted(
-        ordered, -values, side="right"
-    )  # of each value, by all values, itself too
+    # of each value, by all values, itself too
+    above = values.size - np.searchsorted(ordered, -values, side="right")
     alone = int((values > 0).sum())
     return (int(above.sum()) - alone) // 2 + alone
 

@@ -58,15 +58,11 @@ HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 EARLY_PARTS = 3  # an early verdict considers the last of so many equal parts of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
-MAX_FINAL_RATIO, MAX_EARLY_RATIO = (
-    1.05,
-    0.9,
-)  # of the squared distance (e/X)^2 + (v/V)^2, second half over first
+# of the squared distance (e/X)^2 + (v/V)^2, second half over first
+MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9
 NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
-POSITION_REACH = {
-    "rad": lambda plant: math.pi,
-    "m": lambda plant: 2.0 * max(map(abs, plant.x0)),
-}  # X, chosen
+# X, chosen
+POSITION_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last third has one
 CONVERGES = 1
@@ -83,9 +79,8 @@ class Basin:
     x: np.ndarray  # (nx,), positions of the grid, in the plant's unit
     v: np.ndarray  # (nv,), velocities of the grid, per second
     outcome: np.ndarray  # (nv, nx) int8: 1 converges, 0 undecided, -1 does not
-    decided_at: (
-        np.ndarray
-    )  # (nv, nx), duration of the run that decided, s; the whole duration if undecided
+    # (nv, nx), duration of the run that decided, s; the whole duration if undecided
+    decided_at: np.ndarray
     unit: str  # of x, "rad" or "m"
     duration: float  # s, of the longest runs
     source: str = NONE  # where the law's gains come from, a kind of `control.source`

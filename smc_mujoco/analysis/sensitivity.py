@@ -223,9 +223,8 @@ def indices(
 
         def of(at: np.ndarray) -> np.ndarray:
             """Return both indices of each axis, (2, k), from some of the points."""
-            some = np.stack(
-                [parts[:, at]] * 2
-            )  # twice: scipy fails on one axis of one output, and centres in place
+            # twice: scipy fails on one axis of one output, and centres in place
+            some = np.stack([parts[:, at]] * 2)
             outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}
             found = sobol_indices(func=outputs, n=points, method=estimates)  # pyright: ignore[reportArgumentType]
             return possible(*np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0])

@@ -22,9 +22,8 @@ INSTANT_STEP = 1e-9  # s, physics step while rates are linearised
 FLAGS = mujoco.mjtDisableBit
 NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value
 NONLINEAR_FLAGS |= FLAGS.mjDSBL_FRICTIONLOSS.value | FLAGS.mjDSBL_CLAMPCTRL.value
-MAX_REST_ACCELERATION = (
-    1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
-)
+# rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
+MAX_REST_ACCELERATION = 1e-6
 
 
 def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":

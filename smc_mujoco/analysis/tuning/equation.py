@@ -92,11 +92,8 @@ class EquationRun:
         )
         places = *map(state.address, fields.values()), state.address(self.seen), at
         self.run = np.array([(*owners, *functions, *changes, *places)], RUN)
-        self.changed = [
-            self.record.view(np.uint8),
-            self.packed.numbers,
-            *fields.values(),
-        ]  # what a run changes
+        # what a run changes
+        self.changed = [self.record.view(np.uint8), self.packed.numbers, *fields.values()]
         self.at_start = [array.copy() for array in self.changed]
 
     def restart(self) -> None:

@@ -39,9 +39,8 @@ from smc_mujoco.simulation.scenario import Scenario
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "the reference loop"  # engines
 Gains = tuple[float, ...]
 Costs = tuple[float, float]  # tracking and variation of a run
-Terms = Callable[
-    [int, float | None, np.ndarray], Costs
-]  # number of a case, when it failed, s, (K + 1, n) LOG -> costs
+# number of a case, when it failed, s, (K + 1, n) LOG -> costs
+Terms = Callable[[int, float | None, np.ndarray], Costs]
 
 
 class Evaluator:
@@ -113,9 +112,8 @@ class Evaluator:
     def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[Costs]:
         laws = [self.law(gains) for gains in candidates]
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", PlainLoopWarning
-            )  # the runs of the law's own gains have warned
+            # the runs of the law's own gains have warned
+            warnings.simplefilter("ignore", PlainLoopWarning)
             traces = run(
                 [dataclasses.replace(case, law=law) for law in laws for case in self.cases],
                 self.threads,

@@ -40,26 +40,22 @@ from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_s
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-DURATION = (
-    5.0  # s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
-)
+# s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
+DURATION = 5.0
 CONDITIONS = tuple(
     NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy")
 )
 DEFAULT_STARTS = Starts()
 SEEDS_PER_SEARCH = 1000  # each condition uses one of them
-SEARCHES, MAX_SEARCHES = (
-    12,
-    1000,
-)  # of a tuning: with 12, 12 runs of two laws decide between them, see `ranking`
+# of a tuning: with 12, 12 runs of two laws decide between them, see `ranking`
+SEARCHES, MAX_SEARCHES = 12, 1000
 BUDGET, MAX_BUDGET = 64, 10_000  # evaluations of a search, for each gain
 Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
 Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]
 MAX_TUNING_SEED = 10**9
 UNSEEN = MAX_SEARCHES * (MAX_TUNING_SEED + 1)  # instances from this one on belong to no search
-FAILURE_COST = (
-    1e9  # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
-)
+# s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
+FAILURE_COST = 1e9
 
 
 class Evaluation(NamedTuple):
@@ -87,16 +83,14 @@ class Objective:
     unit, in the first condition, see `smc.chattering`. None: chattering costs its variation only.
     """
 
-    conditions: tuple[Condition, ...] = (
-        CONDITIONS  # names, or your own; each is one run of a candidate
-    )
+    # names, or your own; each is one run of a candidate
+    conditions: tuple[Condition, ...] = CONDITIONS
     starts: Starts = DEFAULT_STARTS  # initial states of the runs
     weight: Natural = 1e-3  # w, s^3
     duration: Positive = DURATION  # of a run, s
     control_period: Positive = CONTROL_PERIOD  # s
-    u_max: Positive | None = (
-        None  # bound on |u|, the same for every law, N or N m; default: as in a grid
-    )
+    # bound on |u|, the same for every law, N or N m; default: as in a grid
+    u_max: Positive | None = None
     chattering: Positive | None = None
 
     def __post_init__(self):

@@ -18,14 +18,8 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
-COMPARED_FIELDS = (
-    "rule",
-    "plant",
-    "definition",
-    "budget",
-    "seed",
-    "versions",
-)  # equal in tunings that are compared
+# equal in tunings that are compared
+COMPARED_FIELDS = "rule", "plant", "definition", "budget", "seed", "versions"
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 NEAR = 0.03  # of the best J: gains within it are as good

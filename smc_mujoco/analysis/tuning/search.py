@@ -179,9 +179,8 @@ class Trials:
     cheap: Evaluator
     accurate: Evaluator
     names: tuple[str, ...]
-    limit: Callable[
-        [dict[str, float]], dict[str, float]
-    ]  # gains -> the largest values of some of them
+    # gains -> the largest values of some of them
+    limit: Callable[[dict[str, float]], dict[str, float]]
     report: Callable[[int], None]  # called with the number of new evaluations
     screened: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
     decided: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)

@@ -38,34 +38,23 @@ from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.simulation.trace import Trace
 
 BATCH_MEMBERS = 16  # run at once; chosen
-CHANGES_PER_PARENT = (
-    7,
-    4,
-    3,
-    2,
-)  # in a batch: of the worst member, then of the worst of each other origin; chosen
+# in a batch: of the worst member, then of the worst of each other origin; chosen
+CHANGES_PER_PARENT = 7, 4, 3, 2
 MAX_CORNERS = 16
 FORCE_KNOTS = 32  # in an evolution; chosen
 KNOT_DEVIATION = 0.5  # first standard deviation of a knot, over the bound; chosen
 GENERATIONS = 4  # of an evolution, before the next one begins with the worst member so far; chosen
 FAILED_KEY = math.inf, math.inf
 SIGNS = 1.0, -1.0
-RELAY_SIGNALS = {
-    "sign of s": "s",
-    "sign of e": "error",
-    "sign of e'": "rate",
-}  # strategy -> signal that a relay sees
+# strategy -> signal that a relay sees
+RELAY_SIGNALS = {"sign of s": "s", "sign of e": "error", "sign of e'": "rate"}
 PHASE_LEADS = (-1.2, -0.6, 0.6, 1.2)  # rad, of weighted sums of e' and e before e'; chosen
 SWITCH_TIMES = (0.25, 0.5, 0.75)  # of a force that switches once, as shares of a run; chosen
-EARLY_SWITCH_TIMES = (
-    1 / 32,
-    1 / 16,
-    1 / 8,
-)  # the same while the loop still moves from its start; chosen
+# the same while the loop still moves from its start; chosen
+EARLY_SWITCH_TIMES = 1 / 32, 1 / 16, 1 / 8
 FREQUENCY_RATIOS = (0.5, 0.8, 1.0, 1.25, 2.0)  # frequencies of waves over that of the loop; chosen
-MAX_FREQUENCY_SHARE = (
-    0.1  # of the control frequency: a faster oscillation of the loop is chattering; chosen
-)
+# of the control frequency: a faster oscillation of the loop is chattering; chosen
+MAX_FREQUENCY_SHARE = 0.1
 
 
 class Case(NamedTuple):
@@ -103,9 +92,8 @@ class Search:
         self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
         self.broken = ""  # how the law or a signal failed first, in a sentence
-        self.swing: Trace | None = (
-            None  # the first run under a relay of e', or without a force, for its frequency
-        )
+        # the first run under a relay of e', or without a force, for its frequency
+        self.swing: Trace | None = None
 
     @property
     def worst(self) -> Tried:
@@ -149,9 +137,8 @@ class Search:
                     member, force=recorded_force(trace, relay, member.force)
                 )
                 if relay.slope or relay.start or trace.scenario.clock.jitter:
-                    replays.append(
-                        Case(member)
-                    )  # the recorded force differs a little from that of the relay
+                    # the recorded force differs a little from that of the relay
+                    replays.append(Case(member))
                     continue
             tried[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
         done = [one for one in tried if one]

@@ -42,9 +42,8 @@ CONSTANT_DEVIATION = 0.3  # standard deviation by which a constant moves, of its
 JITTER_SHARES = 8  # jitter is a multiple of this part of the control period; chosen
 MULTIPLE_TOLERANCE = 1e-6  # of a step: a bound so close to a multiple is one
 ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
-DEFAULT_FORCE_SHARE = (
-    1 / 6
-)  # of the force of the weakest drive: the disturbance of the default class; chosen
+# of the force of the weakest drive: the disturbance of the default class; chosen
+DEFAULT_FORCE_SHARE = 1 / 6
 DEFAULT_FRICTION_SCALE = (0.5, 1.5)  # of the default class; chosen
 
 Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
@@ -285,9 +284,8 @@ class Members:
         )
         self.constants = [sets] * (count > 1) + list(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
-        self.hold = max(
-            1, round(within.hold / self.h)
-        )  # samples that an error of measurement lasts
+        # samples that an error of measurement lasts
+        self.hold = max(1, round(within.hold / self.h))
         if within.position_noise or within.velocity_noise:
             self.times = -(-self.samples // self.hold)
         else:
@@ -304,9 +302,8 @@ class Members:
         for constant in self.constants:
             constant.check(scenario)
         for share in (0.0, 1.0):
-            self.with_constants(
-                np.full(len(self.constants), share)
-            )  # raises where bounds do not go together
+            # raises where bounds do not go together
+            self.with_constants(np.full(len(self.constants), share))
 
     def with_constants(self, shares: np.ndarray) -> Scenario:
         """Return the scenario with constants of the class."""
