@@ -96,9 +96,8 @@ def middle(values: np.ndarray) -> np.ndarray:
 
 
 def share_interval(share: float, n: int) -> Interval:
-    """Return a share of the runs of n seeds, with E.
-
-    B. Wilson's interval (JASA 22, 1927): not empty for 0 and 1.
+    """Return a share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927): not
+    empty for 0 and 1.
 
     The share within a seed lies in [0, 1], so its variance is at most p (1 - p). With n the number
     of seeds the interval is as wide as that of n independent runs, however many runs a seed has and

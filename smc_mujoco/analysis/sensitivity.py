@@ -294,10 +294,7 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
 
 
 def _confirmed(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
-    """Return whether more runs fail within a region than elsewhere, by R.
-
-    A. Fisher's exact test.
-    """
+    """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact test."""
     from scipy.stats import fisher_exact
 
     counts = []

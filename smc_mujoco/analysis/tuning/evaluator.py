@@ -4,10 +4,10 @@
     evaluate([(6.0, 2.5), (6.0, 3.0)])                    # an Evaluation for each
 
 A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator
-prepares them once, puts
-the gains of each candidate into the buffers that compiled code reads, and takes J from the logs. It
-has three engines: MuJoCo, in a Batch that lasts; the plant's `equation`, which may only find gains;
-and the reference loop, for laws that do not compile. J is that of `Objective.terms_of_run`.
+prepares them once, puts the gains of each candidate into the buffers that compiled code reads, and
+takes J from the logs. It has three engines: MuJoCo, in a Batch that lasts; the plant's `equation`,
+which may only find gains; and the reference loop, for laws that do not compile. J is that of
+`Objective.terms_of_run`.
 """
 
 import dataclasses

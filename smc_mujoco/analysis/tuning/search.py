@@ -2,9 +2,8 @@
 
 A tuning makes several searches, twelve in a comparison. Each has its own start, its own seed, and
 its own runs with other initial states and noise, so they share nothing: what they end with is a
-sample of what a user gets who tunes the
-law. Run i of a study uses the gains that search i found, see `gain_sets`. A search has 64
-evaluations for each gain:
+sample of what a user gets who tunes the law. Run i of a study uses the gains that search i found,
+see `gain_sets`. A search has 64 evaluations for each gain:
 
 1. An eighth screens a Latin hypercube in the logarithm of the gains.
 2. A half evolves from the best of them by CMA-ES (N. Hansen & A. Ostermeier, Evolutionary

@@ -24,9 +24,8 @@ wherever it starts. A gain that is declared with `turns=True` is of the attitude
 
 A law declares the unit of each gain, and which gains the search leaves as they are: initial values,
 exponents, table sizes, a plant's parameters, filters and number formats of a processor. A gain that
-a law was given as 0 stays 0, which
-says what terms the law has. A gain of unknown unit is searched over as many decades about its
-default:
+a law was given as 0 stays 0, which says what terms the law has. A gain of unknown unit is searched
+over as many decades about its default:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0,
     held=True)})

@@ -138,17 +138,11 @@ class Uncertainty:
             parts = []
         if self.disturbance and self.slope is not None:
             parts += [f"|d'| <= {self.slope:g} {u}/s"]
-        else:
-            parts += []
         hold = f" held for {self.hold:g} s"
         if self.position_noise:
             parts += [f"position errors <= {self.position_noise:g} {x}{hold}"]
-        else:
-            parts += []
         if self.velocity_noise:
             parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{hold}"]
-        else:
-            parts += []
         ranges = {
             "delay (s)": self.delay,
             f"friction ({u})": self.friction,
@@ -162,19 +156,13 @@ class Uncertainty:
         }
         if self.encoder:
             ranges |= {"encoder counts": self.encoder}
-        else:
-            ranges |= {}
         parts += [
             f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high
         ]
         if self.jitter:
             parts += [f"jitter <= {self.jitter:g} s"]
-        else:
-            parts += []
         if self.x0:
             parts += [f"x0 within {100 * self.x0:g} %"]
-        else:
-            parts += []
         return ", ".join(parts)
 
 
