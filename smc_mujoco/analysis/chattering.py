@@ -165,10 +165,15 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
 
 
 def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
-    """Yield a remark on each other stable cycle, or one remark if there are too many to be cycles."""
+    """Yield a remark on each other stable cycle, or one remark if there are too many to be
+    cycles.
+    """
     if len(others) > MAX_OTHER_CYCLES:
         slow, *_, fast = sorted(omega / math.tau for _, omega in others)
-        yield f"N L is about 1 everywhere from {slow:.3g} to {fast:.3g} Hz: the prediction is not to be trusted"
+        yield (
+            f"N L is about 1 everywhere from {slow:.3g} to {fast:.3g} Hz: the prediction is "
+            "not to be trusted"
+        )
         return
     for amplitude, omega in others:
         s = f"{loop.wave(amplitude, omega).s:.2g} {loop.scenario.plant.units[loop.channel]}/s"
@@ -188,7 +193,9 @@ def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
 
 
 def switches(loop: Loop) -> bool:
-    """Return whether a law switches: whether its gain grows without bound towards small amplitudes."""
+    """Return whether a law switches: whether its gain grows without bound towards small
+    amplitudes.
+    """
     omega = 0.1 * math.pi / loop.scenario.control_period
     smaller, small = (
         abs(loop.gain(size * MIN_AMPLITUDE, omega, COARSE_SAMPLES)) for size in (1.0, 1e3)
@@ -209,7 +216,8 @@ def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
         return Chattering(assumptions=assumptions)
     wave = later.wave(*max(stable, key=lambda one: one[1]))
     assumptions += (
-        "the balance has no solution, but the law switches: a cycle locked to the samples is possible",
+        "the balance has no solution, but the law switches: a cycle locked to the samples is "
+        "possible",
     )
     return Chattering(
         amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.s_of_one_count),
@@ -454,16 +462,23 @@ def _prediction(
     response = loop.response(wave.omega)
     if not math.isnan(wave.third):
         passed = abs(loop.response(3.0 * wave.omega) / response)
-        words = f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first"
+        words = (
+            f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its "
+            "answer to the first"
+        )
         assumptions += (words,)
     coupling = loop.coupling(wave.omega)
     if coupling:
-        words = f"other driven channels rest, though this command moves one of them {coupling:.2g} times as far"
+        words = (
+            "other driven channels rest, though this command moves one of them "
+            f"{coupling:.2g} times as far"
+        )
         assumptions += (words,)
     if threshold:
         unit = loop.scenario.plant.units[loop.channel]
         assumptions += (
-            f"x has moved beyond {threshold:.2g} {unit}, an unstable cycle: smaller oscillations die out",
+            f"x has moved beyond {threshold:.2g} {unit}, an unstable cycle: smaller oscillations "
+            "die out",
         )
     if wave.drift > MAX_GAIN_DRIFT:
         assumptions += ("gains or memories of the law drift: the prediction is a snapshot",)

@@ -125,7 +125,10 @@ def gains_for(
             [dataclasses.replace(chosen, duration=DURATION)], ["disturbance"]
         )
     if math.isnan(tolerated.value):
-        words = f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance"
+        words = (
+            f"{base.law.name} with these gains does not hold {base.plant.name}, even without "
+            "a disturbance"
+        )
         warnings.warn(words, ScenarioWarning, users_stacklevel())
     law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions))
     return Design(
@@ -145,9 +148,13 @@ def _forces(
     """
     speeds = [speed for speed in SPEEDS if speed**2 <= headroom * (1.0 + SIZE_TOLERANCE)]
     if not speeds:
-        found = f"{1.0 / headroom:.3g} times what u_max allows, and the search makes them at most {SPEEDS[0] ** -2:g}"
+        found = (
+            f"{1.0 / headroom:.3g} times what u_max allows, and the search makes them at "
+            f"most {SPEEDS[0] ** -2:g}"
+        )
         raise ScenarioError(
-            f"forces among the gains are {found} times smaller: give smaller gains, or a larger u_max"
+            f"forces among the gains are {found} times smaller: give smaller gains, or a larger "
+            "u_max"
         )
     cycles = {speed: cycle(speed) for speed in speeds}
     first = min((speed for speed, one in cycles.items() if one), default=math.inf)

@@ -90,7 +90,8 @@ class Loop:
             raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
         if s.stepper is not None:
             raise ScenarioError(
-                "chattering is not predicted for a Stepper, whose queue is no lag: measure it in a run"
+                "chattering is not predicted for a Stepper, whose queue is no lag: measure it in "
+                "a run"
             )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:

@@ -3,7 +3,7 @@ tolerated force.
 
     plant = smc.plant("inverted_pendulum")
     smallest_lam(plant, k1=9.7)                                     # 0.253
-    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)     # s, sampled and held, as in a run
+    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)     # s, sampled and held
     steady_error(plant, lam=4.4, k1=9.7, d=0.2)                     # rad
 
 At rest the plant is M x'' = -K x - D x' + u + d, x (n,), with M = 1/g, K = -(df/dx)/g (n, n) and D
@@ -11,7 +11,7 @@ At rest the plant is M x'' = -K x - D x' + u + d, x (n,), with M = 1/g, K = -(df
 its eigenvectors divide the plant into n modes that differ only in their stiffness K_j. u = -lam
 tanh(x' + k1 x) is -lam (x' + k1 x) there, so that
 
-    M x'' + (D + lam) x' + (K + lam k1) x = d.                                                          (1)
+    M x'' + (D + lam) x' + (K + lam k1) x = d.                                          (1)
 
 Each result below is that of the worst mode. A law with a boundary layer has the same form near s =
 0, with lam = k/phi and k1 = c (`linear_gains`). Laws that switch have no linear part, and no theory
@@ -54,7 +54,9 @@ class Linear:
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
-        """The stiffnesses of the modes, (n,), smallest first; a negative one is unstable by itself."""
+        """The stiffnesses of the modes, (n,), smallest first; a negative one is unstable by
+        itself.
+        """
         return np.linalg.eigvalsh(self.stiffness)
 
 
@@ -77,7 +79,8 @@ def linear(plant: Plant) -> Linear:
         or np.ptp(g) > EQUALITY_TOLERANCE * g.max()
     ):
         raise ScenarioError(
-            f"{plant.name} has no theory here: give a plant with equal joints and an actuator on each"
+            f"{plant.name} has no theory here: give a plant with equal joints and an actuator on "
+            "each"
         )
 
     def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
@@ -99,7 +102,8 @@ def linear(plant: Plant) -> Linear:
         or np.abs(stiffness - stiffness.T).max() > small
     ):
         raise ScenarioError(
-            f"{plant.name} has no theory here: give a plant whose joints are coupled only by springs"
+            f"{plant.name} has no theory here: give a plant whose joints are coupled only by "
+            "springs"
         )
     return Linear(
         inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0

@@ -175,7 +175,8 @@ class Group:
             a, b, c = np.unravel_index(int(np.argmax(twice)), self.rows.shape)
             cell = f"{laws[a]} on {', '.join(self.blocks[b])}, seed {numbers[c]}"
             raise ScenarioError(
-                f"the table has several runs of {cell}: give those of one set of gains and one duration"
+                f"the table has several runs of {cell}: give those of one set of gains and one "
+                "duration"
             )
         self.rows[cells], self.outcome[cells], self.sets[cells] = (
             rows,
@@ -203,7 +204,8 @@ class Group:
             laws = ", ".join(self.laws)
             where = ", ".join(self.name.values())
             raise ScenarioError(
-                f"{laws} have no run of {where} in common: run them in the same conditions and seeds"
+                f"{laws} have no run of {where} in common: run them in the same conditions and "
+                "seeds"
             )
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
@@ -269,7 +271,9 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
 
 
 def _outcomes(table: Columns) -> np.ndarray:
-    """Return a number for each row: the same for runs whose metrics are all equal up to rounding."""
+    """Return a number for each row: the same for runs whose metrics are all equal up to
+    rounding.
+    """
     columns = []
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that is newer than the table

@@ -434,7 +434,9 @@ def _rises(trends: np.ndarray, relevant: float) -> np.ndarray:
 
 
 def _logarithms(values: np.ndarray, floors: np.ndarray) -> np.ndarray:
-    """Return the logarithms of values (laws, blocks, seeds), at least those of the blocks' floors."""
+    """Return the logarithms of values (laws, blocks, seeds), at least those of the blocks'
+    floors.
+    """
     return np.log(
         np.maximum(np.abs(values), np.maximum(floors, np.finfo(float).tiny)[None, :, None])
     )

@@ -136,12 +136,14 @@ def basin(
     base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
     if start := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
         raise ScenarioError(
-            f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave it out"
+            f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave "
+            "it out"
         )
     reach = POSITION_REACH[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
         raise ScenarioError(
-            f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v"
+            f"{base.plant.name} starts at 0, which tells no reach: give positions x and "
+            "velocities v"
         )
     if len(counts := items_of("points", points)) != 2:
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
@@ -174,7 +176,8 @@ def basin_of(
         raise ScenarioError(f"{base.plant.name} {words}")
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
         raise ScenarioError(
-            f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference"
+            f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant "
+            "reference"
         )
     shortest = math.ceil(MIN_SAMPLES / HORIZONS[0])
     if base.samples < shortest:
@@ -268,7 +271,9 @@ def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int |
 
 
 def _approaches(squares: np.ndarray) -> bool:
-    """Return whether the largest squared distance, (K,), falls over the last four fifths of a run."""
+    """Return whether the largest squared distance, (K,), falls over the last four fifths of a
+    run.
+    """
     largest = np.array([part.max() for part in np.array_split(squares, 5)[1:]])
     return bool((largest[1:] <= MAX_EARLY_RATIO * largest[:-1]).all())
 

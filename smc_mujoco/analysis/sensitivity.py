@@ -59,7 +59,9 @@ class Region(NamedTuple):
 
 
 class Improvement(NamedTuple):
-    """The axis whose narrowing to one half improves the score most, in runs that did not choose it."""
+    """The axis whose narrowing to one half improves the score most, in runs that did not choose
+    it.
+    """
 
     half: Cut
     median: float  # of the score within that half
@@ -126,7 +128,7 @@ class Space:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Explained:
+class SobolResult:
     """A score over a class: independent runs, the indices of its axes, and where runs fail."""
 
     scenario: Scenario
@@ -294,7 +296,9 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
 
 
 def _confirmed(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
-    """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact test."""
+    """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact
+    test.
+    """
     from scipy.stats import fisher_exact
 
     counts = []

@@ -24,13 +24,18 @@ NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
 # at half the step, see `analysis.apart`
 APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"
 NUDGED = (
-    f"changes by more than {APART} at half the physics step, or by more than {100.0 * MAX_CHANGE:g} % "
+    f"changes by more than {APART} at half the physics step, or by more than "
+    f"{100.0 * MAX_CHANGE:g} % "
     f"from a start moved by {NUDGE:g} of itself"
 )
 SCORE_NOTE = f"{MARK} {NUDGED}: the smallest and the largest value"
-NOTE = f"{MARK} half the physics step changes it by more than {APART}, or a nudged start by {100.0 * MAX_CHANGE:g} %"
+NOTE = (
+    f"{MARK} half the physics step changes it by more than {APART}, or a nudged start by "
+    f"{100.0 * MAX_CHANGE:g} %"
+)
 UNTRIED = (
-    "with friction, contacts or other parts, and without RK4, half the physics step may change numbers by more than "
+    "with friction, contacts or other parts, and without RK4, half the physics step may change "
+    "numbers by more than "
     f"{100.0 * MAX_CHANGE:g} %: these runs were not repeated with it"
 )
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
-from smc_mujoco.analysis.sensitivity import CHANCE, Cut, Explained, Space, in_words
+from smc_mujoco.analysis.sensitivity import CHANCE, Cut, SobolResult, Space, in_words
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
@@ -26,7 +26,7 @@ DOT_SIZE = 26.0  # points squared, of a run
 
 
 def draw(
-    found: Explained,
+    found: SobolResult,
     path: str | os.PathLike[str] | None = None,
     title: str | None = None,
     size: Size = None,
@@ -68,7 +68,7 @@ def draw(
     return page
 
 
-def _bars(ax: Axes, found: Explained, colour: str, pale: str) -> None:
+def _bars(ax: Axes, found: SobolResult, colour: str, pale: str) -> None:
     """Draw both indices of each axis, the largest at the top."""
     rows = np.arange(len(found.axes))
     first, total = ([getattr(axis, kind) for axis in found.axes] for kind in ("first", "total"))
@@ -84,7 +84,7 @@ def _bars(ax: Axes, found: Explained, colour: str, pale: str) -> None:
     ax.grid(visible=False, axis="y")
 
 
-def _runs(ax: Axes, found: Explained, colour: str) -> None:
+def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
     """Draw independent runs over the axes of the first region, then those of the largest indices."""
     space = found.space
     if found.regions:

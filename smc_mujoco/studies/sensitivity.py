@@ -29,7 +29,7 @@ from smc_mujoco.analysis.margins import tolerates
 from smc_mujoco.analysis.sensitivity import (
     CHANCE,
     Cut,
-    Explained,
+    SobolResult,
     Improvement,
     Space,
     designs,
@@ -73,7 +73,7 @@ HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Sensitivity(Tables, Explained):
+class Sensitivity(Tables, SobolResult):
     """What explains a law's score over a class of uncertainty, and where its runs fail."""
 
     over: Uncertainty

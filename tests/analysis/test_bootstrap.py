@@ -10,9 +10,8 @@ from smc_mujoco.analysis.bootstrap import median_of, share_interval
 
 pytestmark = pytest.mark.quick
 
-SAMPLES = np.random.default_rng(0).normal(
-    size=(20, 2, 15)
-)  # two blocks each: the values of one are sorted first
+# two blocks each: the values of one are sorted first
+SAMPLES = np.random.default_rng(0).normal(size=(20, 2, 15))
 
 
 def test_an_interval_of_negated_values_is_the_mirror_image():

@@ -17,7 +17,6 @@ from smc_mujoco.analysis.apart import relative_range
 from smc_mujoco.analysis.chattering import (
     Chattering,
     _assumptions,
-    _other_cycles,
     cycles,
     save,
     switches,
@@ -63,10 +62,8 @@ def measured(trace, part=0.4):
 A = 0.03
 OMEGA = 7.0
 C = 2.5
-S, TURN = (
-    A * abs(C + 1j * OMEGA),
-    np.exp(1j * np.angle(C + 1j * OMEGA)),
-)  # s = v + c x, for e = A sin(omega t)
+# s = v + c x, for e = A sin(omega t)
+S, TURN = A * abs(C + 1j * OMEGA), np.exp(1j * np.angle(C + 1j * OMEGA))
 
 
 def saturated(k, width, a):
@@ -209,9 +206,8 @@ def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
         plant="duffing", law=law, x0=0.02, duration=6.0, actuator=(smc.Lag(0.01), gear)
     )
     cycle = chattering(scenario)
-    short = dataclasses.replace(
-        scenario, physics_step=6.25e-5
-    )  # with play, positions lead by half a step
+    # with play, positions lead by half a step
+    short = dataclasses.replace(scenario, physics_step=6.25e-5)
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(short)), rel=0.03)
     rigid = chattering(
         dataclasses.replace(scenario, actuator=(smc.Lag(0.01), dataclasses.replace(gear, gap=0.0)))
@@ -257,9 +253,8 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
             b = 16 * 1.1 / math.pi
             amplitude = mu**2 * (a * a + b) ** 2 / (4 * a * a)
             omega = a / (mu * math.sqrt(a * a + b))
-        fine = chattering(
-            lagging(LAWS[name], mu, control_period=mu / 100)
-        )  # the formula knows no sampling
+        # the formula knows no sampling
+        fine = chattering(lagging(LAWS[name], mu, control_period=mu / 100))
         assert (fine.amplitude, fine.frequency) == pytest.approx(
             (amplitude, omega / math.tau), rel=0.05
         )
@@ -357,15 +352,6 @@ def test_a_cycle_that_the_samples_alone_hold_is_within_its_ranges_and_called_so(
     assert cycle.amplitude_range[0] < amplitude < cycle.amplitude_range[1]
     assert cycle.frequency_range[0] < frequency < cycle.frequency_range[1] * (1.0 + 1e-9)
     assert cycle.assumptions[-1].endswith("a cycle locked to the samples is possible")
-
-
-@COARSELY
-def test_coupled_channels_are_named_in_the_assumptions():
-    pair = chattering("classical", plant="double_pendulum", actuator=smc.Lag(0.01))
-    assert pair.coupling > 1.0
-    assert any(f"moves one of them {pair.coupling:.2g} times" in said for said in pair.assumptions)
-    assert chattering("classical", plant="duffing", actuator=smc.Lag(0.01)).coupling == 0.0
-    assert chattering("classical", plant="pendulum_network", actuator=smc.Lag(0.01)).coupling < 0.01
 
 
 def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
@@ -466,7 +452,9 @@ def relay_with_a_dead_zone(a):
     ],
 )
 def test_the_cycles_of_a_closed_form_are_stable_where_its_gain_falls(law, wanted):
-    """The largest N of the relay with a dead zone is 63.7, at 0.0141; N = 62 at 0.0126 and 0.0162."""
+    """The largest N of the relay with a dead zone is 63.7, at 0.0141; N = 62 at 0.0126 and
+    0.0162.
+    """
     turn = 40.0
     places = np.geomspace(1e-3, 3.0, 200_001)
     loop = Formula(law, 2.0 * turn / wanted, turn)
@@ -490,9 +478,8 @@ def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_res
         plant=damped, law=thruster(), actuator=smc.Lag(0.02), v0=0.0, duration=20.0
     )
     cycle = chattering(scenario)
-    assert cycle.threshold_x == pytest.approx(
-        0.0107, rel=0.01
-    )  # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
+    # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
+    assert cycle.threshold_x == pytest.approx(0.0107, rel=0.01)
     assert any("smaller oscillations die out" in said for said in cycle.assumptions)
     calm, *others = smc.run(
         [dataclasses.replace(scenario, x0=q * cycle.threshold_x) for q in (0.9, 1.1, 10.0)]
@@ -529,9 +516,8 @@ def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too
     halves = [exact + error / 2**k for k in range(2)]
     assert relative_range(halves) == pytest.approx(0.5 * error / (exact + error / 2))
     assert relative_range(halves, first_order=True) == pytest.approx(error / exact)
-    assert relative_range([*halves, 4.0], first_order=True) == pytest.approx(
-        4.0 / exact - 1.0
-    )  # another nudged start
+    # another nudged start
+    assert relative_range([*halves, 4.0], first_order=True) == pytest.approx(4.0 / exact - 1.0)
     never = (math.inf, math.inf), (math.nan,) * 2, (0.2,)
     assert [relative_range(values, first_order=True) for values in never] == [0.0, 0.0, 0.0]
     assert relative_range((0.2, math.inf), first_order=True) == math.inf
@@ -585,11 +571,3 @@ def test_bad_input_is_one_sentence(refused):
         lambda: describing_function(raising(), 1.0, 3.0, 100),
     ):
         refused(call)
-
-
-def test_many_balances_beside_each_other_are_no_cycles():
-    slow, *others = [(1e-3, math.tau * frequency) for frequency in (15.0, 4.0, 6.0, 9.0)]
-    (sentence,) = _other_cycles(None, [slow, *others])
-    assert (
-        sentence == "N L is about 1 everywhere from 4 to 15 Hz: the prediction is not to be trusted"
-    )

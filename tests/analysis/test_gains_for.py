@@ -82,25 +82,6 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
 
 
-@smc.law_function(gains={"k": 1.0})
-def without_units(y, gains, memory):
-    return -gains.k * y.v, y.v
-
-
-def test_bad_input_is_one_sentence(refused):
-    for law, wanted in [
-        ("classical", {}),
-        ("classical", {"frequency": 100.0, "u_max": 0.005}),
-        (without_units(), {"amplitude": 1e-3}),
-        (smc.law("classical", k=(1.0, 2.0)), {"amplitude": 1.0, "plant": "double_pendulum"}),
-    ]:
-        refused(
-            lambda law=law, wanted=wanted: smc.design.gains_for(
-                law, **({"plant": "duffing"} | wanted), **LAG
-            )
-        )
-
-
 def predicted(frequency, amplitude):
     return Chattering(frequency=frequency, amplitude_range=(0.0, amplitude))
 
@@ -174,7 +155,9 @@ def test_size_and_speed_are_those_of_the_largest_forces_within_both_bounds(refus
 
 
 def test_the_largest_size_is_where_the_amplitude_is_the_wanted_one(refused):
-    """Of amplitudes in proportion to the size, to its square, and of one that is lost above a size."""
+    """Of amplitudes in proportion to the size, to its square, and of one that is lost above a
+    size.
+    """
     for power, wanted, limit in (
         (1.0, 0.3, 9.0),
         (1.0, 7.0, 9.0),

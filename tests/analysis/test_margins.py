@@ -1,4 +1,6 @@
-"""Margins: what is found is a boundary, the first one from below, and theory's where there is one."""
+"""Margins: what is found is a boundary, the first one from below, and theory's where there is
+one.
+"""
 
 import dataclasses
 import importlib
@@ -197,9 +199,8 @@ def test_a_delay_may_be_tolerated_beyond_where_rest_turns_unstable_in_a_small_os
         "inverted_pendulum", "observer_free", changes={"input_delay": margin.value}
     )
     x = abs(smc.run(ringing).x[:, 0])
-    assert x[-1000:].max() == pytest.approx(
-        x[-3000:-2000].max(), rel=1e-3
-    )  # neither grows nor decays
+    # neither grows nor decays
+    assert x[-1000:].max() == pytest.approx(x[-3000:-2000].max(), rel=1e-3)
     assert 0.01 < x[-1000:].max() / 0.5 <= margins.TOLERATED_ERROR
 
 
@@ -280,9 +281,8 @@ def poles(tmp_path):
 def test_theory_knows_the_weakest_motor(poles):
     strong = smc.law("boundary_layer", k=30.0, phi=0.01, c=5.0)
     base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
-    at = 15.0 / (
-        30.0 * 5.0 / 0.01
-    )  # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
+    # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
+    at = 15.0 / (30.0 * 5.0 / 0.01)
     expected = margins.MARGIN_KINDS["disturbance"].expected(base)
     assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
 

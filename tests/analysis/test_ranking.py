@@ -130,9 +130,8 @@ def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_poole
     covered = 0
     pooled = 0
     for _ in range(runs):
-        values = rng.normal(size=(1, 12)) + 0.1 * rng.normal(
-            size=(8, 12)
-        )  # the seed decides; median 0
+        # the seed decides; median 0
+        values = rng.normal(size=(1, 12)) + 0.1 * rng.normal(size=(8, 12))
         one = interval(values)
         other = interval(values.ravel())
         covered += one.low <= 0 <= one.high
@@ -188,10 +187,8 @@ def test_ranks_are_those_of_the_medians_of_each_block():
 
 
 def test_ranks_of_shares_are_those_of_their_means():
-    scores = {
-        "a": np.arange(10) < 3,
-        "b": np.arange(10) < 4,
-    }  # of runs that do not settle; both medians are 0
+    # of runs that do not settle; both medians are 0
+    scores = {"a": np.arange(10) < 3, "b": np.arange(10) < 4}
     found = by_law(ranks(scores, shares=True))
     assert {law: rank.mean for law, rank in found.items()} == {"a": 1.0, "b": 2.0}
 
@@ -223,9 +220,8 @@ def test_the_least_relevant_difference_is_a_share_and_values_below_the_floor_are
 
 def test_the_limit_of_p_values_is_that_of_holms_method():
     p = np.array([0.01, 0.04, 0.03, 0.005])
-    assert _holm(p, 0.05) == pytest.approx(
-        0.05 / 2
-    )  # rejects 0.005 and 0.01, at 0.05 / 4 and 0.05 / 3
+    # rejects 0.005 and 0.01, at 0.05 / 4 and 0.05 / 3
+    assert _holm(p, 0.05) == pytest.approx(0.05 / 2)
     assert _holm(p, 0.2) == pytest.approx(0.2)  # rejects all
     assert _holm(p, 0.001) == pytest.approx(0.001 / 4)
 
@@ -247,10 +243,8 @@ def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals
     effect = Comparison(scores).effect(0, "a", "b")
     assert effect[:3] == pytest.approx((1 / 1.05, 1 / 1.05, 1 / 1.05))
     assert (effect.ahead, effect.samples, effect.sets) == (20, 20, False)
-    shuffled = {
-        "a": blocks(1.0),
-        "b": np.random.default_rng(1).permutation(blocks(1.05)[0]),
-    }  # the same, unpaired
+    # the same, unpaired
+    shuffled = {"a": blocks(1.0), "b": np.random.default_rng(1).permutation(blocks(1.05)[0])}
     assert all(rank.best for rank in ranks(shuffled))
 
 
@@ -357,7 +351,9 @@ def test_three_sets_of_gains_are_three_samples_whatever_the_seeds(sets):
 
 
 def test_a_law_that_is_unbeaten_only_as_its_sets_are_few_is_not_among_the_best():
-    """Ten times worse than two others, with three sets of gains in place of 24: no test could tell."""
+    """Ten times worse than two others, with three sets of gains in place of 24: no test could
+    tell.
+    """
     rng = np.random.default_rng(5)
     scores = {}
     for law, size in (("a", 1.0), ("b", 1.2), ("c", 10.0)):
@@ -377,10 +373,8 @@ def test_a_law_that_is_unbeaten_only_as_its_sets_are_few_is_not_among_the_best()
 
 def test_runs_linked_by_sets_of_gains_of_either_law_are_one_sample():
     scores = {"a": blocks(1.0, seeds=12), "b": blocks(2.0, seeds=12)}
-    a, b = (
-        np.arange(12) // 4,
-        np.arange(12) // 6,
-    )  # 0001 1122: the second set of a is linked to both of b
+    # 0001 1122: the second set of a is linked to both of b
+    a, b = np.arange(12) // 4, np.arange(12) // 6
     assert Comparison(scores, sets={"a": a[None], "b": b[None]}).samples[0, 0, 1] == 1
     assert Comparison(scores, sets={"a": a[None], "b": a[None]}).samples[0, 0, 1] == 3
     assert linked(*np.array([[5, 5, 7, 7], [5, -1, 7, 8]])) == (0, 0, 1, 1)
@@ -670,11 +664,13 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
     board = leaderboard(stand(scores), ["itae"])[0]
     assert (board.best, board.winner) == ((), None)
     assert board.result == (
-        "no winner in all 3 conditions: a wins under c0, loses under c1 and c2; b wins under c2, loses under c0 and "
+        "no winner in all 3 conditions: a wins under c0, loses under c1 and c2; b wins under c2, "
+        "loses under c0 and "
         "c1; c wins under c1, loses under c0 and c2, for these gains"
     )
     assert leaderboard(stand({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])[0].result == (
-        "a wins in both conditions: at least 50 % less than b (50 to 50 %), ahead in 20 of 20 runs, for these gains"
+        "a wins in both conditions: at least 50 % less than b (50 to 50 %), ahead in 20 of 20 "
+        "runs, for these gains"
     )
     both = leaderboard(stand({"a": blocks(1), "b": blocks(2)}), ["itae"])[0]
     one_set = dataclasses.replace(both.blocks[0], sets=12, given=("b",))
@@ -749,7 +745,10 @@ def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
         "a",
         [(20, 20)] * 2,
     )
-    start = "ITAE on duffing under nominal and noise: a wins in both conditions: at least 50 % less than b"
+    start = (
+        "ITAE on duffing under nominal and noise: a wins in both conditions: at least 50 % "
+        "less than b"
+    )
     assert itae.verdict.startswith(start)
     assert itae.unit == "{x} s^2"
     settles = picked(boards, "settles", plant="duffing")
@@ -1038,21 +1037,17 @@ def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves
     assert cells.floor(paper.scenario("duffing", "none", changes={"x0": 0.0}), "overshoot") == 0.0
     assert cells.floor(noisy, "ultimate_bound", eps=0.0) == 0.02
     high = smc.Scenario(plant="quadrotor", law="none", x0=(0.3, 0.0, 1.1, 0.0, 0.0, 0.2))
-    assert cells.floor(high, "ultimate_bound") == pytest.approx(
-        3e-5
-    )  # of the way to rest, which is at 1 m
-    assert [cells.floor(fine, name) for name in ("max_u", "tv_rate")] == pytest.approx(
-        [6e-3, 6e-3]
-    )  # |u| <= 6 N
+    # of the way to rest, which is at 1 m
+    assert cells.floor(high, "ultimate_bound") == pytest.approx(3e-5)
+    # |u| <= 6 N
+    assert [cells.floor(fine, name) for name in ("max_u", "tv_rate")] == pytest.approx([6e-3, 6e-3])
     unbounded = paper.scenario("duffing", "none", changes={"u_max": math.inf})
     assert cells.floor(unbounded, "tv_rate") == 0.0
     table = stand({"a": blocks(1e-3), "b": blocks(2e-3)}, metric="ultimate_bound")
     table.columns["scenario"] = np.array([run_key.row(fine)["scenario"]] * 40)
     assert leaderboard(table, ["ultimate_bound"])[0].winner == "a"
-    for near, small in (
-        (1.1e-3, True),
-        (1.5e-3, False),
-    ):  # the smallest difference that this problem shows is 1.5e-4
+    # the smallest difference that this problem shows is 1.5e-4
+    for near, small in (1.1e-3, True), (1.5e-3, False):
         close = stand({"a": blocks(1e-3, 1e-3), "b": blocks(near, 2e-3)}, metric="ultimate_bound")
         close.columns["scenario"] = np.array(
             [run_key.row(fine)["scenario"]] * len(close.columns["seed"])

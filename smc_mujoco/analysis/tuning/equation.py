@@ -127,7 +127,7 @@ def _loop() -> Any:
 
 
 @njit(error_model="numpy")
-def _simulate(run, sim):
+def _simulate(run, sim):  # noqa: PLR0912
     """Take all steps of a run, with a callback where it does something, and one at the end, for the
     last sample.
     """
@@ -150,16 +150,16 @@ def _simulate(run, sim):
         for stage in range(4):
             if stage == 0:
                 past = 0.0
+            elif stage == 3:
+                past = h
             else:
-                past = h if stage == 3 else 0.5 * h
+                past = 0.5 * h
             for i in range(n):
                 channel = channel_at(sim.channels, i)
                 before = (stage - 1) * n + i
                 if stage > 0:
-                    qpos[channel.qpos], qvel[channel.qvel] = (
-                        x[i] + past * speed[before],
-                        v[i] + past * a[before],
-                    )
+                    qpos[channel.qpos] = x[i] + past * speed[before]
+                    qvel[channel.qvel] = v[i] + past * a[before]
                 speed[stage * n + i] = qvel[channel.qvel]
             if (stage > 0 and sim.disturbance_count == 0) or (stage == 2 and run.memoryless != 0):
                 # all that the callback does here: disturbances at the time of stage 1 are there

@@ -165,7 +165,9 @@ def _putter(
 
 
 class _Equations:
-    """The runs by the equation: as many candidates at once as there are threads, if memory allows."""
+    """The runs by the equation: as many candidates at once as there are threads, if memory
+    allows.
+    """
 
     def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int):
         self.cases = len(prepared)

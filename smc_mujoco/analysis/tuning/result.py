@@ -28,7 +28,7 @@ Ranges = dict[str, tuple[float, float]]  # gain -> lowest, highest
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Found:
+class SearchResult:
     """What one search found. Searches share nothing: each has its own starts, noise and runs."""
 
     best: Evaluation  # its J is MuJoCo's, on the runs of this search
@@ -59,14 +59,14 @@ class Found:
         return write_json(path, vars(self))
 
 
-def load_found(path: Path) -> Found:
-    """Read what `Found.save` wrote."""
+def load_found(path: Path) -> SearchResult:
+    """Read what `SearchResult.save` wrote."""
     return _found(read_json(path))
 
 
-def _found(data: Mapping[str, Any]) -> Found:
+def _found(data: Mapping[str, Any]) -> SearchResult:
     history = tuple(map(_evaluation, data["history"]))
-    return Found(**dict(data) | {"best": _evaluation(data["best"]), "history": history})
+    return SearchResult(**dict(data) | {"best": _evaluation(data["best"]), "history": history})
 
 
 def _evaluation(row: Sequence[Any]) -> Evaluation:
@@ -79,7 +79,7 @@ class Tuned(Tables):
     """A law's gains that independent searches found, and how."""
 
     law: Component  # with the gains of the least J
-    searches: tuple[Found, ...]  # in order
+    searches: tuple[SearchResult, ...]  # in order
     # J of the law's original gains, from which no search starts, on the runs of the best search,
     # s^2
     before: float
@@ -146,7 +146,7 @@ class Tuned(Tables):
         return [found.best for found in self.searches]
 
     @property
-    def best(self) -> Found:
+    def best(self) -> SearchResult:
         """The search with the least J."""
         return min(self.searches, key=lambda found: found.best.objective)
 
@@ -279,6 +279,9 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         pairs["number of searches"] = len(one.searches), len(tuned[0].searches)
         for name, (value, other) in pairs.items():
             if value != other:
-                words = f"{name} cannot be compared, {one.law.name} has {value}, {tuned[0].law.name} {other}"
+                words = (
+                    f"{name} cannot be compared, {one.law.name} has {value}, "
+                    f"{tuned[0].law.name} {other}"
+                )
                 raise ScenarioError(f"laws tuned with unequal {words}: tune them in the same way")
     return sorted(tuned, key=lambda one: one.objective)

@@ -50,7 +50,7 @@ from smc_mujoco.analysis.tuning.objective import (
     Objective,
     Searches,
 )
-from smc_mujoco.analysis.tuning.result import Found, Tuned, load_found
+from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
@@ -92,10 +92,14 @@ LAST_SHARE = 0.1
 USUAL_SHARE = 1.0
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
-    "CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, noise and initial states,"
-    f" and {BUDGET} evaluations a gain. An eighth screens a Latin hypercube, within 1.5 decades about the gains' scale"
-    " by dimension, and a half evolves from the best of them by CMA-ES. The rest descends from the best of these by"
-    " COBYQA, until 2 n + 2 evaluations for n gains lower J by less than 0.1 %. Both may leave the box by a decade"
+    "CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, "
+    "noise and initial states,"
+    f" and {BUDGET} evaluations a gain. An eighth screens a Latin hypercube, within 1.5 decades "
+    "about the gains' scale"
+    " by dimension, and a half evolves from the best of them by CMA-ES. The rest descends from "
+    "the best of these by"
+    " COBYQA, until 2 n + 2 evaluations for n gains lower J by less than 0.1 %. Both may leave "
+    "the box by a decade"
 )
 Report = Callable[[int], None]
 
@@ -158,7 +162,7 @@ def tune(
         f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True
     ) as shown:
 
-        def found(i: int) -> Found:
+        def found(i: int) -> SearchResult:
             made = task.kept(i, failure, shown.advance, folder, codes)
             shown.reached((i + 1) * task.size, searches * task.size)
             return made
@@ -333,7 +337,7 @@ class Task(NamedTuple):
         report: Report,
         folder: str | os.PathLike[str] | None,
         codes: Any,
-    ) -> Found:
+    ) -> SearchResult:
         """Return what search i finds, or has found in an earlier call with this folder."""
         if folder is None:
             return self.search(i, failure, report)
@@ -347,10 +351,10 @@ class Task(NamedTuple):
         )
         path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}.json"
         return cached(
-            path, depends, lambda: self.search(i, failure, report), Found.save, load_found
+            path, depends, lambda: self.search(i, failure, report), SearchResult.save, load_found
         )
 
-    def search(self, i: int, failure: str, report: Report) -> Found:
+    def search(self, i: int, failure: str, report: Report) -> SearchResult:
         """Make search i.
 
         Bad gains may make the numbers of a law overflow, and others may cure that. So a law whose
@@ -388,7 +392,7 @@ class Task(NamedTuple):
         cases = [dataclasses.replace(case, law=law) for case in cases]
         return self.goal.evaluation(cases[0], run(cases, self.threads), gains)
 
-    def _found(self, trials: Trials, best: Evaluation, failure: str) -> Found:
+    def _found(self, trials: Trials, best: Evaluation, failure: str) -> SearchResult:
         if (
             failure
             and self.budget >= BUDGET
@@ -397,7 +401,7 @@ class Task(NamedTuple):
             raise _broken(self.law, failure)
         history = tuple(trials.decided.values())
         engine = trials.accurate.engine
-        return Found(best=best, history=history, evaluations=trials.count, engine=engine)
+        return SearchResult(best=best, history=history, evaluations=trials.count, engine=engine)
 
 
 def _task(
@@ -524,7 +528,7 @@ def _only_limits(case: Scenario) -> bool:
     return bool(plain and not dry and all(part.in_callback for part in case.actuator))
 
 
-def _result(task: Task, found: tuple[Found, ...]) -> Tuned:
+def _result(task: Task, found: tuple[SearchResult, ...]) -> Tuned:
     tuned = Tuned(
         law=task.law,
         searches=found,
@@ -550,7 +554,8 @@ def _warn_of_result(tuned: Tuned) -> None:
     if tuned.objective > tuned.before:
         values = f"an objective of {tuned.objective:.3g} s² instead of {tuned.before:.3g} s²"
         _warn(
-            f"no set of gains {tried} is better than the law's own, with {values}: give a larger budget"
+            f"no set of gains {tried} is better than the law's own, with {values}: give a larger "
+            "budget"
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.definition.excess(first):

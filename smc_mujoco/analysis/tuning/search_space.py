@@ -138,7 +138,8 @@ def scales(
         )
     if not (math.isfinite(g) and g > 0.0):
         raise ScenarioError(
-            f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant"
+            f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another "
+            "plant"
         )
     return _scales(g, u_max, X)
 

@@ -6,9 +6,9 @@ before anything is run.
 A member of a class is one choice within all of its bounds. `Members` makes scenarios of members. A
 member has
 
-    shares      one number in [0, 1] for each constant that may differ: set, delay, mass, friction, bound, x0, ...
+    shares      one number in [0, 1] for each constant that may differ: set, delay, mass, x0, ...
     force       |force_k| <= 1, a number for each control sample: the disturbance over its bound
-    noise       |noise_jk| <= 1, numbers for each time that an error of measurement is held: position, velocity
+    noise       |noise_jk| <= 1, numbers for each time that an error of position or velocity is held
 """
 
 import dataclasses
@@ -473,11 +473,13 @@ def _check_class(scenario: Scenario, within: Uncertainty) -> None:
         fields = [field.name for field in dataclasses.fields(within) if field.name != "parameters"]
         known = ", ".join(sorted({*fields, *plant.parameters}))
         raise ScenarioError(
-            f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from {known}"
+            f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from "
+            f"{known}"
         )
     if (longest := scenario.duration - scenario.input_delay) < within.delay[1]:
         raise ScenarioError(
-            f"Uncertainty's delay reaches {within.delay[1]:g} s: give at most {longest:g}, a run's end"
+            f"Uncertainty's delay reaches {within.delay[1]:g} s: give at most {longest:g}, a "
+            "run's end"
         )
 
 
@@ -510,9 +512,13 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
             )
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
-            cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
+            cure = (
+                "give it some, such as friction=smc.Coulomb(0.1), or a class with "
+                "friction=(0.0, 0.1)"
+            )
             raise ScenarioError(
-                f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: {cure}"
+                f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: "
+                f"{cure}"
             )
         yield Constant(
             name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale

@@ -13,7 +13,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, Evaluator
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Evaluation, Objective
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
 from smc_mujoco.analysis.tuning.result import compare, load
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.control.law import catalogue
@@ -149,14 +149,6 @@ def _of_twice_the_force(x, v, i, p):
     return (p.alpha * x[i] - p.beta * x[i] ** 3 - p.delta * v[i]) / p.M, 2.0 / p.M
 
 
-def test_gains_as_good_are_those_of_sets_within_three_percent(found):
-    line = [Evaluation((10.0 ** (k / 100), 1.0), 1.0 + k / 2500, 1.0, 0.0) for k in range(101)]
-    one = dataclasses.replace(found.searches[0], history=tuple(reversed(line)))
-    assert one.near(found.bounds) == {"lam": (1.0, pytest.approx(10**0.75)), "k1": (1.0, 1.0)}
-    both = dataclasses.replace(found, searches=(one, dataclasses.replace(one, history=line[:3])))
-    assert both.near == one.near(found.bounds)
-
-
 def test_a_search_has_three_stages_and_screens_at_less_cost(monkeypatch):
     """Behind friction MuJoCo makes all of them: with one step a control period, until a descent
     begins.
@@ -199,10 +191,11 @@ def test_what_needs_a_shorter_step_keeps_its_own():
     late = smc.Scenario(plant="duffing", law="none", friction=smc.Viscous(0.3), input_delay=5e-4)
     assert search._coarse(late) is late
     dry = search._coarse(smc.Scenario(plant="duffing", law="none", friction=smc.Coulomb(0.3)))
+    # MuJoCo's friction
     assert (dry.resolved.integrator, dry.resolved.physics_step) == (
         "implicitfast",
         1e-3,
-    )  # MuJoCo's friction
+    )
     plain = search._coarse(smc.Scenario(plant="duffing", law="none"))
     assert plain.resolved.integrator == "Euler"
 
@@ -276,15 +269,6 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
         search._task("duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1)
 
 
-def test_the_driven_joint_has_the_scales_of_a_machine_with_a_free_one():
-    task = search._task("furuta", smc.law("rotary_swing_up"), Objective(), 8, 0, 1)
-    p = smc.plant("furuta").values({})
-    Jp = p.Jc + p.m * p.l**2
-    lever = p.m * p.L * p.l
-    assert task.scales["M"] == pytest.approx(p.J + p.m * p.L**2 - lever**2 / Jp)
-    assert task.scales["X"] == 0.2  # of the free joint
-
-
 def test_a_gain_given_as_0_stays_0():
     scales = {"X": 2.0, "F": 6.0, "M": 1.0, "T": 0.5}
     assert set(search_space.box(smc.law("pid"), scales)) == {"kp", "ki", "kd", "tt"}
@@ -338,14 +322,6 @@ def test_a_law_written_with_other_gains_ends_as_well(plant):
     assert not {*one.at_bound, *two.at_bound}
 
 
-def test_a_gain_is_divided_by_one_that_the_law_has(refused):
-    refused(
-        lambda: smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(
-            lambda y, gains, memory: (0.0, 0.0)
-        )
-    )
-
-
 def test_a_held_gain_keeps_its_value():
     tuned = tune("duffing", smc.law("adaptive", k0=1.25), budget=2, objective=LEAN, searches=1)
     assert tuned.law.gains["k0"] == 1.25
@@ -370,14 +346,6 @@ def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
         assert low * high == pytest.approx(failing().gains[name] ** 2)
 
 
-def test_a_gain_without_a_unit_that_is_not_positive_is_refused(refused):
-    refused(
-        lambda: tune(
-            "duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN
-        )
-    )
-
-
 @pytest.mark.slow
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     own = catalogue()["observer_free"]
@@ -390,13 +358,6 @@ def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     assert tuned.searched["lam"] == (pytest.approx(low / 10), pytest.approx(10 * high))
     assert high < tuned.gains["lam"] <= 10 * high
     assert tuned.at_bound == {"lam": "upper"}
-
-
-@pytest.mark.parametrize(
-    ("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")]
-)
-def test_near_a_bound_is_within_two_percent_of_its_decades(gain, side):
-    assert search_space.at_bound({"k": gain}, {"k": (1.0, 1000.0)}).get("k") == side
 
 
 # runs that fail
@@ -454,58 +415,6 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
         "heavy",
     ]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
-
-
-def test_a_tuning_says_each_gain_its_range_and_whether_it_is_at_a_bound_or_searches_disagree(
-    found, tmp_path
-):
-    gains = {"lam": 2.0, "k1": 3.0}, {"lam": 600.0, "k1": 1e-3}
-    plain, extreme = (
-        dataclasses.replace(found, law=dataclasses.replace(found.law, gains=one)) for one in gains
-    )
-    alone = dataclasses.replace(plain, searches=found.searches[:1])
-    far = found.searches[0].best._replace(objective=7.0 * found.objective)
-    apart = dataclasses.replace(
-        plain, searches=(dataclasses.replace(found.searches[0], best=far), *found.searches[1:])
-    )
-    tables = {
-        name: one.tables[0]
-        for name, one in {
-            "plain": plain,
-            "extreme": extreme,
-            "alone": alone,
-            "apart": apart,
-        }.items()
-    }
-    for name, table in tables.items():
-        assert [row[0] for row in table.rows] == ["lam", "k1"]
-        assert [bool(row[-1]) for row in table.rows] == [
-            False,
-            name == "extreme",
-        ]  # at its lower bound
-        assert len(table.headings) == len(table.rows[0])
-    notes = {name: " ".join(table.notes) for name, table in tables.items()}
-    assert "J up to 7 times the least" in notes["apart"]
-    assert notes["alone"] != notes["plain"] != notes["apart"]
-    assert "lam=2" in repr(plain)
-    goal = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine"))
-    free = Objective(weight=0.0)
-    assert all(
-        part in str(goal)
-        for part in ("nominal, sine", "0.001 TV", "|u| <= 12", "chattering of s <= 0.01")
-    )
-    assert not any(part in str(free) for part in ("|u| <=", "chattering", "0.001 TV"))
-    assert goal.describe() == {
-        "chattering": 0.01,
-        "conditions": ["nominal", "sine"],
-        "control_period": 0.001,
-        "duration": 5.0,
-        "starts": {"by": 0.0, "spread": 0.2, "x0": None},
-        "u_max": 12.0,
-        "weight": 0.001,
-    }
-    names = "at_bound before bounds budget definition record rule scales scenario searched searches seed versions"
-    assert sorted(json.loads(found.save(tmp_path / "a.json").read_text())) == names.split()
 
 
 def test_what_is_no_tuning_is_refused(found, tmp_path, refused):
@@ -578,13 +487,9 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
     assert not tune("duffing", made(2.0), budget=8, objective=LEAN, searches=1).sets[0].failed
 
 
-def test_a_bad_objective_is_refused(refused):
-    for changed in ({"conditions": ("calm",)}, {"conditions": 3}, {"conditions": ()}):
-        refused(lambda changed=changed: Objective(**changed))
-
-
 WORSE = (
-    r"no set of gains tried for classical on duffing is better than the law's own, with an objective of \S+ s² instead "
+    r"no set of gains tried for classical on duffing is better than the law's own, with an "
+    r"objective of \S+ s² instead "
     r"of \S+ s²: give a larger budget"
 )
 
@@ -596,9 +501,8 @@ def test_warns_if_and_only_if_the_laws_own_gains_are_better():
         again = tune("duffing", first.law, budget=1, objective=SHORT, searches=1)
     assert again.objective > again.before
     assert [Path(one.filename).name for one in caught] == ["test_search.py"]
-    tune(
-        "duffing", first.law, objective=SHORT, searches=1
-    )  # as good as its own: a warning would be an error
+    # as good as its own: a warning would be an error
+    tune("duffing", first.law, objective=SHORT, searches=1)
 
 
 LAGGING = smc.condition("lagging", actuator=smc.Lag(0.01))

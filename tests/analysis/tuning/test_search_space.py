@@ -53,12 +53,8 @@ WITHOUT_MODEL = dict.fromkeys(
 )
 
 
-VISIBLE = {
-    "N": 5.0,
-    "least": 3.0,
-    "bound": 0.3,
-    "w_max": 0.5,
-}  # so that they act in a run as short as these
+# so that they act in a run as short as these
+VISIBLE = {"N": 5.0, "least": 3.0, "bound": 0.3, "w_max": 0.5}
 
 
 def systems(law, fixed, model, rng):
