@@ -29,8 +29,8 @@ from smc_mujoco.analysis.margins import tolerates
 from smc_mujoco.analysis.sensitivity import (
     CHANCE,
     Cut,
-    SobolResult,
     Improvement,
+    SobolResult,
     Space,
     designs,
     improvement,
