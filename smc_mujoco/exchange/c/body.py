@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.exchange.c.translate import Kind
 from smc_mujoco.mechanisms.hardware.part import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import mix, put_attitude_error, rotation_vector
 from smc_mujoco.simulation.model import keeps_torques, mixer
 
-VECTOR = f"real[{len(PLACES)}]"  # of a pose, a velocity or a command
+VECTOR = Kind("real", (len(PLACES),))  # of a pose, a velocity or a command
 
 
 def pose(q, x):
@@ -30,12 +31,12 @@ def errors(x, v, r, dr, e, de):
     put_attitude_error(x, v, r, dr, e, de)
 
 
-def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[str]]]:
+def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[Kind]]]:
     """Return name in smc_law.h -> function, and the kinds of its arguments.
 
     Without a plant there are no actuators.
     """
-    found = {"smc_pose": (pose, ["real[7]", VECTOR]), "smc_errors": (errors, [VECTOR] * 6)}
+    found = {"smc_pose": (pose, [Kind("real", (7,)), VECTOR]), "smc_errors": (errors, [VECTOR] * 6)}
     if plant is None:
         return found
     table = mixer(plant)
@@ -49,4 +50,4 @@ def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[s
             command[i] = min(max(u[i], -y.limit[i]), y.limit[i])
         mix(y.x, command, rows, count, keeping, controls)
 
-    return {**found, "smc_actuators": (actuators, ["y", VECTOR, f"real[{count}]"])}
+    return {**found, "smc_actuators": (actuators, [Kind("y"), VECTOR, Kind("real", (count,))])}

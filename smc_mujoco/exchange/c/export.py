@@ -162,9 +162,7 @@ def translated(
         joints and isinstance(component, Law) and component.plants == (FREE_BODY,)
     )
     try:
-        slots, code = translate(
-            component, single, joints, body.functions(plant) if of_body else None
-        )
+        slots, code = translate(component, single, joints, body.functions(plant) if of_body else {})
     except Untranslatable as error:
         raise ScenarioError(
             f"{component.kind} {component.name!r} cannot be written in C: {error}"

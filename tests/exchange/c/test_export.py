@@ -363,22 +363,17 @@ def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
 
 
 REFUSED = {
-    "u = sum((y.e, y.de))": "sum of an array",
     "u = [y.e, y.de][0]": "List",
     "u = y.e // 2.0": "the operator FloorDiv",
     "u = 'a'": "the value 'a'",
     "u = y.e if y.de else np.sinc(y.e)": "sinc",
-    "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
     "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
     "u = TABLE[2]": "an index outside -2 to 1",
     "for u in (y.e, y.de): pass": "a loop over anything but a range",
-    "n = 3; u = 0.0\n    for i in range(n): n += 1": "a loop that changes its own variable or range",
-    "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable or range",
-    "u = 0.0\n    for i in range(int(memory[0])): memory[0] += 1.0": "a loop that changes its own variable or range",
+    "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable",
     "u = again(y.e)": "again, which calls itself,",
     "u = 2 ** 40 * y.e": "a power of a whole number",
     "u = 5000000000 * y.e": "beyond 32 bits",
-    "u = nowhere * y.e": "a name without a value",
     "try:\n        u = y.e\n    finally:\n        pass": "try",
     "u = (lambda a: a)(y.e)": "a call",
     "y = 3.0; u = y": "an assignment to this",
