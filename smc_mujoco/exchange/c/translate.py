@@ -9,14 +9,15 @@ indices: an assignment to an array is a loop over such elements, with the operat
 same order. What does not fit into an expression, such as a call that gives an array, becomes a line
 before it. A function that returns arrays or several numbers writes them to pointers.
 
-Python's names of arrays may share numbers. A name that is bound once to an array that lasts, or to a
-part of it, as in `w = memory[:, 0]`, is a pointer into it. All others are copies. So an array that
-the function changes must not share its numbers with a copy; such code is refused.
+Python's names of arrays may share numbers. A name that is bound once to an array that lasts, or to
+a part of it, as in `w = memory[:, 0]`, is a pointer into it. All others are copies. So an array
+that the function changes must not share its numbers with a copy; such code is refused.
 """
 
 import ast
 import builtins
 import collections
+import functools
 import inspect
 import itertools
 import math
@@ -44,15 +45,14 @@ PARSING_LOCK = (
 WIDTHS = ("bool", "int", "single", "real")
 WHOLE = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
-TYPES["memory"] = "smc_real"
-STRUCTS = {"estimator": "smc_reading"}  # structs of y, where they differ from a measurement
+TYPES |= {"memory": "smc_real", "gains": "smc_real", "y": "smc_measurement"}
 CHANNEL_FIELDS = {"estimator": Reading._fields}  # of y, where they differ from a measurement's
 JOINTS = "SMC_JOINTS"
 SLOTS = "SMC_LAW_MEMORY"  # numbers of memory of a joint: known when all of a law is translated
 # What the caller of a law of many joints provides: its name, and its rows if it is a matrix.
 REQUESTS = {joint_law.coriolis: ("coriolis", ()), joint_law.jacobian: ("jacobian", (3,))}
 ROW, COLUMN = "\x00", "\x01"  # stand for the indices in the text of an array's element
-NUMPY = "numpy"
+INDICES = (*"ijklmn", "row", "column", "element_1", "element_2")  # of loops over arrays
 
 # Precedence of C's operators. An operand of lower precedence is put in parentheses.
 ATOM = 5
@@ -83,18 +83,17 @@ COMPARISONS: dict[type, str] = {
 }
 
 # Functions of Python's math module that have the same name in C.
-MATH_NAMES = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log log1p
-log10 log2 sqrt hypot fabs copysign fmod""".split()
-SAME_IN_C = {getattr(math, name) for name in MATH_NAMES}
+MATH_NAMES = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log
+log1p log10 log2 sqrt hypot fabs copysign fmod"""
+SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
 ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # to integers in Python
-MATH = {"pow", *ROUNDING.values(), *MATH_NAMES}
+MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
 # Functions of numpy, element by element -> the same in C, or a helper.
-NUMPY_RENAMED = {"arctan": "atan", "arctan2": "atan2", "arcsin": "asin", "arccos": "acos"}
-ELEMENTWISE = {np.abs: "fabs", abs: "fabs", np.fabs: "fabs", np.hypot: "hypot"}
-ELEMENTWISE |= {getattr(np, name): same for name, same in NUMPY_RENAMED.items()}
-for _name in "sqrt exp expm1 log log1p sin cos tan sinh cosh tanh".split():
-    ELEMENTWISE[getattr(np, _name)] = _name
+NUMPY_NAMES = """sqrt exp expm1 log log1p sin cos tan sinh cosh tanh fabs hypot arctan arctan2
+arcsin arccos"""
+ELEMENTWISE = {getattr(np, name): name.replace("arc", "a") for name in NUMPY_NAMES.split()}
+ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
 ELEMENTWISE |= {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
 FILLED = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
 
@@ -149,6 +148,11 @@ class Kind(NamedTuple):
     fields: tuple[str, ...] | None = None  # of a tuple: their names, if it has some
     stride: str = "1"  # of a vector: from one number to the next
 
+    @property
+    def number(self) -> "Kind":
+        """The kind of its numbers."""
+        return Kind("real" if self.of == "memory" else self.of)
+
 
 INT = Kind("int")
 BOOL = Kind("bool")
@@ -175,10 +179,8 @@ class Value(NamedTuple):
         """Return the items of a tuple, or the numbers of a vector."""
         if self.items or not self.kind.shape:
             return self.items
-        of = Kind(self.kind.of)
-        return tuple(
-            Value(self.text.replace(ROW, str(i)), of, self.level) for i in range(self.kind.shape[0])
-        )
+        texts = [self.text.replace(ROW, str(i)) for i in range(self.kind.shape[0])]
+        return tuple(Value(text, self.kind.number, self.level) for text in texts)
 
 
 def array_at(base: str, kind: Kind, offset: str = "", sources: Iterable[str] = ()) -> Value:
@@ -339,75 +341,69 @@ class Function:
         self.entry = entry
         written, self.tree = parsed(function)
         self.globals = around(written) | dict(constants)
-        arguments = self.tree.args
-        if len(arguments.args) != len(kinds) or arguments.vararg or arguments.kwonlyargs:
-            raise refuse(None, f"{self.tree.name} with its arguments")
+        arguments = [argument.arg for argument in self.tree.args.args]
         nodes = [node for statement in self.tree.body for node in ast.walk(statement)]
-        if entry or any(isinstance(node, ast.Return) for node in nodes):
-            if not returns(self.tree.body):
-                raise refuse(None, f"{self.tree.name}, which does not end in a return,")
-        self.position = {argument.arg: i for i, argument in enumerate(arguments.args)}
-        self.parameters = {}
-        for argument, kind in zip(arguments.args, kinds, strict=True):
-            if argument.arg not in constants:
-                self.parameters[argument.arg] = kind
-        self.taken = {node.id for node in nodes if isinstance(node, ast.Name)} | set(
-            self.parameters
-        )
-        loops = "ijklmn", ("row", "column", "element_1", "element_2")
-        self.indices = [name for name in itertools.chain(*loops) if name not in self.taken]
+        gives = entry or any(isinstance(node, ast.Return) for node in nodes)
+        if len(arguments) != len(kinds):
+            raise refuse(None, f"{self.tree.name} with its arguments")
+        if gives and not returns(self.tree.body):
+            raise refuse(None, f"{self.tree.name}, which does not end in a return,")
+        self.position = {argument: i for i, argument in enumerate(arguments)}
+        self.parameters = dict(zip(arguments, kinds, strict=True))
+        for name in constants:
+            del self.parameters[name]
+        self.taken = {node.id for node in nodes if isinstance(node, ast.Name)} | {*arguments}
+        self.indices = [name for name in INDICES if name not in self.taken]
         self.assignments: dict[str, list[ast.AST]] = collections.defaultdict(list)
         for node in nodes:
             for name in assigned(node):
                 self.assignments[name].append(node)
-        self.in_loops = set[ast.AST]()
-        for node in nodes:
-            if isinstance(node, ast.For | ast.While):
-                self.in_loops |= set(ast.walk(node))
+        loops = [node for node in nodes if isinstance(node, ast.For | ast.While)]
+        self.in_loops = {node for loop in loops for node in ast.walk(loop)}
         self.kinds = dict(self.parameters)
         self.views = set[str]()  # names that are pointers to arrays or parts of them
-        self.names: dict[str, Value] = {}
+        self.names = dict[str, Value]()
         for name in self.parameters:
             self.names[name] = self.named(name)
         self.results = list[Kind]()
         before: Any = None
         while before != (self.kinds, self.results):  # until no variable's kind widens
             before = dict(self.kinds), list(self.results)
-            self.lines = list[str]()
-            self.temporaries = dict[str, Kind]()
-            self.counts = itertools.count(1)
-            self.counters = set[str]()  # variables of the present loops that are never negative
-            self.changed = set[str]()  # names of arrays whose elements it changes
-            self.returned = set[int]()  # positions of arguments whose numbers a result may have
-            self.copies = list[tuple[str, frozenset[str], ast.AST]]()
-            self.block(self.tree.body)
+            self.translate()
         for name, sources, node in self.copies:
-            if sources & self.changed or name in self.changed:
-                raise refuse(
-                    node,
-                    "an array, which shares its numbers with another name: write .copy() behind it,",
+            if (sources | {name}) & self.changed:
+                what = (
+                    "an array, which shares its numbers with another name: write .copy() behind it,"
                 )
+                raise refuse(node, what)
+
+    def translate(self) -> None:
+        """Write the lines, with the kinds as far as they are known."""
+        self.lines = list[str]()
+        self.temporaries = dict[str, Kind]()
+        self.counts = itertools.count(1)
+        self.counters = set[str]()  # variables of the present loops that are never negative
+        self.changed = set[str]()  # names of arrays whose elements it changes
+        if self.entry:
+            self.changed |= {name for name, kind in self.parameters.items() if kind.of == "memory"}
+        self.returned = set[int]()  # positions of arguments whose numbers a result may have
+        self.copies = list[tuple[str, frozenset[str], ast.AST]]()
+        self.block(self.tree.body)
 
     def text(self, name: str) -> str:
         """Return the whole function under a name. Variables are declared at its top."""
-        own = {}
+        declared = {self.c_name(parameter): "" for parameter in self.parameters}
         for variable, kind in self.kinds.items():
-            if variable not in self.parameters:
-                own[self.c_name(variable)] = kind
-        views = {self.c_name(variable): self.names[variable] for variable in self.views}
-        top = []
-        for variable, kind in (own | self.temporaries).items():
-            if variable in views:
-                kept = "const " if views[variable].sources <= self.constant_arguments() else ""
-                top.append(f"{kept}{TYPES[kind.of]} *{variable} = 0;")
-            elif kind.shape:
-                top.append(f"{TYPES[kind.of]} {variable}[{math.prod(kind.shape)}];")
-            else:
-                top.append(f"{TYPES[kind.of]} {variable} = 0;")
+            in_c = self.c_name(variable)
+            if variable in self.views:
+                declared[in_c] = f"{self.pointer_to(variable)}{in_c} = 0;"
+            elif variable not in self.parameters:
+                declared[in_c] = declaration(in_c, kind)
+        for variable, kind in self.temporaries.items():
+            declared[variable] = declaration(variable, kind)
         read = words(" ".join(line.partition(" = ")[2] or line for line in self.lines))
-        for variable in [*own, *self.temporaries, *map(self.c_name, self.parameters)]:
-            if variable not in read:  # compilers warn of unused variables
-                top.append(f"(void){variable};")
+        top = [line for line in declared.values() if line]
+        top += [f"(void){variable};" for variable in declared if variable not in read]
         lines = [*wrapped("", self.head(name)), "{"]
         depth = 1
         for line in [*top, *self.lines]:
@@ -418,17 +414,7 @@ class Function:
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon. Arrays are pointers."""
-        arguments = []
-        for parameter, kind in self.parameters.items():
-            of = TYPES.get(kind.of, "smc_real")
-            if kind.of == "y":
-                of = STRUCTS.get(self.program.component.kind, "smc_measurement")
-            if kind.shape or kind.of not in TYPES:
-                of += " *"
-            else:
-                of += " "
-            kept = "const " if parameter in self.constant_arguments() else ""
-            arguments.append(f"{kept}{of}{self.c_name(parameter)}")
+        arguments = [f"{self.pointer_to(n)}{self.c_name(n)}" for n in self.parameters]
         if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
         if self.gives_number():
@@ -437,14 +423,16 @@ class Function:
             arguments.append(f"{TYPES[kind.of]} *out_{i}")
         return f"static void {name}({', '.join(arguments)})"
 
-    def constant_arguments(self) -> set[str]:
-        """Return the names of arguments that are pointers to constants."""
-        kept = set()
-        for name, kind in self.parameters.items():
-            pointer = kind.shape or kind.of not in TYPES
-            if pointer and name not in self.changed and not (self.entry and kind.of == "memory"):
-                kept.add(name)
-        return kept
+    def pointer_to(self, name: str) -> str:
+        """Return the type of an argument or of a pointer to an array."""
+        kind = self.kinds[name]
+        if not kind.shape and kind.of in WIDTHS:
+            return f"{TYPES[kind.of]} "
+        of = TYPES[kind.of]
+        if kind.of == "y" and self.program.component.kind == "estimator":
+            of = "smc_reading"
+        constant = self.names[name].sources <= self.parameters.keys() - self.changed
+        return f"const {of} *" if constant else f"{of} *"
 
     def gives_number(self) -> bool:
         """Return whether it returns one number."""
@@ -455,7 +443,7 @@ class Function:
         kind = self.kinds[name]
         if kind.shape:
             return array_at(self.c_name(name), kind, sources=[name])
-        sources = frozenset() if kind.of in TYPES else frozenset([name])  # of y and gains
+        sources = frozenset() if kind.of in WIDTHS else frozenset([name])  # of y and gains
         return Value(self.c_name(name), kind, sources=sources)
 
     def c_name(self, name: str) -> str:
@@ -563,13 +551,12 @@ class Function:
 
     def loop(self, node: ast.For, variable: str) -> None:
         """Translate for i in range(...) and for element in array."""
-        name = self.c_name(variable)
         inside = {other for part in node.body for other in ast.walk(part)}
         if inside & {*self.assignments[variable]}:
             raise refuse(node.iter, "a loop that changes its own variable")
         match node.iter:
             case ast.Call(func=ast.Name(id="range"), args=[*bounds]) if 1 <= len(bounds) <= 3:
-                self.count(name, variable, bounds)
+                self.count(variable, bounds)
                 self.block(node.body)
                 self.counters.discard(variable)
                 del self.names[variable]
@@ -577,70 +564,74 @@ class Function:
                 items = self.value(node.iter)
                 i = self.temporary(INT).text
                 self.lines.append(f"for ({i} = 0; {i} < {items.kind.shape[0]}; {i}++) {{")
-                element = Value(items.text.replace(ROW, i), Kind(items.kind.of))
-                self.store(node.target, element)
+                self.store(node.target, Value(items.text.replace(ROW, i), items.kind.number))
                 self.block(node.body)
             case _:
                 raise refuse(node.iter, "a loop over anything but a range")
         self.lines.append("}")
 
-    def count(self, name: str, variable: str, bounds: list[ast.expr]) -> None:
+    def count(self, variable: str, bounds: list[ast.expr]) -> None:
         """Begin a loop over a range."""
-        ends = [self.number(bound) for bound in bounds[:2]]
         step = self.whole(bounds[2]) if len(bounds) == 3 else 1
-        if any(end.kind != INT for end in ends) or not step:
-            raise refuse(self.line, "a range of other than integers with a constant step")
         if len(bounds) == 1:
             bounds = [ast.Constant(0), *bounds]
-            ends = [Value("0", INT), *ends]
-        if not ends[1].text.lstrip("-").isdigit():
-            ends[1] = self.kept(ends[1])
-        last = self.whole(bounds[1])
-        if self.natural(bounds[0]) if step > 0 else last is not None and last >= -1:
+        first, last = [self.number(bound) for bound in bounds[:2]]
+        if (first.kind, last.kind) != (INT, INT) or not step:
+            raise refuse(self.line, "a range of other than integers with a constant step")
+        end = self.whole(bounds[1])
+        if end is None:  # Python computes it once
+            last = self.kept(last)
+        if self.natural(bounds[0]) if step > 0 else end is not None and end >= -1:
             self.counters.add(variable)
+        i = self.c_name(variable)
         sign = "<" if step > 0 else ">"
         change = {1: "++", -1: "--"}.get(step, f" += {step}")
-        self.names[variable] = Value(name, INT)
-        self.lines.append(
-            f"for (int32_t {name} = {ends[0].text}; {name} {sign} {ends[1].text}; {name}{change}) {{"
-        )
+        self.names[variable] = Value(i, INT)
+        loop = f"int32_t {i} = {first.text}; {i} {sign} {last.text}; {i}{change}"
+        self.lines.append(f"for ({loop}) {{")
 
     def give(self, node: ast.expr) -> None:
         """Translate return."""
         value = self.value(node)
-        values = value.items
-        if not values:
-            values = (value,) if value.kind.fields is None else value.elements()
+        values = value.items or (value,)
+        if not value.items and value.kind.fields is not None:
+            values = value.elements()
         if self.entry and self.program.component.kind == "estimator" and len(values) == 1:
             values = (*values, Value("NAN", REAL, UNARY))
         self.results = self.results or [item.kind._replace(stride="1") for item in values]
         if len(values) != len(self.results):
             raise refuse(node, "another number of results")
+        places = self.results_at()
         for i, item in enumerate(values):
             self.results[i] = wider(self.results[i], item.kind)
-            for source in item.sources:
-                argument = source.partition(".")[0]
-                if argument in self.parameters:
-                    self.returned.add(self.position[argument])
+            arguments = {source.partition(".")[0] for source in item.sources}
+            self.returned |= {self.position[name] for name in arguments & self.parameters.keys()}
+            if places:
+                self.fill(places[i], item)
         joints = self.program.joints
-        if self.entry:
-            shape = (joints,) if joints else ()
-            if [kind.shape for kind in self.results] != [shape] * 2:
-                raise refuse(node, "a result other than u and s, a number or one of each joint,")
-        elif self.gives_number():
+        shape = (joints,) if joints else ()
+        if self.entry and [kind.shape for kind in self.results] != [shape] * 2:
+            raise refuse(node, "a result other than u and s, a number or one of each joint,")
+        if places:
+            self.lines.append("return 0;" if self.entry else "return;")
+        else:
             self.lines.append(f"return {values[0].text};")
-            return
-        for i, item in enumerate(values):
-            if not self.entry:
-                place = Value(f"*out_{i}", item.kind)
-                if item.kind.shape:
-                    place = array_at(f"out_{i}", item.kind._replace(stride="1"))
-            elif joints:
-                place = array_at("out", self.results[i], JOINTS if i else "")
+
+    def results_at(self) -> list[Value]:
+        """Return the places of the results; none for a number."""
+        if not self.entry and self.gives_number():
+            return []
+        places = []
+        for i, kind in enumerate(self.results):
+            if not self.entry and kind.shape:
+                places.append(array_at(f"out_{i}", kind))
+            elif not self.entry:
+                places.append(Value(f"*out_{i}", kind))
+            elif kind.shape:
+                places.append(array_at("out", kind, JOINTS if i else ""))
             else:
-                place = Value(f"out[{i}]", REAL)
-            self.fill(place, item)
-        self.lines.append("return 0;" if self.entry else "return;")
+                places.append(Value(f"out[{i}]", kind))
+        return places
 
     # assignments
 
@@ -655,11 +646,12 @@ class Function:
         targets = target.elts
         if self.calls_python(node):
             values = self.results_of(node, targets).items
-        elif isinstance(node, ast.Name) and self.value(node).kind.of == "memory":
-            parts = [ast.Subscript(node, ast.Constant(i)) for i in range(len(targets))]
-            values = [self.value(part) for part in parts]
         else:
-            values = self.value(node).elements()
+            value = self.value(node)
+            values = value.elements()
+            if value.kind.of == "memory":
+                self.program.claim(node, len(targets))
+                values = values[: len(targets)]
         if len(values) != len(targets):
             raise refuse(node, f"{len(targets)} names for {len(values)} numbers")
         held = []  # Python computes all values before the first assignment
@@ -697,7 +689,7 @@ class Function:
         name = target.id
         kind = value.kind._replace(stride="1")
         before = self.kinds.get(name)
-        if name in self.constants or kind.of not in TYPES or (before and before.of not in TYPES):
+        if name in self.constants or (before or kind).of not in WIDTHS or kind.of not in WIDTHS:
             raise refuse(target, "an assignment to this")
         if name in self.parameters and before and (before.shape or kind.shape):
             raise refuse(target, "an assignment to an argument that is an array")
@@ -715,9 +707,7 @@ class Function:
         return self.names[name]
 
     def is_view(self, name: str, value: Value) -> bool:
-        """Return whether a name is always the array, or part of one, that a value is, so that it can
-        be a pointer to it.
-        """
+        """Return whether a name is always the same array, or part of one: then it is a pointer."""
         if not value.pointer or value.kind.fields is not None or len(value.sources) != 1:
             return False
         (array,) = value.sources
@@ -730,9 +720,7 @@ class Function:
         return lasts and len(self.assignments[name]) == 1 and name not in self.parameters
 
     def changeable(self, target: ast.expr) -> Value:
-        """Return elements that the function changes: of its memory, of an array that it makes, or of
-        an argument.
-        """
+        """Return elements that the function changes: of its own arrays, or of an argument."""
         array = self.names.get(root(target))
         if array is None or not array.kind.shape or array.kind.fields is not None:
             raise refuse(target, "an assignment to this, which is no array of the function's own,")
@@ -778,10 +766,6 @@ class Function:
 
     def receiver(self, target: ast.expr, kind: Kind, read: set[str]) -> Value | None:
         """Return the place of a target that a call can write itself."""
-        if isinstance(target, ast.Subscript):
-            place = self.changeable(target)
-            fits = place.kind == kind == Kind(kind.of) and not self.origins(place.text) & read
-            return place if fits else None
         if not isinstance(target, ast.Name) or self.kinds.get(target.id, kind) != kind:
             return None
         if kind.shape and target.id in {*self.parameters, *read}:
@@ -835,7 +819,7 @@ class Function:
     def number(self, node: ast.expr) -> Value:
         """Translate an expression that is a number, an array, or a tuple of these."""
         value = self.value(node)
-        if value.kind.of not in TYPES:
+        if value.kind.of not in WIDTHS and not value.kind.shape:
             raise refuse(node, f"{value.text or 'nothing'} as a number")
         return value
 
@@ -956,23 +940,22 @@ class Function:
             if joints:
                 fields = ("t", "dt", "model", *joint_law.ARRAYS)
             check("reading" if component.kind == "estimator" else "measurement", name, fields)
+            place = f"{owner.text}->{name}"
+            shape = (joints, joints) if name == "M" else (joints,)
             if joints and name in joint_law.ARRAYS:
-                shape = (joints, joints) if name == "M" else (joints,)
-                return array_at(f"{owner.text}->{name}", Kind("real", shape), sources=sources)
-            return Value(f"{owner.text}->{name}", REAL)
-        if owner.kind.of == "gains":
+                return array_at(place, Kind("real", shape), sources=sources)
+        elif owner.kind.of == "gains":
             check("gain", name, component.gains)
-            place = f"GAIN_{plain(name)}"
-            if not joints:
-                return Value(f"{owner.text}[{place}]", REAL)
-            place += f" * {JOINTS}"
-            if name in component.shared:
-                return Value(f"{owner.text}[{place}]", REAL)
-            return array_at(owner.text, Kind("real", (joints,)), place, sources)
-        if owner.kind.fields:
+            offset = f"GAIN_{plain(name)} * {JOINTS}" if joints else f"GAIN_{plain(name)}"
+            place = f"{owner.text}[{offset}]"
+            if joints and name not in component.shared:
+                return array_at(owner.text, Kind("real", (joints,)), offset, sources)
+        elif owner.kind.fields:
             check("field", name, owner.kind.fields)
             return owner.elements()[owner.kind.fields.index(name)]
-        raise refuse(node, "an attribute")
+        else:
+            raise refuse(node, "an attribute")
+        return Value(place, REAL)
 
     def _subscript(self, node: ast.Subscript) -> Value:
         owner = self.value(node.value)
@@ -990,47 +973,33 @@ class Function:
         strides = [owner.kind.stride]
         if len(shape) == 2:
             strides = [SLOTS if memory else str(shape[1]), "1"]
-        text = owner.text
-        pointer = owner.pointer
-        left = []
+        tokens = (ROW, COLUMN)[: len(shape)]
+        made = owner
+        left = list[int]()
         stride = "1"
-        for token, place, size, step in zip((ROW, COLUMN), places, shape, strides, strict=False):
-            slots = memory and token == (ROW, COLUMN)[len(shape) - 1]
+        for token, place, size, step in zip(tokens, places, shape, strides, strict=True):
+            slots = memory and token == tokens[-1]
             if isinstance(place, ast.Slice):
-                part = self.part(node, place, size)
-                if slots:
-                    self.program.claim(node, part.stop)
-                start = Value(str(part.start), INT)
-                kept = (ROW, COLUMN)[len(left)]
-                index = Value(f"{kept} + {part.start}", INT, SUM)
-                if not part.start:
-                    index = Value(kept, INT)
+                part = self.part(node, place, size, slots)
+                kept = Value(tokens[len(left)], INT)
+                if part.start:
+                    kept = Value(f"{kept.text} + {part.start}", INT, SUM)
+                made = indexed(made, token, kept, Value(str(part.start), INT), step)
                 left.append(len(part))
                 stride = step
             else:
-                start = index = self.index(node, place, size, slots)
-            before, *after = re.split(rf"(\[{token}\]|{token})", text)
-            text = before
-            for found, rest in zip(after[::2], after[1::2], strict=True):
-                text += f"[{index.text}]" if found[0] == "[" else index.within(PRODUCT)
-                text += rest
-            if start.text != "0" and step == "1":
-                pointer += f" + {start.within(SUM)}"
-            elif start.text != "0":
-                pointer += f" + {start.within(PRODUCT)} * {step}"
-        of = "real" if memory else owner.kind.of
-        fields = owner.kind.fields if owner.kind.fields is None else ()
+                index = self.index(node, place, size, slots)
+                made = indexed(made, token, index, index, step)
         if not left:
-            return Value(text, Kind(of), owner.level)
+            return Value(made.text, owner.kind.number, owner.level)
         if not owner.pointer or (len(left) == 2 and (memory or left[1] != shape[1])):
-            pointer = ""  # its numbers do not lie in a row
+            made = made._replace(pointer="")  # its numbers do not lie in a row
             stride = "1"
-        return Value(
-            text, Kind(of, tuple(left), fields, stride), owner.level, pointer, owner.sources
-        )
+        fields = owner.kind.fields if owner.kind.fields is None else ()
+        return made._replace(kind=Kind(owner.kind.number.of, tuple(left), fields, stride))
 
-    def part(self, node: ast.Subscript, place: ast.Slice, size: int) -> range:
-        """Return the indices of a slice of a dimension."""
+    def part(self, node: ast.Subscript, place: ast.Slice, size: int, slots: bool) -> range:
+        """Return the indices of a slice of a dimension. `slots`: whether it is the memory's."""
         bounds = []
         for bound in (place.lower, place.upper):
             bounds.append(self.whole(bound))
@@ -1039,6 +1008,8 @@ class Function:
         found = range(size)[slice(*bounds)]
         if place.step or not found:
             raise refuse(node, "a part of an array that is empty or has a step")
+        if slots:
+            self.program.claim(node, found.stop)
         return found
 
     def index(self, node: ast.Subscript, place: ast.expr, size: int, slots: bool) -> Value:
@@ -1143,16 +1114,13 @@ class Function:
         pairs = [(yes, no)]
         if is_tuple:
             pairs = [*zip(yes.elements(), no.elements(), strict=True)]
-        if not first and not second:
-            items = [chosen(test, *pair) for pair in pairs]
-        else:
-            items = [self.temporary(wider(a.kind, b.kind)) for a, b in pairs]
-            self.lines += [f"if ({text}) {{", *first]
-            for place, (value, _) in zip(items, pairs, strict=True):
-                self.fill(place, value)
-            self.lines += ["} else {", *second]
-            for place, (_, value) in zip(items, pairs, strict=True):
-                self.fill(place, value)
+        items = [chosen(test, *pair) for pair in pairs]
+        if first or second:
+            items = [self.temporary(item.kind) for item in items]
+            for i, beginning in enumerate(([f"if ({text}) {{", *first], ["} else {", *second])):
+                self.lines += beginning
+                for place, pair in zip(items, pairs, strict=True):
+                    self.fill(place, pair[i])
             self.lines.append("}")
         if is_tuple:
             return gathered(items)
@@ -1166,30 +1134,31 @@ class Function:
             return self.value(node.func.value)._replace(pointer="", sources=frozenset())
         function = self.callee(node)
         if function is len:
-            return Value(str(self.whole(node)), INT)
-        if function in FILLED and len(node.args) == 1:
-            return self.filled(function, node.args[0])
-        if function in REQUESTS:
-            return self.requested(function, node)
-        if hasattr(function, "_fields"):
-            items = [self.number(part) for part in node.args]
-            return gathered(items, function._fields)
-        if function is np.array and isinstance(node.args[0], ast.List | ast.Tuple):
-            value = gathered([self.number(part) for part in node.args[0].elts])
-            return self.kept(value._replace(kind=value.kind._replace(fields=None)))
-        if self.calls_python(node):
-            return self.results_of(node)
-        return self.built_in(function, node)
+            made = Value(str(self.whole(node)), INT)
+        elif function in FILLED:
+            made = self.filled(function, node)
+        elif function in REQUESTS:
+            made = self.requested(function, node)
+        elif hasattr(function, "_fields"):
+            made = gathered([self.number(part) for part in node.args], function._fields)
+        elif function is np.array and isinstance(node.args[0], ast.List | ast.Tuple):
+            made = gathered([self.number(part) for part in node.args[0].elts])
+            made = self.kept(made._replace(kind=made.kind._replace(fields=None)))
+        elif self.calls_python(node):
+            made = self.results_of(node)
+        else:
+            made = self.built_in(function, node)
+        return made
 
-    def filled(self, function: Any, node: ast.expr) -> Value:
+    def filled(self, function: Any, node: ast.Call) -> Value:
         """Return an array that is filled with one number."""
-        shape = []
-        for size in node.elts if isinstance(node, ast.Tuple) else [node]:
-            if not (known := self.whole(size)):
-                raise refuse(node, "a length that is not known before the law runs")
-            shape.append(known)
+        (size,) = node.args
+        parts = size.elts if isinstance(size, ast.Tuple) else [size]
+        shape = tuple(self.whole(part) or 0 for part in parts)
+        if 0 in shape:
+            raise refuse(node, "a length that is not known before the law runs")
         value = literal(FILLED[function], self.program.single, node)
-        return value._replace(kind=Kind("real", tuple(shape)))
+        return value._replace(kind=Kind("real", shape))
 
     def requested(self, function: Any, node: ast.Call) -> Value:
         """Translate coriolis and jacobian, which the caller of the law provides."""
@@ -1206,34 +1175,33 @@ class Function:
         of_numpy = function in ELEMENTWISE or function is np.where
         if shape and not of_numpy:
             raise refuse(node, f"{getattr(function, '__name__', function)} of an array")
+        name = getattr(function, "__name__", str(function))
+        numbers = [value.kind.of for value in values]
         if function is np.where and len(values) == 3:
-            return chosen(*values, shape)
-        if function in (min, max) and len(values) > 1:
-            helper = "minimum" if function is min else "maximum"
-            result = values[0]
+            made = chosen(*values, shape)
+        elif function in (min, max) and len(values) > 1:
+            made = values[0]
             for value in values[1:]:
-                of = widest(result.kind.of, value.kind.of)
-                call = f"{self.program.helper(helper, of)}({result.text}, {value.text})"
-                result = Value(call, Kind(of))
-            return result
-        if function in CASTS and len(values) == 1:
-            of = CASTS[function]
-            return Value(f"({TYPES[of]}){values[0].within(UNARY)}", Kind(of), UNARY)
-        if function in ROUNDING:
-            return Value(f"(int32_t){self.math(ROUNDING[function], values).text}", INT, UNARY)
-        if function in SAME_IN_C:
-            return self.math(function.__name__, values)
-        if not of_numpy:
-            raise refuse(node, f"{getattr(function, '__name__', function)}")
-        name = ELEMENTWISE[function]
-        of = "single" if all(value.kind.of == "single" for value in values) else "real"
-        if name == "fabs" and values[0].kind.of in WHOLE:
-            name = "absolute"
-            of = "int"
-        if name in HELPERS:
-            arguments = ", ".join(value.text for value in values)
-            return Value(f"{self.program.helper(name, of)}({arguments})", Kind(of, shape))
-        return self.math(name, values, shape)
+                of = widest(made.kind.of, value.kind.of)
+                helper = self.program.helper("minimum" if function is min else "maximum", of)
+                made = Value(f"{helper}({made.text}, {value.text})", Kind(of))
+        elif function in CASTS and len(values) == 1:
+            kind = Kind(CASTS[function])
+            made = Value(f"({TYPES[kind.of]}){values[0].within(UNARY)}", kind, UNARY)
+        elif function in ROUNDING:
+            text = self.math(ROUNDING[function], values).text
+            made = Value(f"(int32_t){text}", INT, UNARY)
+        elif function in SAME_IN_C:
+            made = self.math(name, values)
+        elif not of_numpy:
+            raise refuse(node, name)
+        elif ELEMENTWISE[function] in HELPERS or (numbers[0] in WHOLE and "abs" in name):
+            of = functools.reduce(widest, numbers)
+            helper = self.program.helper(ELEMENTWISE[function].replace("fabs", "absolute"), of)
+            made = Value(f"{helper}({', '.join(value.text for value in values)})", Kind(of, shape))
+        else:
+            made = self.math(ELEMENTWISE[function], values, shape)
+        return made
 
     def math(self, name: str, values: Sequence[Value], shape: tuple[int, ...] = ()) -> Value:
         """Translate a call of a function of math.h, in the precision of its arguments."""
@@ -1271,7 +1239,7 @@ def around(written: FunctionType) -> dict[str, Any]:
 def in_python(function: Any) -> FunctionType | None:
     """Return the Python of a function, compiled or not; None for numpy's and for C's."""
     written = getattr(function, "py_func", function)
-    if not isinstance(written, FunctionType) or str(written.__module__).startswith(NUMPY):
+    if not isinstance(written, FunctionType) or str(written.__module__).startswith("numpy"):
         return None
     return written
 
@@ -1377,6 +1345,23 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
     elif single or kind.of == "single":
         text += "f"
     return Value(text, kind, UNARY if text.startswith("-") else ATOM)
+
+
+def indexed(array: Value, token: str, index: Value, start: Value, stride: str) -> Value:
+    """Return an array with an index in place of a token, and the pointer to where it starts."""
+    text, *after = re.split(rf"(\[{token}\]|{token})", array.text)
+    for found, rest in zip(after[::2], after[1::2], strict=True):
+        text += f"[{index.text}]" if found[0] == "[" else index.within(PRODUCT)
+        text += rest
+    offset = start.within(SUM) if stride == "1" else f"{start.within(PRODUCT)} * {stride}"
+    pointer = array.pointer if start.text == "0" else f"{array.pointer} + {offset}"
+    return array._replace(text=text, pointer=pointer)
+
+
+def declaration(name: str, kind: Kind) -> str:
+    """Return the line that declares a variable."""
+    size = f"[{math.prod(kind.shape)}]" if kind.shape else " = 0"
+    return f"{TYPES[kind.of]} {name}{size};"
 
 
 def plain(name: str) -> str:
