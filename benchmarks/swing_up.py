@@ -1,5 +1,4 @@
-"""The trajectories of the boards' entries, found again:
-smc_mujoco/benchmark/realaigym/trajectories.
+"""The trajectories of the boards' entries, found again: benchmarks/realaigym/trajectories.
 
     python benchmarks/swing_up.py acrobot              # optimise, then write the file; a minute
     python benchmarks/swing_up.py acrobot --starts 12  # also tell what other starts of the search
@@ -21,15 +20,15 @@ import json
 import math
 
 import numpy as np
+import realaigym as boards
 from numba import njit
+from realaigym import entries, swing_ups
+from realaigym.scoring import V2
+from realaigym.simulator import Case, Machine, _slope, upright
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import minimize
 
-from smc_mujoco.benchmark import realaigym as boards
-from smc_mujoco.benchmark.realaigym import entries, swing_ups
-from smc_mujoco.benchmark.realaigym.scoring import V2
-from smc_mujoco.benchmark.realaigym.simulator import Case, Machine, _slope, upright
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, TORQUE_LIMIT

@@ -26,7 +26,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
 What is needed less often is in modules: `smc.signals` (paths, gusts, series), `smc.hardware` (more
 friction, servos), `smc.design` (gains from theory), `smc.fidelity`, `smc.metrics` (of joints and
 tips), `smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents),
-`smc.errors` (warnings), `smc.boards` and `smc.paper`.
+`smc.errors` (warnings) and `smc.paper`.
 
 `__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that
 importing the package costs nothing. Types that are only returned are in their modules, such as

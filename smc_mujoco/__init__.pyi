@@ -1,4 +1,3 @@
-import smc_mujoco.benchmark.realaigym
 import smc_mujoco.evidence.papers.gaber.scenarios
 from smc_mujoco import design as design
 from smc_mujoco import envs as envs
@@ -81,5 +80,4 @@ from smc_mujoco.studies.table import Table as Table
 from smc_mujoco.studies.worst_case import worst_case as worst_case
 
 __version__: str
-boards = smc_mujoco.benchmark.realaigym
 paper = smc_mujoco.evidence.papers.gaber.scenarios

@@ -57,16 +57,8 @@ OTHERS = {  # title -> names of modules that are no public names
     evidence.audit.audit.Audit
     evidence.audit.verdict.Claim
     """,
-    "Boards, the paper, tests": """
+    "The paper, tests": """
     evidence.papers.gaber.scenarios
-    benchmark.realaigym
-    benchmark.realaigym.entries.entry
-    benchmark.realaigym.entries.on_board
-    benchmark.realaigym.scoring.criteria
-    benchmark.realaigym.scoring.score
-    benchmark.realaigym.simulator.robustness
-    benchmark.realaigym.standings.board
-    benchmark.realaigym.standings.experiments
     testing.plugin.step_response
     testing.plugin.smc_golden
     testing.response.StepResponse

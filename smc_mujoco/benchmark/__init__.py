@@ -1,3 +1,1 @@
-"""Annex: problems with names, suites of them, entries, results and their pages; and RealAIGym's
-boards.
-"""
+"""Annex: problems with names, suites of them, entries, results and their pages."""

@@ -12,7 +12,6 @@ from smc_mujoco.common.errors import ScenarioError, find
 
 SUITES = Path(__file__).parent / "suites"
 PERIOD = 5  # of the pattern
-FOREIGN = "realaigym"  # boards of others, in a folder of their own
 
 
 def suites() -> tuple[str, ...]:
@@ -22,11 +21,6 @@ def suites() -> tuple[str, ...]:
 
 def suite(name: str) -> tuple[str, ...]:
     """Return the IDs of a suite's problems. Raise ScenarioError for an unknown name."""
-    if name == FOREIGN:
-        raise ScenarioError(
-            f"suite {name!r} has published scores of single runs, no drawn instances and no targets: enter a folder "
-            "there with python -m smc_mujoco.benchmark.realaigym acrobot --entry FOLDER"
-        )
     find("suite", name, dict.fromkeys(suites()))
     lines = (SUITES / f"{name}.txt").read_text(encoding="utf-8").splitlines()
     return tuple(line for line in lines if line and not line.startswith("#"))

@@ -30,7 +30,6 @@ NOT_OF_CONDITION = (
     "condition",
 )
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
-    "benchmark/realaigym",
     "evidence/audit",
     "evidence/papers",
     "draw",

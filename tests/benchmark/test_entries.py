@@ -58,13 +58,6 @@ def test_an_entry_has_its_gains_on_each_plant(tmp_path):
         assert its.law(plant).gains["k"] == 2.5
 
 
-def test_realaigyms_boards_are_no_list_of_problems():
-    with pytest.raises(
-        ScenarioError, match=r"no targets: enter a folder there with python -m .* --entry FOLDER"
-    ):
-        suite.suite("realaigym")
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -17,8 +17,7 @@ that pushes, a response beyond 1. It is RK4 at 2 ms of the double pendulum's equ
 friction cf arctan(100 q'). The law and its estimator run as in every scenario, compiled, by their
 addresses. In the published simulator a pulse on the joint without a motor has no effect (its input
 matrix is 0 there), so only the driven joint's are drawn. The published test has other random
-numbers at every run. Here they depend only on `SEED`, and for a law that is not of this package on
-a noise key, which is drawn when the test begins: no law can know its noise. Source:
+numbers at every run; here they depend only on `SEED`. Source:
 leaderboard/*/robustness_v2 and src/python/double_pendulum of
 github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
@@ -31,7 +30,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from smc_mujoco.benchmark.realaigym.scoring import shoulder_first
+from realaigym.scoring import shoulder_first
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.jit import NotCompilable, call
@@ -98,8 +97,6 @@ class Robustness:
     survived: Mapping[
         str, tuple[tuple[str, float, bool], ...]
     ]  # test -> (name, level, whether the law survived it)
-    # key of the random numbers: a scenario with it repeats them; 0 if they depend on SEED alone
-    noise_key: int = 0
 
     def __repr__(self) -> str:
         tests = ", ".join(f"{test} {percent:.1f} %" for test, percent in self.percent.items())
@@ -119,11 +116,8 @@ class Robustness:
         return sum(self.percent.values()) / (100.0 * len(self.survived))
 
 
-def cases(key: int = 0) -> list[Case]:
-    """Return every run of the test, in order, with the pulses of a noise key.
-
-    Runs of one level stand together.
-    """
+def cases() -> list[Case]:
+    """Return every run of the test, in order: runs of one level stand together."""
     listed = list[Case]()
 
     def levels(low: float, high: float) -> list[float]:
@@ -149,7 +143,7 @@ def cases(key: int = 0) -> list[Case]:
             listed.append(case(test, value, seed=seed, **{test: value}))
     listed += [case("torque_response", value, response=value) for value in levels(0.1, 2.0)]
     listed += [case("delay", count * STEP, delay=count) for count in range(LEVELS)]
-    rng = np.random.default_rng([SEED, key])
+    rng = np.random.default_rng([SEED, 0])
     return listed + [case("perturbations", float(k), pulses=_pulses(rng)) for k in range(PROFILES)]
 
 
@@ -179,8 +173,7 @@ def robustness(
 
     Args:
       scenario: plant pendubot or acrobot; its law and velocity estimator are tested. The law may
-        know the plant's nominal parameters if the scenario says so. If its noise_key is 0, and the
-        law is your own, one is drawn.
+        know the plant's nominal parameters if the scenario says so.
       report: called with the number of runs done and the number of all.
 
     Raises:
@@ -188,7 +181,7 @@ def robustness(
         compile.
     """
     machine = Machine(scenario)
-    todo = cases(0)
+    todo = cases()
     levels: dict[tuple[str, str, float], list[bool]] = {}
     for done, case in enumerate(todo, 1):
         ended = upright(machine.simulate(case)[0][-1])
@@ -198,7 +191,7 @@ def robustness(
     survived = {test: list[tuple[str, float, bool]]() for test in TESTS}
     for (test, name, value), results in levels.items():
         survived[test].append((name, value, sum(results) > len(results) / 2))
-    return Robustness({test: tuple(rows) for test, rows in survived.items()}, 0)
+    return Robustness({test: tuple(rows) for test, rows in survived.items()})
 
 
 def upright(state: np.ndarray) -> bool:
@@ -244,8 +237,7 @@ class Machine:
         self.gains = np.array([*law.gains.values(), 0.0])
         self.filter = np.array([*velocity.gains.values(), 0.0])
         self.sizes = law.memory, velocity.memory
-        self.known = np.array([scenario.plant.parameters[name] for name in MODEL_1_1])
-        self.key = 0
+        self.known = tuple(scenario.plant.parameters[name] for name in MODEL_1_1)
         self.limit = scenario.limits[0]
         self.uses_model = float(resolved.model == "nominal")
 
@@ -255,7 +247,7 @@ class Machine:
         """
         true = dict(zip(MODEL_1_1, self.known, strict=True)) | dict(case.parameters)
         t = STEP * np.arange(STEPS)
-        rng = np.random.default_rng([SEED, case.seed, self.key])
+        rng = np.random.default_rng([SEED, case.seed, 0])
         noise = rng.normal(size=(STEPS, 3)) * [
             case.velocity_noise,
             case.velocity_noise,
@@ -275,7 +267,7 @@ class Machine:
                 self.filter,
                 *memories,
                 self.known,
-                np.array(list(true.values())),
+                tuple(true.values()),
                 self.driven,
                 self.limit,
                 self.uses_model,
@@ -353,17 +345,7 @@ def answered(functions, gains, tuning, memory, memories, known, driven, seen, y,
         position[1],
         velocity[0],
         velocity[1],
-        known[0],
-        known[1],
-        known[2],
-        known[3],
-        known[4],
-        known[5],
-        known[6],
-        known[7],
-        known[8],
-        known[9],
-        known[10],
+        *known[:11],
         known[13],
     )
     if driven == 0:
@@ -410,22 +392,6 @@ def _simulate(
 
     Return whether the law or its estimator raised an exception.
     """
-    parameters = (
-        true[0],
-        true[1],
-        true[2],
-        true[3],
-        true[4],
-        true[5],
-        true[6],
-        true[7],
-        true[8],
-        true[9],
-        true[10],
-        true[11],
-        true[12],
-        true[13],
-    )
     x = (0.0, 0.0, 0.0, 0.0)
     motor = 0.0
     seen = np.zeros(4)
@@ -446,7 +412,7 @@ def _simulate(
         motor = min(max(motor + noise[k, 2], -limit), limit)
         u = motor + pulse[k]
         u1, u2 = (u, 0.0) if driven == 0 else (0.0, u)
-        x = stepped(x, u1, u2, parameters)
+        x = stepped(x, u1, u2, true)
         torque[k] = motor
         states[k + 1, 0], states[k + 1, 1], states[k + 1, 2], states[k + 1, 3] = x
         if not abs(x[2]) + abs(x[3]) < 1e6:

@@ -8,6 +8,8 @@ Look for: the motor saturates at 0.3 N m s. The law forgives a blow as long as t
 the arm back; one that is a little too hard sends the machine round and round.
 """
 
+import realaigym
+
 import smc_mujoco as smc
 
 UP = 3.14159265  # rad
@@ -16,11 +18,11 @@ UP = 3.14159265  # rad
 def run(blow):
     disturbance = smc.signals.Impulse(blow, time=4.0, width=0.05)
     up = smc.Constant(UP)  # for the metrics: the law has its own reference
-    return smc.boards.entry("pendubot", disturbance=disturbance, reference=up, duration=5.0)
+    return realaigym.entry("pendubot", disturbance=disturbance, reference=up, duration=5.0)
 
 
 def stands(trace):
-    return smc.boards.criteria(trace).success
+    return realaigym.criteria(trace).success
 
 
 def lean(trace):

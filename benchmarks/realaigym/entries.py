@@ -121,9 +121,7 @@ def _along(robot: str) -> Template:
     STEP = float(table["step"])
     LAST = len(table["u"]) - 1
     names = ("x", "v", "a", "q", "dq", "ddq", "u", "s_x", "s_v", "s_q", "s_dq")
-    arrays = X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = [np.array(table[name]) for name in names]
-    for array in arrays:
-        array.flags.writeable = False  # as constants of a checked law are
+    X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = [np.array(table[name]) for name in names]
 
     def law(y, gains, memory):
         place = y.t / STEP

@@ -23,8 +23,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from smc_mujoco.benchmark.realaigym.entries import entry, nearest, on_board
-from smc_mujoco.benchmark.realaigym.scoring import shoulder_first
+from realaigym.entries import entry, nearest, on_board
+from realaigym.scoring import shoulder_first
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import law_function
 from smc_mujoco.control.source import SHIPPED
@@ -90,8 +90,6 @@ def upright_law(robot: str) -> tuple[np.ndarray, np.ndarray]:
 def _swing_up(robot: str) -> Template:
     """Return the law of a robot; (x, v) are the driven joint's, (q, dq) the free one's."""
     k, solved = upright_law(robot)
-    for array in (k, solved):
-        array.flags.writeable = False  # as constants of a checked law are
     shoulder = robot == "pendubot"
 
     def law(y, gains, memory):

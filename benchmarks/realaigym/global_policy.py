@@ -25,9 +25,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from smc_mujoco.benchmark.realaigym.published import GlobalRow
-from smc_mujoco.benchmark.realaigym.scoring import MIN_TIP_HEIGHT
-from smc_mujoco.benchmark.realaigym.simulator import (
+from realaigym.published import GlobalRow
+from realaigym.scoring import MIN_TIP_HEIGHT
+from realaigym.simulator import (
     DT,
     LIMIT,
     MEASUREMENT_SIZE,
@@ -161,22 +161,6 @@ def _minute(
 
     Return whether the law or its estimator raised an exception.
     """
-    p = (
-        known[0],
-        known[1],
-        known[2],
-        known[3],
-        known[4],
-        known[5],
-        known[6],
-        known[7],
-        known[8],
-        known[9],
-        known[10],
-        known[11],
-        known[12],
-        known[13],
-    )
     x = (0.0, 0.0, 0.0, 0.0)
     seen = np.zeros(4)
     y = np.zeros(MEASUREMENT_SIZE)
@@ -198,8 +182,8 @@ def _minute(
             pushed = False
         if pushed:
             count += 1
-            outer = p[13] * p[1] * p[4] * math.sin(x[0] + x[1])
-            gravity = (p[13] * LEVER * math.sin(x[0]) + outer, outer)
+            outer = known[13] * known[1] * known[4] * math.sin(x[0] + x[1])
+            gravity = (known[13] * LEVER * math.sin(x[0]) + outer, outer)
             for joint in range(2):
                 error = goals[resets_done - 1, joint] - x[joint]
                 total[joint] += error
@@ -223,7 +207,7 @@ def _minute(
             u[driven], u[1 - driven] = min(max(wanted, -limit), limit), 0.0
         last = t
         torques[k] = u
-        x = stepped(x, u[0], u[1], p)
+        x = stepped(x, u[0], u[1], known)
         states[k + 1, 0], states[k + 1, 1], states[k + 1, 2], states[k + 1, 3] = x
         if not abs(x[2]) + abs(x[3]) < 1e6:
             states[k + 1 :] = math.inf

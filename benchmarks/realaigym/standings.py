@@ -4,8 +4,8 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from smc_mujoco.benchmark.realaigym.entries import FEEDBACKS, entry, on_board
-from smc_mujoco.benchmark.realaigym.published import (
+from realaigym.entries import FEEDBACKS, entry, on_board
+from realaigym.published import (
     GLOBAL,
     ROBUSTNESS,
     SIMULATION,
@@ -13,8 +13,8 @@ from smc_mujoco.benchmark.realaigym.published import (
     RobustnessRow,
     Row,
 )
-from smc_mujoco.benchmark.realaigym.scoring import criteria, score, shoulder_first
-from smc_mujoco.benchmark.realaigym.simulator import Robustness
+from realaigym.scoring import criteria, score, shoulder_first
+from realaigym.simulator import Robustness
 from smc_mujoco.common import errors
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -35,7 +35,6 @@ DESIGN_FIELDS = (
     "reference",
     "feedforward",
     "seed",
-    "noise_key",
     "condition",
 )
 
@@ -61,8 +60,7 @@ def board(runs: Trace | Mapping[str, Trace], name: str = NAME) -> tuple[Row, ...
 
     Raises:
       ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards',
-        a law that needs the Python loop and knows more than its measurements, or a name that cannot
-        be printed or is that of a published row.
+        or the name of a published row.
     """
     if isinstance(runs, Mapping):
         traces = runs
@@ -90,15 +88,11 @@ def global_board(robot: str, rows: Sequence[GlobalRow]) -> tuple[GlobalRow, ...]
 
 
 def _ranked(published: tuple[Any, ...], rows: list[Any]) -> tuple[Any, ...]:
-    """Return published and other rows, best score first.
-
-    Refuse a name that cannot be printed or is taken.
-    """
+    """Return published and other rows, best score first. Refuse a name that is taken."""
+    taken = {row.name for row in published}
     for row in rows:
-        if errors.name("name of the row", row.name) in [one.name for one in published]:
-            raise errors.ScenarioError(
-                f"name of the row is {row.name!r}, which a published row has: give another"
-            )
+        if row.name in taken:
+            raise errors.ScenarioError(f"row {row.name!r} is published: give another name")
     return tuple(sorted((*published, *rows), key=lambda row: -row.score))
 
 
@@ -110,7 +104,7 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
         if (value := ran.get(rule)) != right:
             raise errors.ScenarioError(
                 f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
-                "use smc.boards.on_board"
+                "use realaigym.on_board"
             )
     return Row(
         name=name,

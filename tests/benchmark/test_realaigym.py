@@ -1,0 +1,470 @@
+"""RealAIGym's boards (benchmarks/realaigym): published scores, the published simulator against
+MuJoCo and its own numbers, and this package's rows.
+
+Numbers without a formula are those of the published code, run unchanged on 2026-11-23 (repository
+dfki-ric-underactuated-lab/double_pendulum, commit 1e8544e).
+"""
+
+import dataclasses
+import math
+import re
+from types import SimpleNamespace
+
+import boards as script
+import numpy as np
+import pytest
+import realaigym as boards
+from helpers.pages import ROOT
+from realaigym import entries, global_policy, simulator, swing_ups
+from realaigym.scoring import VERSIONS
+from realaigym.simulator import Case, Machine, stepped
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import solve_continuous_are
+
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
+from smc_mujoco.studies import scene
+
+ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
+ORDER = {"acrobot": [1, 0], "pendubot": [0, 1]}  # channels of shoulder and elbow
+DIGITS = {"torque_smoothness": 3}  # of the published criteria after the point; of the others 2
+DRAWN = {  # seed -> first times of resets, and goals
+    333: ((3.9924, 8.2595, 11.3649, 15.6190, 18.2143),
+          ((0.27201, 1.43854), (-0.82485, -2.83809), (-1.59968, 2.3467))),
+    777: ((4.0065, 6.5967, 10.3490, 15.6826, 18.9549),
+          ((-2.18237812, -1.24183005), (2.10646, 2.6829), (-1.45013, 0.90496))),
+}  # fmt: skip
+# Three standard deviations of a row whose gains differ in their 13th digit.
+CHAOS = 0.08
+STATES = {  # seed -> time, s -> state under u = 0
+    333: {
+        4.2: (0.069803, 0.853357, 1.722369, 2.993765),
+        6.0: (0.711255, -0.116228, -1.005636, -3.279171),
+        10.0: (0.112146, -1.612764, 0.172681, -7.424433),
+        12.0: (0.383254, -1.167559, 5.744387, -5.488736),
+    },
+    777: {
+        4.2: (-0.346767, -0.588496, -5.374484, -2.003267),
+        6.0: (-1.402629, -0.257037, -4.742809, 3.535720),
+        12.0: (37.625280, 6.651855, 11.217737, -8.977259),
+    },
+}
+PUSHED = {  # seed -> first and last samples of two resets, s
+    333: ((3.994, 4.194), (8.260, 8.458)),
+    777: ((4.008, 4.208), (6.598, 6.798)),
+}
+UPRIGHT_GAINS = {
+    "pendubot": (57.254203, 54.500374, 13.305076, 9.668627),
+    "acrobot": (255.754194, 107.575098, 54.153341, 24.868653),
+}
+
+
+@pytest.fixture(scope="module")
+def traces():
+    """The run of our entry of each robot."""
+    found = smc.run([boards.entry(robot) for robot in boards.ROBOTS])
+    return dict(zip(boards.ROBOTS, found, strict=True))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@ROBOTS
+def test_published_criteria_give_their_published_score(robot, version):
+    """Within what the rounding of the criteria leaves open, up to 0.004, and half a digit."""
+    for row in boards.SIMULATION[robot][version]:
+        ends = []
+        for side in (1.0, -1.0):
+            values = row._asdict()
+            for name in VERSIONS[version]:
+                values[name] += side * 0.5 * 10.0 ** -DIGITS.get(name, 2)
+            ends.append(boards.score(values, version))
+        assert ends[0] - 5e-4 <= row.score <= ends[1] + 5e-4, row.name
+        assert boards.score(row, version) == pytest.approx(row.score, abs=0.0023), row.name
+
+
+def test_unrounded_criteria_give_their_unrounded_score():
+    """History SAC's run on the acrobot's board: scores.csv of its data."""
+    values = (1.0000000000000007, 8.077749161960673, 1.8037118196867141,
+              0.009546752841345449, 88.4965605525382)  # fmt: skip
+    row = dict(zip(VERSIONS["v2"], values, strict=True))
+    assert boards.score(row) == pytest.approx(0.6552699844147534, abs=1e-12)
+
+
+@ROBOTS
+def test_a_published_score_of_robustness_is_the_mean_of_its_tests(robot):
+    for row in boards.ROBUSTNESS[robot]:
+        assert np.mean(row[1:-1]) / 100.0 == pytest.approx(row.score, abs=0.0011), row.name
+
+
+def of_arrays(t, q, v, u, robot):
+    """Criteria of a motion of shoulder and elbow."""
+    scenario = smc.Scenario(plant=robot, law="none")
+    order = ORDER[robot]
+    trace = SimpleNamespace(
+        t=t, x=q[:, order], v=v[:, order], u=u[:, None], scenario=scenario, failure=None
+    )
+    return boards.criteria(trace)
+
+
+def test_criteria_of_a_motion_are_those_of_its_formula():
+    t = np.arange(1001) * 0.01
+    q = np.zeros((1001, 2))
+    v = np.zeros((1001, 2))
+    u = np.where(np.arange(1001) % 2, 1.0, -1.0)
+    q[:, 0] = np.where(t < 3.995, 0.0, math.pi)  # up from the sample at 4 s
+    v[:, 1] = 2.0
+    found = of_arrays(t, q, v, u, "pendubot")
+    assert found == pytest.approx((4.0, math.pi, 1.0, 10.0, 10.0, 2.0, 40.0))
+    q[900, 0] = 0.0  # falls once
+    assert of_arrays(t, q, v, u, "acrobot").swing_up_time == pytest.approx(9.01)
+    q[-2:, 0] = 0.0
+    assert not of_arrays(t, q, v, u, "acrobot").success
+
+
+def test_a_run_that_stays_down_or_diverges_scores_nothing():
+    down = dataclasses.replace(boards.on_board("acrobot", "none"), duration=0.1)
+    fast = smc.run(dataclasses.replace(down, v0=99e4))
+    assert fast.failure
+    assert boards.score(smc.run(down)) == boards.score(fast, "v1") == 0.0
+
+
+@pytest.mark.slow
+@ROBOTS
+def test_the_published_simulator_is_mujocos(robot, traces):
+    states, torque = Machine(boards.entry(robot)).simulate(Case())
+    order = ORDER[robot]
+    np.testing.assert_allclose(states[:, :2], traces[robot].x[:, order], atol=1e-8)
+    np.testing.assert_allclose(states[:, 2:], traces[robot].v[:, order], atol=1e-7)
+    np.testing.assert_allclose(torque, traces[robot].u[:-1, 0], atol=1e-7)
+
+
+def test_dry_friction_is_the_published_arctangent():
+    state = (0.4, -0.2, 0.03, -0.05)
+    known = tuple((MODEL_1_1 | {"cf1": 0.2, "cf2": -0.1}).values())
+    torques = -0.2 * math.atan(3.0), 0.1 * math.atan(-5.0)
+    without = simulator._slope(state, *torques, tuple(MODEL_1_1.values()))
+    np.testing.assert_allclose(simulator._slope(state, 0.0, 0.0, known), without, rtol=1e-12)
+
+
+def test_the_grid_has_the_published_levels():
+    """722 machines, and the pulses of each apart and of the published sizes."""
+    grid = simulator.cases()
+    levels = {}
+    for case in grid:
+        levels.setdefault((case.test, case.name), []).append(case.value)
+    assert {name for test, name in levels if test == "model"} == set(simulator.MODEL_LEVELS)
+    assert levels["model", "cf2"] == pytest.approx(np.linspace(-0.2, 0.2, 21))
+    assert levels["velocity_noise", "velocity_noise"][::10] == pytest.approx(
+        np.linspace(0.0, 0.5, 21)
+    )
+    assert levels["torque_response", "torque_response"] == pytest.approx(np.linspace(0.1, 2.0, 21))
+    assert [case.delay for case in grid if case.test == "delay"] == [*range(21)]
+    assert len(grid) == 722
+    pulses = np.array([case.pulses for case in grid[-50:]])
+    assert np.diff(np.sort(pulses[..., 0], axis=1)).min() >= 1.0
+    for k, (low, high) in enumerate([(1.0, 9.0), (0.05, 0.1), (0.5, 5.0)]):
+        size = np.abs(pulses[..., k])
+        assert low <= size.min() < low + 0.1 * (high - low)
+        assert high - 0.1 * (high - low) < size.max() <= high
+
+
+@smc.law_function(plants=boards.ROBOTS)
+def mine(y, gains, memory):
+    u = 0.4 * y.x - 0.25 * y.v + 0.07 * y.q - 0.03 * y.dq + 0.5 * y.t + 10.0 * y.dt
+    return u + 2e-3 * (y.f + y.fq) + 1e-4 * (y.g + 2.0 * y.gq) + 0.1 * y.limit + 0.01 * y.model, y.x
+
+
+@ROBOTS
+def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
+    """Each torque from what the law may see of the states, each state from the one before by the
+    equation of motion.
+    """
+    changed = {"m2": 0.55, "b1": 0.03}
+    case = Case(
+        response=1.3, delay=2, pulses=((0.02, 0.05, 1.5),), seed=4, parameters=changed,
+        velocity_noise=0.1, torque_noise=0.2,
+    )  # fmt: skip
+    scenario = dataclasses.replace(boards.on_board(robot, mine), u_max=2.5, model="nominal")
+    states, torque = Machine(scenario).simulate(case)
+    noise = np.random.default_rng([simulator.SEED, 4, 0]).normal(size=(5000, 3)) * [0.1, 0.1, 0.2]
+    plant = smc.plant(robot)
+    driven = ["pendubot", "acrobot"].index(robot)
+    p = type("P", (), dict(plant.parameters))
+    order = [driven, 1 - driven]
+    last = 0.0
+    t = 2e-3 * np.arange(60)
+    for k in range(60):
+        seen = states[max(0, k - 2)]
+        place = seen[:2][order]
+        speed = (seen[2:] + noise[k, :2])[order]
+        (f, g), (fq, gq) = (plant.nominal(place, speed, i, p) for i in range(2))
+        u = 0.4 * place[0] - 0.25 * speed[0] + 0.07 * place[1] - 0.03 * speed[1] + 0.5 * t[k]
+        u += 0.02 + 2e-3 * (f + fq) + 1e-4 * (g + 2.0 * gq) + 0.26
+        last += 1.3 * (np.clip(u, -2.5, 2.5) - last)
+        last = np.clip(last + noise[k, 2], -2.5, 2.5)
+        assert torque[k] == pytest.approx(last, abs=1e-12), k
+    assert np.abs(torque).max() == 2.5
+    known = tuple((MODEL_1_1 | changed).values())
+    pulse = 1.5 * np.exp(-0.5 * ((t - 0.02) / 0.05) ** 2)
+    force = np.eye(2)[driven] * (torque[:60] + pulse)[:, None]
+    for k in range(0, 60, 7):
+        slope = lambda _, state, k=k: simulator._slope.py_func(tuple(state), *force[k], known)  # noqa: E731
+        end = solve_ivp(slope, (0.0, 2e-3), states[k], rtol=1e-10, atol=1e-12).y[:, -1]
+        np.testing.assert_allclose(states[k + 1], end, atol=1e-6)
+
+
+def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
+    """One run of a level of the first test, and three, two and two of others."""
+    ends = [3.4, 3.4, 0.0, 3.4, 0.0, 0.0, 3.4, 0.0]  # up, or hanging
+    kinds = [("model", "a")] + [("model", "b")] * 3
+    kinds += [("delay", "c")] * 2 + [("perturbations", "d")] * 2
+    grid = [Case(test=test, name=name, delay=k) for k, (test, name) in enumerate(kinds)]
+    end = lambda case: (np.array([[ends[case.delay], 0.0, 0.0, 0.0]]), None)  # noqa: E731
+    monkeypatch.setattr(simulator, "Machine", lambda scenario: SimpleNamespace(simulate=end))
+    monkeypatch.setattr(simulator, "cases", lambda: grid)
+    monkeypatch.setattr(simulator, "TESTS", ("model", "delay", "perturbations"))
+    found = simulator.robustness(boards.entry("acrobot"))
+    assert found.survived["model"] == (("a", 0.0, True), ("b", 0.0, True))
+    assert found.percent == {"model": 100.0, "delay": 0.0, "perturbations": 0.0}
+    assert found.score == pytest.approx(1.0 / 3.0)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_upright_is_within_the_published_bounds_after_any_turns(k):
+    bound = np.array([0.35, 0.35, 1.0, 1.0])[k] * np.eye(4)[k]
+    top = np.array([3.0 * math.pi, -4.0 * math.pi, 0.0, 0.0])
+    for sign in (1.0, -1.0):
+        assert simulator.upright(top + sign * 0.999 * bound)
+        assert not simulator.upright(top + sign * 1.001 * bound)
+
+
+# the board of 2025
+
+
+@pytest.mark.parametrize("seed", DRAWN)
+def test_a_minute_is_that_of_the_published_simulator(seed):
+    times, goals = global_policy.resets(seed)
+    np.testing.assert_allclose(times[:5], DRAWN[seed][0], rtol=0, atol=5.1e-5)
+    np.testing.assert_allclose(goals[:3], DRAWN[seed][1], rtol=0, atol=5.1e-6)
+    run = global_policy.minute(boards.on_board("pendubot", "none"), seed)
+    for time, state in STATES[seed].items():
+        np.testing.assert_allclose(run.states[round(time / 2e-3)], state, rtol=0, atol=2e-6)
+    pushed = np.flatnonzero(np.abs(run.torques).sum(axis=1))
+    ends = np.flatnonzero(np.diff(pushed) > 1)
+    begun = pushed[[0, *(ends + 1)]]
+    both = np.column_stack([begun[:2], pushed[ends][:2]])
+    np.testing.assert_allclose(2e-3 * both, PUSHED[seed], atol=1e-9)
+    first = run.torques[begun[0] : begun[0] + 4]
+    if seed == 333:
+        np.testing.assert_allclose(
+            first[:, 0], (2.720086, 2.723832, 3.884847, 4.605569), rtol=0, atol=1e-6
+        )
+    assert first[:, 1] == pytest.approx(6.0 if seed == 333 else -6.0)
+
+
+@pytest.mark.parametrize(
+    ("model", "end", "digits"),
+    [
+        (MODEL_1_1, (-0.529998, -0.408896, -4.793177, 1.031446), (6, 6, 6, 6)),
+        (MODEL_1_0, (-0.423207, -0.165304, -1.811, -1.129962), (6, 6, 3, 6)),
+    ],
+)
+def test_a_free_swing_ends_where_the_published_one_does(model, end, digits):
+    # of cf arctan(100 q')
+    published = model | {name: model[name] * 2.0 / math.pi for name in ("cf1", "cf2")}
+    x = (1.0, 0.5, 0.0, 0.0)
+    for _ in range(1000):
+        x = stepped(x, 0.0, 0.0, tuple(published.values()))
+    rounded = [round(value, places) for value, places in zip(x, digits, strict=True)]
+    assert rounded == pytest.approx(end, abs=2e-6)
+
+
+@ROBOTS
+def test_the_linear_law_is_the_published_one(robot):
+    law, _ = swing_ups.upright_law(robot)
+    np.testing.assert_allclose(law, np.negative(UPRIGHT_GAINS[robot]), rtol=1e-6)
+
+
+def test_uptime_and_swing_ups_of_a_motion_by_hand():
+    """Up at 1 to 1.2 s, 1.5 to 1.6 s, less than a second after that rise, and from 3 s to the end
+    at 60 s.
+    """
+    t = 2e-3 * np.arange(30_001)
+    up = ((t > 0.999) & (t < 1.199)) | ((t > 1.499) & (t < 1.599)) | (t > 2.999)
+    states = np.zeros((30_001, 4))
+    states[:, 0] = np.where(up, math.pi, 0.0)
+    run = global_policy.Run(states, np.zeros((30_000, 2)))
+    assert run.swing_ups == 2
+    assert run.uptime == pytest.approx(0.2 + 0.1 + 57.002, abs=1e-9)
+
+
+def test_a_law_is_not_asked_during_a_reset_and_its_limit_holds():
+    @smc.law_function(plants=("pendubot",), memory=1)
+    def counting(y, gains, memory):
+        memory[0] += 1.0
+        return 1e-6 * memory[0] if y.t < 59.99 else 99.0, y.q
+
+    run = global_policy.minute(boards.on_board("pendubot", counting()), 333)
+    pushed = np.abs(run.torques[:-10, 1]) > 0.0
+    asked = 1e-6 * np.cumsum(~pushed)
+    assert 15 * 100 <= pushed.sum() <= 15 * 101
+    np.testing.assert_allclose(run.torques[:-10, 0][~pushed], asked[~pushed], rtol=0, atol=1e-9)
+    assert run.torques[-1].tolist() == [6.0, 0.0]
+
+
+# this package's rows
+
+
+@ROBOTS
+def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, traces):
+    """The entry swings up and leads, and its score is the trajectory's: no row may be read as a
+    success of sliding mode.
+    """
+    entry = traces[robot]
+    top = entry.x[-1, ORDER[robot]]
+    assert np.abs(top - [math.pi, 0.0]).max() < 1e-3
+    gains = boards.FEEDBACKS["Riccati"]
+    feedback = gains["k"] * np.tanh(entry.s[:, 0] / gains["phi"])
+    assert np.abs(feedback).max() < 0.015  # N m, of 6
+    rows = boards.experiments(robot)
+    runs = dict(zip(rows, smc.run(list(rows.values())), strict=True))
+    assert boards.board(runs)[0].name in rows
+    score = {name: boards.score(trace) for name, trace in runs.items()}
+    published = [row.score for row in boards.SIMULATION[robot]["v2"]]
+    for name, value in score.items():
+        if "sliding" in name:
+            assert value < min(published)
+        else:
+            assert value == pytest.approx(score[boards.NAME], abs=2e-4)
+    assert score[boards.NAME] > max(published)
+
+
+@pytest.mark.slow
+@ROBOTS
+def test_scores_of_the_page_and_of_readme_are_those_of_the_boards(robot):
+    page = (ROOT / "docs" / "boards.md").read_text(encoding="utf-8")
+    rows = boards.experiments(robot)
+    column = 2 * boards.ROBOTS.index(robot)
+    score = {}
+    for row in boards.board(dict(zip(rows, smc.run([*rows.values()]), strict=True))):
+        score[row.name] = row.score
+    tested = {name: boards.robustness(scenario) for name, scenario in rows.items()}
+    robust = {row.name: row.score for row in boards.robustness_board(robot, tested)}
+    cells = re.findall(r"^\| ([^|]*?)(?: \(.*|,.*)?" + 4 * r" \| ([.0-9]+)" + r" \|$", page, re.M)
+    assert len(cells) == 9
+    for name, *values in cells:
+        assert values[column] == f"{score[name]:.3f}", name
+        assert float(values[column + 1]) == pytest.approx(robust[name], abs=0.005), name
+    assert f"{score[boards.NAME]:.3f}" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@ROBOTS
+def test_rows_of_2025_are_those_of_the_page(robot):
+    """Ours is below three published ones and above the last; no control experiment comes near but
+    the linear one.
+    """
+    rows = boards.global_experiments(robot)
+    made = {name: boards.global_row(name, scenario) for name, scenario in rows.items()}
+    page = (ROOT / "docs" / "boards.md").read_text(encoding="utf-8")
+    cells = re.findall(r"^\| ([^|]+) \| ([.0-9]+) \| ([.0-9]+) \|$", page, re.MULTILINE)
+    stated = {name: values for name, *values in cells}
+    published = {row.name: row for row in boards.GLOBAL[robot]}
+    assert set(stated) == {*made, *published}
+    for name, row in (made | published).items():
+        tolerance = 5.1e-4 if name in published else CHAOS
+        value = float(stated[name][boards.ROBOTS.index(robot)])
+        assert value == pytest.approx(row.score, abs=tolerance), name
+    names = [row.name for row in boards.global_board(robot, [*made.values()])]
+    ours = names.index(boards.GLOBAL_NAME)
+    assert names.index("AcadosMpc") < ours < names.index("prx_analytical")
+
+
+def trajectory(robot):
+    """The arrays of a trajectory's file."""
+    table = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json")
+    return {key: np.array(values) for key, values in table.items() if key != "about"}
+
+
+@ROBOTS
+def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
+    """Its accelerations are those of the plant's nominal model."""
+    table = trajectory(robot)
+    plant = smc.plant(robot)
+    p = type("P", (), dict(plant.parameters))
+    x, v, q, dq, u = (table[key] for key in ("x", "v", "q", "dq", "u"))
+    for k in range(len(u)):
+        for i, key in enumerate(("a", "ddq")):
+            f, g = plant.nominal(np.array([x[k], q[k]]), np.array([v[k], dq[k]]), i, p)
+            assert f + g * u[k] == pytest.approx(table[key][k], abs=1e-6)
+    assert np.abs(u).max() <= 6.0
+    assert [x[0], v[0], q[0], dq[0], u[0], u[-1], v[-1], dq[-1]] == pytest.approx(
+        [0.0] * 8, abs=1e-8
+    )
+
+
+@ROBOTS
+def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_its_end(robot):
+    template = getattr(entries, f"{robot}_swing_up")
+    rng = np.random.default_rng(2)
+    table = trajectory(robot)
+    nodes = float(table["step"]) * np.arange(len(table["u"]))
+    paths = []
+    for value, rate in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq")):
+        paths.append(CubicHermiteSpline(nodes, table[value], table[rate]))
+    for t in (0.0, 0.0013, 1.2345, nodes[-2], nodes[-1] - 1e-4, nodes[-1] + 3.0):
+        now = min(t, nodes[-1])
+        apart = rng.uniform(-0.3, 0.3, 4)
+        turns = 2.0 * math.pi * np.array([1, 0, -2, 0])
+        x, v, q, dq = np.array([path(now) for path in paths]) + apart + turns
+        rows = [np.interp(t, nodes, table[key]) for key in ("s_x", "s_v", "s_q", "s_dq")]
+        y = SimpleNamespace(t=t, dt=0.004, x=x, v=v, q=q, dq=dq)
+        u, s = template.function(y, SimpleNamespace(k=0.7, phi=1.3), None)
+        assert s == pytest.approx(np.dot(rows, apart), abs=1e-9)
+        along = np.interp(t + 0.002, nodes, table["u"])
+        assert u == pytest.approx(along - 0.7 * math.tanh(s / 1.3), abs=1e-9)
+
+
+@ROBOTS
+def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
+    """At the end the law's linear part is the LQR of Q = diag(1, 1, 0.1, 0.1), R = 1."""
+    table = trajectory(robot)
+    plant = smc.plant(robot)
+    p = type("P", (), dict(plant.parameters))
+    top = np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0])
+    rest = np.zeros(2)
+    A = np.zeros((4, 4))
+    b = np.zeros((4, 1))
+    A[:2, 2:] = np.eye(2)
+    for i in range(2):
+        b[2 + i] = plant.nominal(top, rest, i, p)[1]
+        for j in range(2):
+            d = 1e-6 * np.eye(2)[j]
+            ahead = plant.nominal(top + d, rest, i, p)[0]
+            A[2 + i, j] = (ahead - plant.nominal(top - d, rest, i, p)[0]) / 2e-6
+    row = (b.T @ solve_continuous_are(A, b, np.diag([1.0, 1.0, 0.1, 0.1]), [[1.0]])).ravel()
+    last = [table[key][-1] for key in ("s_x", "s_q", "s_v", "s_dq")]
+    np.testing.assert_allclose(last, row, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "fields", [{"x0": 3.0}, {"u_max": 3.0}, {"disturbance": smc.Sine(0.5, 1.0)}]
+)
+def test_a_run_by_other_rules_has_no_row(fields, refused, traces):
+    trace = traces["acrobot"]
+    other = dataclasses.replace(trace, scenario=boards.entry("acrobot", **fields))
+    refused(lambda: boards.board(other))
+
+
+def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(capsys):
+    folder = str(ROOT / "examples" / "entries" / "soft_relay")
+    script.main(["acrobot", "--no-robustness", "--entry", folder])
+    printed = capsys.readouterr().out
+    assert printed.count("soft relay") == 2
+    assert "trajectory + " not in printed
+    assert printed.index("History SAC") < printed.index("soft relay")
+
+
+@ROBOTS
+def test_the_scenes_of_the_machines_can_be_read(robot):
+    found = scene.read(ROOT / "benchmarks" / f"{robot}.py")
+    assert {scenario.plant.name for _, _, scenario in found.runs()} == {robot}
