@@ -75,11 +75,8 @@ def list_(
 
     FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong
     with it. The trial runs the law on a double integrator under noise, with and without model and
-    surface, for 10 s. It also calls the law at later times and with very large errors. It finds
-    crashes, endless loops, NaN, writes beyond the law's memory, state kept elsewhere (such as
-    static data), and a changed rounding mode or flush-to-zero. It then runs a .c file with the
-    compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2.
-    smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export`
+    surface. It finds crashes, endless loops, NaN, writes beyond the law's memory, and state kept
+    elsewhere, such as static data. Any finding ends in exit code 2. smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export`
     writes. The process is not a sandbox: the law can open files and connections, like any program
     that you start.
 

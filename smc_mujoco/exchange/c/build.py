@@ -24,7 +24,7 @@ from smc_mujoco.control.law import Measurement
 FOLDER = Path(__file__).parent
 HEADER = FOLDER / "smc_law.h"
 MEASUREMENT_SIZE = len(Measurement._fields)  # numbers in a measurement
-# How a measurement is stored, for glue.c and replay.c.
+# How a measurement is stored, for glue.c.
 LAYOUT_FLAGS = f"-DSMC_INPUTS={MEASUREMENT_SIZE}", f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}"
 PROTOTYPE = (
     "int {}(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
@@ -37,8 +37,6 @@ if sys.platform not in ("darwin", "win32"):
     SYMBOLIC_FLAGS = ("-Wl,-Bsymbolic",)
 else:
     SYMBOLIC_FLAGS = ()
-# For a trial: an access beyond an array or undefined behaviour ends the process with a report.
-SANITIZER_FLAGS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 WARNING_FLAGS = ("-Wall", "-Wextra")
 # Compiler warnings that are errors here.
 STRICT_FLAGS = tuple(
@@ -140,27 +138,6 @@ def library(
     if done.returncode or not target.exists():
         raise ScenarioError(_sentence(source, symbol, " ".join(command), done.stderr))
     return target, WARNING.findall(done.stderr)
-
-
-@functools.cache
-def replayer(command: tuple[str, ...]) -> Path | None:
-    """Return `replay.c`, compiled with a compiler's sanitizers; None if these do not work."""
-    target = fresh(".exe")
-    line = [
-        *command,
-        *SANITIZER_FLAGS,
-        *LAYOUT_FLAGS,
-        str(FOLDER / "replay.c"),
-        "-o",
-        str(target),
-        "-ldl",
-    ]
-    try:
-        if run_compiler(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
-            return None
-    except (TimedOut, OSError):
-        return None
-    return target
 
 
 def undefined(source: Path, symbol: str) -> str:

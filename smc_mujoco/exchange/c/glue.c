@@ -22,26 +22,6 @@ long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double
 
 int smc_mujoco_gains = 0, smc_mujoco_memory = 0;
 
-/* How this thread rounds, flushes and traps, where we can ask and restore it: after the law it is as it was before. */
-#if defined(__SSE__) && defined(__GNUC__)
-static unsigned smc_mujoco_arithmetic(void)
-{
-    unsigned short smc_x87; /* C's library and MuJoCo's compiler round by this one */
-    __asm__ volatile("fnstcw %0" : "=m"(smc_x87));
-    return (__builtin_ia32_stmxcsr() & 0xffc0u) | (unsigned)smc_x87 << 16; /* without the flags of past exceptions */
-}
-
-static void smc_mujoco_restore(unsigned smc_was)
-{
-    const unsigned short smc_x87 = (unsigned short)(smc_was >> 16);
-    __asm__ volatile("fldcw %0" : : "m"(smc_x87));
-    __builtin_ia32_ldmxcsr(smc_was & 0xffc0u);
-}
-#else
-static unsigned smc_mujoco_arithmetic(void) { return 0u; }
-static void smc_mujoco_restore(unsigned smc_was) { (void)smc_was; }
-#endif
-
 /* Calls the law with numbers of its type, between guards that show whether it writes beyond them. */
 static long long smc_mujoco_convert(
     const smc_measurement *smc_y, const double *smc_gains, double *smc_memory, double *smc_out)
@@ -169,12 +149,7 @@ static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, 
 
 long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
 {
-    const unsigned smc_was = smc_mujoco_arithmetic();
-    long long smc_code;
     int smc_i;
     for (smc_i = 0; smc_i < 2 * SMC_EACH; smc_i++) smc_out[smc_i] = __builtin_nan(""); /* unset, it ends the run */
-    smc_code = smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
-    if (smc_mujoco_arithmetic() == smc_was) return smc_code;
-    smc_mujoco_restore(smc_was);
-    return SMC_BEYOND + 2;
+    return smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
 }

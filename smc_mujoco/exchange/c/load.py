@@ -24,12 +24,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, whole
-from smc_mujoco.common.guard import Arithmetic, computed
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.component import Template, as_gains, gain_at, gain_text, template_decorator
 from smc_mujoco.control.from_text import parsed_gains
@@ -43,7 +42,7 @@ DEFAULT_MEMORY = 8
 
 
 class CLaw(AtAddress):
-    """A law in C: called by its address in the callback, and through ctypes in the reference loop.
+    """A law in C: called by its address in the callback, and from Python through ctypes.
 
     Two laws are equal if their machine code is. It follows from file, headers, flags and compiler.
     """
@@ -55,14 +54,11 @@ class CLaw(AtAddress):
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
         self._function, self.library = sandbox.entry(str(file), symbol)
         self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
-        glued, self._arithmetic = hasattr(self.library, "smc_mujoco_entry"), None
-        if glued:
+        self.joints = 0
+        if hasattr(self.library, "smc_mujoco_entry"):
             self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value
         else:
-            self.joints = 0
-        if not glued:
-            self._arithmetic = Arithmetic()
-            self._trampoline = _trampoline(self.address, self._arithmetic)
+            self._trampoline = _trampoline(self.address)
             self.address = self._trampoline.address
         self.sizes = 0, 1  # number of gains, and of memory slots
         self.__name__ = re.sub(r"\W", "_", path.stem)
@@ -77,31 +73,25 @@ class CLaw(AtAddress):
         if not self.joints:
             u, s = self._out(y, gains, memory, 2)
             return u, s
+        n = self.joints
         requests = sandbox.Requests(
-            self.joints,
+            n,
             lambda w: y.dynamics.coriolis(np.array(w)).tolist(),
             lambda: y.dynamics.jacobian().ravel(),
         )
-        numbers = sandbox.stored(
-            y[:3], requests, [np.ravel(getattr(y, name)).tolist() for name in ARRAYS]
-        )
-        numbers_of_gains = []
-        for g in gains:
-            for n in np.broadcast_to(g, self.joints).tolist():
-                numbers_of_gains.append(n)
-        out = self._out(numbers, numbers_of_gains, memory, 2 * len(y.x))
-        return np.array(out[: self.joints]), np.array(out[self.joints :])
+        arrays = [np.ravel(getattr(y, name)).tolist() for name in ARRAYS]
+        numbers = sandbox.stored(y[:3], requests, arrays)
+        each = np.concatenate([np.empty(0), *(np.broadcast_to(gain, n) for gain in gains)])
+        out = self._out(numbers, each.tolist(), memory, 2 * n)
+        return np.array(out[:n]), np.array(out[n:])
 
     def _out(
         self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int
     ) -> list[float]:
         """Call the C function, and return the numbers of its out[]."""
         out = sandbox.doubles([math.nan] * count)
-        code = self._function(
-            sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out
-        )
-        if self._arithmetic is not None and self._arithmetic.changed():
-            code = sandbox.ALTERED_ARITHMETIC
+        place = memory.ctypes.data_as(sandbox.DOUBLES)
+        code = self._function(sandbox.doubles(y), sandbox.doubles(gains), place, out)
         if code != 0:
             what, _ = sandbox.FAULTS.get(code, (f"returned {code}", ""))
             raise ArithmeticError(f"{self.symbol} {what.format(self.sizes[1])}")
@@ -148,27 +138,14 @@ def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name
     return law
 
 
-def _trampoline(address: int, arithmetic: Arithmetic) -> Function:
-    """Return a function of the callback's type that calls a C function which returns an int.
-
-    It restores the arithmetic of its thread, and returns ALTERED_ARITHMETIC if the C function has
-    changed it.
-    """
-    numbers = ctypes.addressof(arithmetic.numbers)
-    environment = ctypes.addressof(arithmetic.environment)
-    restore = ctypes.cast(arithmetic.library.fesetenv, ctypes.c_void_p).value or 0
-    results = arithmetic.results
-    altered = sandbox.ALTERED_ARITHMETIC
-    compute = njit(computed, error_model="numpy")
+def _trampoline(address: int) -> Function:
+    """Return a function of the callback's type that calls a C function which returns an int."""
 
     def native(y: Any, g: Any, m: Any, out: Any):
         output = carray(pointer(out), (2,))
-        output[0], output[1] = math.nan, math.nan  # a result that the law does not set ends its run
-        code = call_int(address, y, g, m, out)
-        if compute(pointer(numbers)) == results:
-            return code
-        call_int(restore, environment, 0, 0, 0)
-        return altered
+        output[0] = math.nan  # a result that the law does not set ends its run
+        output[1] = math.nan
+        return call_int(address, y, g, m, out)
 
     return Function(native)
 
@@ -232,27 +209,15 @@ def law_from_c(
     )(law)
 
 
-def _try(library: sandbox.Library, about: "About") -> str:
-    """Call a law in a separate process, then with sanitizers.
-
-    Return why there were none, or an empty text.
-    """
-    if about.joints:
-        fields = ARRAYS
-        channels = about.joints
-    else:
-        fields = Measurement._fields
-        channels = 1
+def _try(library: sandbox.Library, about: "About") -> None:
+    """Call a law in a separate process."""
     gains = []
     for gain in about.gains.values():
-        for i in range(channels):
+        for i in range(max(1, about.joints)):
             gains.append(gain_at(gain.default, i))
-    trial = {"fields": fields, "gains": gains, "memory": about.memory, "modelled": about.modelled}
-    calls = build.fresh(".calls")
-    sandbox.load(library, trial | {"joints": about.joints, "calls": str(calls)})
-    why = sandbox.sanitize(library, calls, len(about.gains), about.memory)
-    calls.unlink()
-    return why
+    fields = ARRAYS if about.joints else Measurement._fields
+    trial = {"fields": fields, "gains": gains, "memory": about.memory}
+    sandbox.load(library, trial | {"joints": about.joints, "modelled": about.modelled})
 
 
 def check(
@@ -263,22 +228,17 @@ def check(
     flags: Sequence[str],
     timeout: float,
 ) -> Iterator[str]:
-    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and
-    memory.
-    """
-    library = _library(
-        source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout
-    )
+    """Try a law without loading it, and yield lines: warnings, gains and memory."""
+    if source.suffix == ".c":
+        flags = (*build.WARNING_FLAGS, *flags)
+    library = _library(source, symbol, flags, timeout)
     about = _about(library, gains, memory)
     yield from library.warnings
-    if why := _try(library, about):
-        yield f"{source.name} is tried without address and undefined-behaviour sanitizers: {why}"
-    gains_text = (
-        ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items())
-        or "none"
-    )
-    joints = f"{about.joints} joints; " * bool(about.joints)
-    yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
+    _try(library, about)
+    texts = [f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()]
+    joints = f"{about.joints} joints; " if about.joints else ""
+    given = ", ".join(texts) or "none"
+    yield f"{source.name}: {symbol} passes; {joints}gains {given}; memory {about.memory}"
 
 
 @constrained
