@@ -20,7 +20,8 @@ from numba import njit
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Law, Measurement, law
 from smc_mujoco.simulation import cfunctions
-from smc_mujoco.simulation.python_controller import Controller, Failure
+from smc_mujoco.simulation.python_controller import Controller
+from smc_mujoco.simulation.python_functions import Failure
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 

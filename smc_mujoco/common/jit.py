@@ -94,7 +94,7 @@ NUMBERS = Numbers()
 
 
 class NotCompilable(Exception):
-    """A function cannot be compiled, and runs in the reference loop. The message says why."""
+    """A function cannot be compiled, and is called in Python. The message says why."""
 
 
 def _at(kind: types.Type) -> Callable:

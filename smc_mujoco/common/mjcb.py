@@ -9,8 +9,7 @@ takes 16 to 40 % of a plain `mj_step`. The time callback of a run reads no clock
 in `mjData.timer` are 0.
 
 MuJoCo cannot compile a model while a callback is a Python function, because it would call that
-function with a model that Python does not know. The reference loop installs such a function. The
-compiled callback is native code, with which MuJoCo can compile models.
+function with a model that Python does not know. So a user's is removed meanwhile.
 """
 
 import contextlib
@@ -37,26 +36,20 @@ CALLBACKS = (
 )
 
 _lock = threading.RLock()  # held while callbacks are replaced
-_given: list[
-    dict[str, Any]
-] = []  # the callbacks of the with blocks of `installed`, the innermost last
-_python_lock = (
-    threading.RLock()
-)  # held while no Python callback may be installed; its holder never waits
+# the callbacks of the with blocks of `installed`, the innermost last
+_given: list[dict[str, Any]] = []
 # MuJoCo warns of a model with each of its many compilations: once is enough, when a plant is made
 # of it
 warnings.filterwarnings("ignore", category=UserWarning, module=re.escape(__name__), append=True)
 
 
 def _after_fork() -> None:
-    """Free the locks and remove our callbacks: a child process has none of its parent's threads."""
-    global _lock, _python_lock
+    """Free the lock and remove our callbacks: a child process has none of its parent's threads."""
+    global _lock
     _lock = threading.RLock()
-    _python_lock = threading.RLock()
     mujoco.set_mjcb_control(None)
-    if (
-        no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock()
-    ):  # else it is None or a user's
+    # else it is None or a user's
+    if no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock():
         mujoco.set_mjcb_time(None)
 
 
@@ -111,15 +104,11 @@ def compiled(
 ) -> mujoco.MjModel:
     """Compile a spec; MuJoCo's warnings are shown if `build`, which compiles it, is a function of
     another module.
-
-    A Python callback is removed meanwhile. The thread that installed it does not wait, so that a
-    policy can make an environment during a run. Other threads wait until that run is over. No
-    thread waits for native callbacks.
     """
-    with _python_lock:
-        if not any(map(_python, _callbacks().values())):
-            return build(spec) if build else spec.compile()
-    with installed(None):
+    without = contextlib.nullcontext()
+    if any(map(_python, _callbacks().values())):
+        without = installed(None)
+    with without:
         return build(spec) if build else spec.compile()
 
 
@@ -132,10 +121,9 @@ def _install(callbacks: dict[str, Any]) -> None:
     """Install those of the callbacks, given as `_callbacks` returns them, that are not installed
     yet.
     """
-    with _python_lock if any(map(_python, callbacks.values())) else contextlib.nullcontext():
-        for name, callback in callbacks.items():
-            if getattr(mujoco, f"get_mjcb_{name}")() is not callback:
-                getattr(mujoco, f"set_mjcb_{name}")(callback)
+    for name, callback in callbacks.items():
+        if getattr(mujoco, f"get_mjcb_{name}")() is not callback:
+            getattr(mujoco, f"set_mjcb_{name}")(callback)
 
 
 def _python(callback: Any) -> bool:

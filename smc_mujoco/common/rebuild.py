@@ -2,8 +2,8 @@
 plain Python.
 
 The author of a law may compile its helpers, and numba checks array bounds only on request. So the
-callback runs a law with copies of its helpers that are compiled with checks. The reference loop
-runs it with the helpers' plain Python.
+callback runs a law with copies of its helpers that are compiled with checks. A law that is called
+in Python runs with the helpers' plain Python.
 """
 
 import dis

@@ -80,8 +80,6 @@ class Session:
                 "no view: the runs differ in control_period or duration: give both the same"
             )
         prepared = [prepare(scenario) for scenario in scenarios]
-        if reason := next((one.why_not for one in prepared if one.why_not), None):
-            raise ScenarioError(f"no view: {reason}")
         with callback.installed():
             self.batches = [ScenarioBatch([one], threads=1) for one in prepared]
         self.scenarios = tuple(scenarios)

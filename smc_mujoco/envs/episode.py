@@ -24,7 +24,7 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.model import channels
-from smc_mujoco.simulation.python_controller import Failure, evaluate
+from smc_mujoco.simulation.python_functions import Failure, evaluate
 from smc_mujoco.simulation.scenario import Resolved, Scenario, stepped_by_mujoco
 from smc_mujoco.simulation.signals import PerChannel
 

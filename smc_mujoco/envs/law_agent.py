@@ -3,8 +3,8 @@
     act = smc.envs.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-The law is called by the `Controller` of the reference loop, so it measures the same as in
-`smc.run`, and the episode equals the trace of that run.
+The law is called in Python, by a `Controller`. It measures the same as in `smc.run`, and the
+episode equals the trace of that run.
 """
 
 import dataclasses
@@ -20,7 +20,8 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.envs.episode import Episode
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.python_controller import Controller, Failure
+from smc_mujoco.simulation.python_controller import Controller
+from smc_mujoco.simulation.python_functions import Failure
 
 
 def agent(

@@ -4,7 +4,7 @@
 
 A policy observes the same positions and velocities as in an environment. On a plant of several
 channels it is called once per channel, with that channel's observation. State that a plain function
-keeps elsewhere is shared by all runs. A policy is Python, so its runs take the reference loop. A
+keeps elsewhere is shared by all runs. A policy is called in Python. A
 file is first read in another process.
 """
 

@@ -30,7 +30,7 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.python_controller import evaluate
+from smc_mujoco.simulation.python_functions import evaluate
 from smc_mujoco.simulation.signals import Push
 
 if TYPE_CHECKING:

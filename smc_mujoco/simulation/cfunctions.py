@@ -42,7 +42,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.plant import SEEN
+from smc_mujoco.mechanisms.plant import SEEN, Plant
 from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.state import FRICTION_INPUT, INSTANT
@@ -149,7 +149,7 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 
 
 @functools.cache
-def compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
+def _compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
     """Compile a record SEEN -> f and g of channel i."""
     body = jit(function)
     values = loader(named(names))
@@ -238,6 +238,14 @@ def compile_component(c: Component) -> Function | AtAddress:
 def compile_signal(s: Signal) -> Function:
     """Return a signal as a C function; raises as `compile_component`."""
     return _compile(type(s).__name__, _compile_signal, type(s), tuple(s.parameters()))
+
+
+def compile_nominal(plant: Plant) -> Function:
+    """Return a plant's nominal model of one equation a channel as a C function; raises as
+    `compile_component`.
+    """
+    name = f"the nominal model of {plant.name}"
+    return _compile(name, _compile_nominal, plant.nominal, tuple(plant.parameters))
 
 
 def compile_friction(f: Sliding) -> Function:

@@ -12,16 +12,16 @@ import dataclasses
 import itertools
 import math
 import re
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
-from smc_mujoco.common.jit import Function, NotCompilable, Uncompiled
+from smc_mujoco.common.jit import NotCompilable, Uncompiled
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.component import gain_at
+from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
@@ -33,9 +33,10 @@ from smc_mujoco.mechanisms.custom.nominal_model import (
 )
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import cfunctions, philox, state
+from smc_mujoco.simulation import cfunctions, philox, python_functions, state
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
@@ -45,6 +46,7 @@ from smc_mujoco.simulation.model import (
     mixer,
     with_values,
 )
+from smc_mujoco.simulation.python_functions import PythonFunction
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
@@ -152,18 +154,12 @@ def _compile(s: Resolved) -> None:
         cfunctions.signal_values(signal)  # refuses data that compiled code would misread
     for component in filter(None, (*s.law.parts, s.surface, s.velocity)):
         cfunctions.compile_component(component)
-    _compiled_nominal(s.plant)
+    if not isinstance(s.plant.nominal, NominalModel):
+        cfunctions.compile_nominal(s.plant)
     for signal in signals:
         cfunctions.compile_signal(signal)
     if s.formula_friction:
         cfunctions.compile_friction(s.formula_friction)
-
-
-def _compiled_nominal(plant: Plant) -> Function | None:
-    """Return the compiled nominal model of a plant, or None if MuJoCo itself computes it."""
-    if isinstance(plant.nominal, NominalModel):
-        return None
-    return cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters))
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -186,7 +182,7 @@ class Packed:
     references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
-    python: list[Any]  # the functions that are called in Python
+    python: list[PythonFunction]  # the functions that are called in Python
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
 
 
@@ -194,11 +190,12 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it
     points to.
 
-    The log, (K + 1, n) LOG, is written at samples. It and `prepared` must outlive the run.
+    The log, (K + 1, n) LOG, is written at samples. It and `prepared` must outlive the run. With
+    `python`, no function is compiled but the models that MuJoCo computes.
     """
     s = prepared.scenario.resolved
     mechanism = prepared.mechanism
-    buffer = Functions(prepared.scenario.resolved, python)
+    buffer = Functions(s, python)
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
     values = (
@@ -240,47 +237,53 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
 
 
 class Functions(state.Buffer):
-    """The buffer of a run, and its functions: compiled, or in `python` if they do not compile or
-    that is wanted.
+    """The numbers of a run, and its functions: compiled, or called in Python if they do not compile
+    or `called` is wanted.
     """
 
-    def __init__(self, s: Resolved, python: bool):
-        from smc_mujoco.simulation import python_functions
-
+    def __init__(self, s: Resolved, called: bool):
         super().__init__()
-        self.wrap = python_functions
         self.s = s
-        self.all_python = python
-        self.python = list[Any]()
+        self.called = called
+        self.python: list[PythonFunction] = []
 
-    def _found(self, compiler: Any, thing: Any, otherwise: Any, *arguments: Any) -> Any:
-        with contextlib.suppress(NotCompilable):
-            if not self.all_python:
-                return compiler(thing)
-        self.python.append(otherwise(thing, *arguments))
-        return self.python[-1]
+    def component(self, c: Component) -> Any:
+        """Return a law, a surface or an estimator."""
+        return self._made(cfunctions.compile_component, python_functions.of_component, c, self.s)
 
-    def component(self, c: Any) -> Any:
-        return self._found(
-            cfunctions.compile_component, c, self.wrap.of_component, self.s.plant.n, self.s
-        )
+    def laws(self) -> list[Component]:
+        """Return the laws of the driven channels, or one for all.
 
-    def signal(self, signal: Signal) -> Any:
-        return self._found(cfunctions.compile_signal, signal, self.wrap.of_signal)
-
-    def laws(self) -> list[Any]:
-        """The laws of the driven channels, or one for all; one each if they may keep state in
-        Python.
+        It is one for each channel if they may keep state in Python.
         """
         law = self.s.law
-        each = isinstance(law.function, Uncompiled) and not law.joint
-        if each:
-            return [law] * self.s.plant.driven
-        return law.of_channels(self.s.plant.driven)
+        driven = self.s.plant.driven
+        if isinstance(law.function, Uncompiled) and not law.joint:
+            return [law.of_channel(i) for i in range(driven)]
+        return law.of_channels(driven)
+
+    def signal(self, signal: Signal) -> Any:
+        """Return a reference, a disturbance or another signal."""
+        return self._made(cfunctions.compile_signal, python_functions.of_signal, signal)
+
+    def nominal(self, plant: Plant) -> Any:
+        """Return a nominal model that is not MuJoCo's."""
+        return self._made(cfunctions.compile_nominal, python_functions.of_nominal, plant)
+
+    def friction(self, formula: Sliding) -> Any:
+        """Return a friction by a formula."""
+        return self._made(cfunctions.compile_friction, python_functions.of_friction, formula)
+
+    def _made(self, compiler: Callable, caller: Callable, thing: Any, *arguments: Any) -> Any:
+        if not self.called:
+            with contextlib.suppress(NotCompilable):
+                return compiler(thing)
+        self.python.append(caller(thing, *arguments))
+        return self.python[-1]
 
 
 def _function(
-    compiled: Any, values: Any, buffer: "Functions", memory: int = 0, channels: int = 1
+    compiled: Any, values: Any, buffer: Functions, memory: int = 0, channels: int = 1
 ) -> dict[str, int]:
     """Return the fields of a FUNCTION.
 
@@ -296,7 +299,7 @@ def _function(
     }
 
 
-def _tables(prepared: Prepared, buffer: "Functions") -> dict[str, list[dict[str, Any]]]:
+def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, Any]]]:
     """Return the laws, references and frictions of the channels, and the disturbances, as fields of
     records.
     """
@@ -325,7 +328,7 @@ def _tables(prepared: Prepared, buffer: "Functions") -> dict[str, list[dict[str,
     }
 
 
-def _shared_functions(s: Resolved, nominal: Native | None, buffer: "Functions") -> dict[str, Any]:
+def _shared_functions(s: Resolved, nominal: Native | None, buffer: Functions) -> dict[str, Any]:
     """Return the functions of a record that all channels share, except law and reference."""
     fields = {}
     for c in filter(None, (s.velocity, s.surface)):
@@ -335,14 +338,14 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: "Functions") 
         fields["dynamics" if s.law.joint else "nominal"] = _function(
             nominal, nominal.values, buffer
         )
-    elif compiled := _compiled_nominal(s.plant):
-        fields["nominal"] = _function(compiled, known_values(s), buffer)
+    elif not isinstance(s.plant.nominal, NominalModel):
+        fields["nominal"] = _function(buffer.nominal(s.plant), known_values(s), buffer)
     signals = {"feedforward": s.feedforward}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
     return fields | {name: _signal(signal, buffer) for name, signal in signals.items() if signal}
 
 
-def _signal(signal: Signal, buffer: "Functions", channels: int = 1) -> dict[str, int]:
+def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, int]:
     """Return the fields of a signal's FUNCTION."""
     compiled = buffer.signal(signal)
     return _function(compiled, cfunctions.signal_values(signal), buffer, signal.memory, channels)
@@ -383,7 +386,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
     }
 
 
-def _arrays(s: Resolved, model: mujoco.MjModel, buffer: "Functions") -> dict[str, Any]:
+def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, Any]:
     """Return the arrays of a record in which the callback keeps measurements, commands and states."""
     n = s.plant.n
     width = s.plant.n if s.law.joint else 1
@@ -440,7 +443,7 @@ def motors_at_start(s: Resolved) -> list[dict[str, float]]:
 
 
 def _joint_measurement(
-    s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: "Functions"
+    s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: Functions
 ) -> dict[str, Any]:
     """Return the fields of a record that only a law of many joints has."""
     stored = joint_law.stored_dtype(s.plant.n)
@@ -472,14 +475,14 @@ def _native_nominal(s: Resolved) -> Native | None:
     return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest)
 
 
-def _frictions(prepared: Prepared, buffer: "Functions") -> list[dict[str, int]]:
+def _frictions(prepared: Prepared, buffer: Functions) -> list[dict[str, int]]:
     """Return the FUNCTIONs of a friction by a formula, one for each joint.
 
     Their numbers go into the buffer.
     """
     if (friction := prepared.scenario.formula_friction) is None:
         return []
-    compiled = cfunctions.compile_friction(friction)
+    compiled = buffer.friction(friction)
     shared = prepared.mechanism
     inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
     numbers = []

@@ -1,103 +1,372 @@
-"""Functions that do not compile, as C functions which the callback calls like compiled ones:
-through ctypes, in Python.
+"""The functions of a run, called in Python: laws, estimators, surfaces, signals, nominal models and
+frictions.
 
-A call takes some microseconds and the interpreter's lock. The text of an exception is kept for the
-trace's `failure`.
+What does not compile becomes a C function that calls Python through ctypes, in some microseconds.
+The callback calls it as a compiled one. `Controller`, by which agents act, calls the same functions
+directly.
 """
 
+import contextlib
 import ctypes
-from collections.abc import Callable
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.control.component import Component
+from smc_mujoco.common import jit
+from smc_mujoco.common.errors import one_line, shown
+from smc_mujoco.common.rebuild import rebuild
+from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import measurement_of, stored_dtype
+from smc_mujoco.control.joint_law import JointMeasurement, measurement_of, stored_dtype
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation.python_controller import NominalDynamics, PythonComponent, evaluate
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.mechanisms.plant import SEEN, Plant, Values
+from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Signal
 
+USER_EXCEPTIONS = (Exception, SystemExit)  # of a user's function; they end one run
+RETURN_VALUES = {  # kind of a component -> what it returns, for messages
+    "law": "the two numbers u, s",
+    "surface": "the two numbers s, v_eq",
+    "estimator": "a velocity, or a velocity and an acceleration",
+}
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)
 
 
-class PythonFunction:
-    """A C function that calls `body(y, memory)`, which returns the outputs; `error` is its last
-    exception.
+class Failure(Exception):
+    """Why a run ended early, and in which channel a law, a surface or an estimator raised."""
+
+    def __init__(self, why: str, channel: int | None = None):
+        super().__init__(why)
+        self.channel = channel
+
+    def __str__(self) -> str:
+        where = "" if self.channel is None else f" in channel {self.channel}"
+        return f"{self.args[0]}{where}"
+
+
+def failure_of(name: str, error: BaseException, channel: int | None = None) -> Failure:
+    """Return the Failure for an exception of a user's function."""
+    try:
+        text = str(error)
+    except USER_EXCEPTIONS:
+        text = "its text cannot be shown"
+    return Failure(f"{name} raised {type(error).__name__} ({one_line(text)})", channel)
+
+
+def called(
+    name: str, expected: str, count: int, function: Callable, *arguments: Any
+) -> list[float]:
+    """Return the `count` numbers of a user's function; raise Failure for anything else."""
+    try:
+        out = function(*arguments)
+    except USER_EXCEPTIONS as error:
+        raise failure_of(name, error) from error
+    return as_floats(name, out, expected, count)
+
+
+def as_floats(name: str, out: Any, expected: str, count: int) -> list[float]:
+    """Return what a user's function returned as `count` floats; raise Failure if it is anything
+    else.
+    """
+    try:
+        values = [float(value) for value in out]
+    except (TypeError, ValueError, OverflowError):
+        values = []
+    if len(values) != count:
+        raise Failure(f"{name} returned {shown(out)} instead of {expected}")
+    return values
+
+
+def gains_of(c: Component, n: int = 1) -> tuple:
+    """Return the gains of a component as the record that its function reads: vectors (n,) for a law
+    of many joints.
+    """
+    values: list[Any] = list(c.gains.values())
+    if c.joint:
+        for k, (name, value) in enumerate(c.gains.items()):
+            if name in c.shared:
+                values[k] = gain_at(value, 0)
+            else:
+                values[k] = np.array([gain_at(value, i) for i in range(n)])
+    return jit.named(tuple(c.gains))(*(values or [0.0]))
+
+
+class PythonComponent:
+    """A law, surface or estimator as the Python function that its author wrote, with a memory, (n,
+    c.memory).
     """
 
-    def __init__(self, body: Callable[[Any, Any], Any]):
-        self.error: Exception | None = None
+    def __init__(self, c: Component, n: int):
+        self.name = f"{c.kind} {c.name!r}"
+        self.returns = RETURN_VALUES[c.kind]
+        self.memory = np.zeros((n, c.memory))
+        parts = c.of_channels(n)
+        if len(parts) == 1:
+            parts = parts * n
+        self.sizes = [part.memory for part in parts]
+        self.gains = [gains_of(part, n) for part in parts]
+        plain = {}  # by id, as a callable object may have no hash
+        self.functions = []
+        for part in parts:
+            function = plain.setdefault(id(part.function), rebuild(part.function, lambda f: f))
+            if isinstance(function, jit.Uncompiled):
+                function = function.fresh()
+            self.functions.append(function)
 
-        def call(y, _, m, out):
+    def __call__(self, i: int, y: tuple) -> list[float]:
+        """Return its two numbers for channel i, of a Reading or a Measurement; NaN for a missing
+        acceleration.
+        """
+        try:
+            out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
+        except USER_EXCEPTIONS as error:
+            raise failure_of(self.name, error, channel=i) from error
+        if isinstance(y, Reading) and not isinstance(out, tuple):
+            out = out, math.nan
+        return as_floats(self.name, out, self.returns, 2)
+
+    def call_joint(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
+        """Return u and s of a law of many joints, (n,) each; raise Failure if it fails."""
+        try:
+            out = self.functions[0](y, self.gains[0], self.memory)
+        except USER_EXCEPTIONS as error:
+            raise failure_of(self.name, error) from error
+        n = len(self.memory)
+        try:
+            u, s = (np.asarray(values, float) for values in out)
+        except (TypeError, ValueError, OverflowError):
+            u = s = np.empty(())
+        if u.shape != (n,) or s.shape != (n,):
+            raise Failure(
+                f"{self.name} returned {shown(out)} instead of two vectors u, s of {n} numbers each"
+            )
+        return u, s
+
+
+class NominalDynamics:
+    """The nominal mechanism of a law in Python, for `coriolis` and `jacobian` of
+    control.joint_law.
+    """
+
+    def __init__(self, scenario: Scenario, x: np.ndarray, v: np.ndarray):
+        self.scenario = scenario
+        self.x = x
+        self.v = v
+
+    def coriolis(self, w: np.ndarray) -> np.ndarray:
+        """Return C(x, v) w per unit of u, (n,)."""
+        nominal = self.nominal
+        if nominal is None:
+            return np.zeros(len(self.x))
+        values = Values(**self.scenario.plant.parameters)
+        return nominal.coriolis(self.x, self.v, w, values) / self.scenario.nominal_drive.gain
+
+    def jacobian(self) -> np.ndarray:
+        """Return the tip's Jacobian, (3, n)."""
+        plant = self.scenario.plant
+        nominal = self.nominal
+        if nominal is None or not plant.tip:
+            raise ValueError(
+                "there is no tip, or the law has no model: "
+                "give the plant a tip, and the law the model"
+            )
+        return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
+
+    @property
+    def nominal(self) -> NominalModel | None:
+        """The nominal model of all joints, if the plant has one and the law may use it."""
+        model = self.scenario.plant.nominal
+        if isinstance(model, NominalModel) and self.scenario.resolved.model != "none":
+            return model
+        return None
+
+
+def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
+    """Return a signal and its two derivatives at time t, s.
+
+    The state is memory, seed, channel and stream for process noise, and memory, e, e' and s for one
+    that sees the loop.
+    """
+    inputs = state
+    if not (signal.random or signal.sees):
+        inputs = (signal.data,) if signal.series else ()
+    kind = type(signal)
+    return called(kind.__name__, "a value and two derivatives", 3, kind.value, t, signal, *inputs)
+
+
+def evaluate_nominal(
+    plant: Plant, x: np.ndarray, v: np.ndarray, i: int, values: Values, u: np.ndarray
+) -> list[float]:
+    """Return nominal f and g of channel i.
+
+    The model of coupled channels also depends on the last commands u, (n,).
+    """
+    name = f"the nominal model of {plant.name}"
+    inputs = (x, v, i, values)
+    if isinstance(plant.nominal, NominalModel):
+        inputs = (*inputs, u)
+    return called(name, "the two numbers f, g", 2, plant.nominal, *inputs)
+
+
+def evaluate_friction(
+    formula: Sliding, numbers: tuple, v: float, motor: float, load: float
+) -> list[float]:
+    """Return the sliding friction by a formula, with its numbers in a channel, and its bounds at
+    rest.
+    """
+    name = f"friction {type(formula).__name__}"
+    return called(name, "a force and two bounds", 3, type(formula).value, v, motor, load, numbers)
+
+
+class PythonFunction:
+    """A C function that calls body(inputs, parameters, memory), which returns its outputs.
+
+    `error` is what the body raised, of which compiled code keeps nothing.
+    """
+
+    def __init__(self, body: Callable[[Any, Any, Any], Any]):
+        self.error: BaseException | None = None
+
+        def call(inputs, parameters, memory, outputs):
             try:
-                for i, number in enumerate(body(y, m)):
-                    out[i] = number
-            except Exception as error:  # whatever a user's function raises
+                for i, number in enumerate(body(inputs, parameters, memory)):
+                    outputs[i] = number
+            except BaseException as error:  # ctypes would print it, and go on
                 self.error = error
                 return 1
             return 0
 
-        self._call = C_FUNCTION(call)
-        self.address: int = ctypes.cast(self._call, ctypes.c_void_p).value or 0
+        self.code = call.__code__
+        self.call = C_FUNCTION(call)
+        self.address: int = ctypes.cast(self.call, ctypes.c_void_p).value or 0
 
 
-class Memories(dict[int, np.ndarray]):
-    """The memories of a function by address: the same array at each call, which lives as long as
-    the run.
+@contextlib.contextmanager
+def hearing_ctrl_c(functions: Sequence[PythonFunction]) -> Iterator[None]:
+    """Raise, at the end of a with block, Ctrl-C that came while a function was called in Python.
+
+    While MuJoCo steps, Ctrl-C waits for Python. So it mostly comes as a function begins, where
+    ctypes would print it and go on.
+    """
+    heard = []
+    codes = {function.code for function in functions}
+    before = sys.unraisablehook
+
+    def hook(unraisable):
+        traceback = unraisable.exc_traceback
+        if traceback is not None and traceback.tb_frame.f_code in codes:
+            heard.append(unraisable.exc_value)
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+    errors = [function.error for function in functions if function.error is not None]
+    for error in (*heard, *errors):
+        if not isinstance(error, Exception):
+            raise error
+
+
+class Memories:
+    """Memories as arrays of a shape, by their addresses: at each call the same array, which lives
+    as long as the run.
     """
 
-    def at(self, m: Any, shape: tuple[int, int]) -> np.ndarray:
-        """Return the memory at a pointer."""
-        if not shape[1]:
-            return np.empty(shape)
-        place = ctypes.addressof(m.contents)
-        if place in self:
-            return self[place]
-        return self.setdefault(place, np.ctypeslib.as_array(m, shape))
+    def __init__(self, *shape: int):
+        self.shape = shape
+        self.arrays: dict[int, np.ndarray] = {}
+
+    def __getitem__(self, pointer: Any) -> np.ndarray:
+        if 0 in self.shape:
+            return np.empty(self.shape)
+        address = ctypes.addressof(pointer.contents)
+        if address not in self.arrays:
+            self.arrays[address] = np.ctypeslib.as_array(pointer, self.shape)
+        return self.arrays[address]
 
 
-def of_component(c: Component, n: int, s: Any) -> PythonFunction:
-    """Return a law, a surface or an estimator of one run; a law of many joints needs the scenario
-    s.
-    """
-    memories = Memories()
+def of_component(c: Component, s: Resolved) -> PythonFunction:
+    """Return a law, a surface or an estimator of a run: for one channel, or for all joints."""
     if c.joint:
-        dtype = stored_dtype(n)
-        function = PythonComponent(c, n)
-
-        def joint(y, m):
-            seen = np.ctypeslib.as_array(y, (dtype.itemsize // 8,)).view(dtype)[0]
-            function.memory = memories.at(m, (n, c.memory))
-            return np.concatenate(
-                function.call_joint(measurement_of(seen, NominalDynamics(s, seen["x"], seen["v"])))
-            )
-
-        return PythonFunction(joint)
+        return _of_joint_law(c, s)
+    component = PythonComponent(c, 1)
+    memories = Memories(1, c.memory)
     record = Reading if c.kind == "estimator" else Measurement
-    function = PythonComponent(c, 1)
+    count = len(record._fields)
 
-    def one(y, m):
-        function.memory = memories.at(m, (1, c.memory))
-        return function(0, record(*y[: len(record._fields)]))
+    def body(inputs, _, memory):
+        component.memory = memories[memory]
+        return component(0, record(*inputs[:count]))
 
-    return PythonFunction(one)
+    return PythonFunction(body)
+
+
+def _of_joint_law(law: Component, s: Resolved) -> PythonFunction:
+    """Return a law of many joints."""
+    n = s.plant.n
+    component = PythonComponent(law, n)
+    memories = Memories(n, law.memory)
+    dtype = stored_dtype(n)
+
+    def body(inputs, _, memory):
+        component.memory = memories[memory]
+        stored = np.ctypeslib.as_array(inputs, (dtype.itemsize // 8,)).view(dtype)[0]
+        dynamics = NominalDynamics(s, stored["x"], stored["v"])
+        return np.concatenate(component.call_joint(measurement_of(stored, dynamics)))
+
+    return PythonFunction(body)
 
 
 def of_signal(signal: Signal) -> PythonFunction:
-    """Return a reference or a disturbance."""
+    """Return a reference, a disturbance or another signal."""
+    memories = Memories(max(signal.memory, 1))
 
-    def value(y, m):
-        t, seed, channel, stream, *loop = y[:7]
-        if signal.random or signal.sees:
-            memory = np.ctypeslib.as_array(m, (max(signal.memory, 1),))
-        else:
-            memory = None
+    def body(inputs, _, memory):
+        t, seed, channel, stream, *loop = inputs[:7]
         if signal.random:
-            state = (memory, int(seed), int(channel), stream)
-        else:
-            state = (memory, *loop) if signal.sees else ()
-        return evaluate(signal, t, *state)
+            return evaluate(signal, t, memories[memory], int(seed), int(channel), stream)
+        if signal.sees:
+            return evaluate(signal, t, memories[memory], *loop)
+        return evaluate(signal, t)
 
-    return PythonFunction(value)
+    return PythonFunction(body)
+
+
+def of_nominal(plant: Plant) -> PythonFunction:
+    """Return the nominal model of a plant whose channels have one equation each."""
+    names = tuple(plant.parameters)
+
+    def body(inputs, parameters, _):
+        seen = np.ctypeslib.as_array(inputs, (len(SEEN),)).view(SEEN)[0]
+        n = int(seen["n"])
+        arrays = [np.array(pointer(int(seen[name]))[:n]) for name in ("x", "v", "u")]
+        values = Values(**dict(zip(names, parameters[: len(names)], strict=True)))
+        x, v, u = arrays
+        return evaluate_nominal(plant, x, v, int(seen["i"]), values, u)
+
+    return PythonFunction(body)
+
+
+def pointer(address: int) -> Any:
+    """Return an address as a pointer to numbers."""
+    return ctypes.cast(address, DOUBLES)
+
+
+def of_friction(formula: Sliding) -> PythonFunction:
+    """Return a friction by a formula."""
+    record = jit.named(formula.names)
+    count = len(record._fields)
+
+    def body(inputs, parameters, _):
+        return evaluate_friction(formula, record(*parameters[:count]), *inputs[:3])
+
+    return PythonFunction(body)

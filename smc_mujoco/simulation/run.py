@@ -2,13 +2,15 @@
 
 The scenarios of a group have the same plant, size, kinds of parts (not the same numbers),
 integrator, physics step and number of steps. They may differ in parameters, friction levels, laws,
-gains, signals, delays and seeds. Functions that do not compile run in the reference loop. The
-results do not depend on the number of threads, the grouping or the other runs.
+gains, signals, delays and seeds. A scenario of which something does not compile has a batch of its
+own, whose callback calls Python. The results do not depend on the number of threads, the grouping
+or the other runs.
 """
 
 import contextlib
 import copy
 import ctypes
+import functools
 import os
 import sys
 import warnings
@@ -22,15 +24,14 @@ from smc_mujoco.common import mjcb
 from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, users_stacklevel
 from smc_mujoco.common.progress import bar
-from smc_mujoco.control import joint_law
-from smc_mujoco.control.law import Measurement
+from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
-from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation import callback, python_functions, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.prepare import Packed, Prepared, pack, prepare
-from smc_mujoco.simulation.python_controller import Failure, NominalDynamics, PythonComponent
-from smc_mujoco.simulation.scenario import Resolved, Scenario
+from smc_mujoco.simulation.prepare import Prepared, pack, prepare
+from smc_mujoco.simulation.python_functions import Failure
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import PLANT_DIVERGED as PLANT_DIVERGED_SHORT
 from smc_mujoco.simulation.trace import Trace, from_log
 
@@ -38,13 +39,12 @@ from smc_mujoco.simulation.trace import Trace, from_log
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
-MIN_TRIM_RUNS = (
-    64  # after a batch of fewer runs, freed memory is not returned to the system; chosen
-)
+MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system
 SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
-USER_MODEL_STEPS = (
-    200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
-)
+# physics steps in a slice of a user's model, which with contacts takes 0.1 s and more a step once it
+# has diverged
+USER_MODEL_STEPS = 200
+PYTHON_STEPS = 20_000  # in a slice where a function is called in Python
 FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 DRY_FRICTION = "dof_frictionloss", "tendon_frictionloss"  # fields of a model
 LOST_CONTACTS = (
@@ -59,11 +59,14 @@ def interrupted(name: str) -> str:
     """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the
     control callback.
     """
-    name = name or "control"
-    so = ", so that its law was not called" * (name == "control")
+    so = ""
+    if name in ("", "control"):
+        name = "control"
+        so = ", so that its law was not called"
     return (
-        f"other code replaced MuJoCo's {name} callback during the run{so}: "
-        f"call mujoco.set_mjcb_{name} before or after the run, or restore what mujoco.get_mjcb_{name}() returned"
+        f"other code replaced MuJoCo's {name} callback during the run{so}: call "
+        f"mujoco.set_mjcb_{name} before or after the run, or restore what mujoco.get_mjcb_{name}() "
+        "returned"
     )
 
 
@@ -112,12 +115,11 @@ def run(
         )
     prepared = list(map(prepare, [scenarios] if isinstance(scenarios, Scenario) else scenarios))
     work = sum(item.scenario.work for item in prepared)
-    count = len(prepared)
-    with bar(f"{count} run{'s' * (count != 1)}", work, shown=progress) as progress_bar:
+    with bar(counted(len(prepared), "run"), work, shown=progress) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
     if isinstance(scenarios, Scenario):
         return traces[0]
-    return [traces[i] for i in range(count)]
+    return [traces[i] for i in range(len(prepared))]
 
 
 def stream(
@@ -133,7 +135,8 @@ def stream(
             warnings.warn(
                 f"{prepared.why_not}; it is called in Python", PlainLoopWarning, users_stacklevel()
             )
-        groups.setdefault(prepared.key, []).append((index, prepared))
+        alone = index if prepared.why_not else -1
+        groups.setdefault((prepared.key, alone), []).append((index, prepared))
     for group in groups.values():
         for batch in _batches(group, threads):
             items = [prepared for _, prepared in batch]
@@ -152,11 +155,11 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
     except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo raises any of the three
         if not (isinstance(error, MemoryError) or "allocate memory" in str(error)):
             raise
-        count = len(prepared)
         needed = sum(item.bytes for item in prepared) / 2**20
         raise ScenarioError(
-            f"no memory for {count} run{'s' * (count > 1)} at once, about {needed:.0f} MiB beside the traces kept so "
-            "far: give a shorter duration, a longer control period or fewer channels, or take traces from smc.stream"
+            f"no memory for {counted(len(prepared), 'run')} at once, about {needed:.0f} MiB beside "
+            "the traces kept so far: give a shorter duration, a longer control period or fewer "
+            "channels, or take traces from smc.stream"
         ) from None
 
 
@@ -165,8 +168,8 @@ def return_freed_memory() -> None:
 
     Without it, a run leaves 45 to 100 kB allocated.
     """
-    if trim := getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None:
-        trim(0)
+    if sys.platform == "linux" and hasattr(ctypes.CDLL(None), "malloc_trim"):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _batches(
@@ -287,16 +290,15 @@ class ScenarioBatch:
         )
         if touching or model.neq or np.any(model.jnt_limited) or np.any(model.tendon_limited):
             return True
-        if (
-            model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS.value
-        ):  # the callback has the friction
-            return False
-        values = (
-            models.field_values(model, s, step) for s in self.scenarios for step in {0, s.jump_step}
-        )
-        return any(
-            np.any(its.get(name, getattr(model, name))) for its in values for name in DRY_FRICTION
-        )
+        if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS.value:
+            return False  # the callback has the friction
+        for scenario in self.scenarios:
+            for step in {0, scenario.jump_step}:
+                values = models.field_values(model, scenario, step)
+                for name in DRY_FRICTION:
+                    if np.any(values.get(name, getattr(model, name))):
+                        return True
+        return False
 
     def reset(self) -> None:
         """Put MuJoCo's states at the model's defaults, and tell the callback which record is whose."""
@@ -322,14 +324,12 @@ class ScenarioBatch:
         """Step all scenarios to a physics step, each with the parameters that hold from its jump
         on.
         """
-        for stop in sorted(
-            {end, *(s.jump_step for s in self.scenarios if self.step < s.jump_step <= end)}
-        ):
+        jumps = [s.jump_step for s in self.scenarios]
+        for stop in sorted({end, *(step for step in jumps if self.step < step <= end)}):
             self.advance(stop - self.step, report)
             self.step = stop
-            self.set_parameters(
-                stop, [i for i, s in enumerate(self.scenarios) if s.jump_step == stop > 0]
-            )
+            if stop > 0:
+                self.set_parameters(stop, [i for i, step in enumerate(jumps) if step == stop])
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
         """Set the true parameters that hold from a physics step on, in the simulations of these
@@ -355,18 +355,23 @@ class ScenarioBatch:
         """The arrays of all simulations whose start is not MuJoCo's: states, and the past of
         delayed sensors.
         """
-        lagged = ["act"] * bool(self.scenarios[0].plant.pose and self.model.na)
-        names = ("qpos", "qvel", *lagged, *["history"] * bool(self.model.nhistory))
+        names = ["qpos", "qvel"]
+        if self.scenarios[0].plant.pose and self.model.na:
+            names.append("act")
+        if self.model.nhistory:
+            names.append("history")
         return {name: self.batch.bind(name) for name in names}
 
     def put_initial_states(self) -> None:
         """Put all simulations at t = 0, with the past readings of delayed sensors."""
         delayed = bool(self.model.nhistory)
         arrays = self.started
-        model = copy.copy(self.model) if delayed else self.model
+        model = self.model
+        if delayed:  # the periods of the readings differ between scenarios
+            model = copy.copy(self.model)
         data = self.scratch
         for i, scenario in enumerate(self.scenarios):
-            if delayed:  # the periods of the readings differ between scenarios
+            if delayed:
                 models.put_values(model, self.base, scenario, 0)
             models.put_initial_state(model, data, scenario)
             for name, array in arrays.items():
@@ -378,15 +383,15 @@ class ScenarioBatch:
         """
         first = self.scenarios[0]
         channels = len(self.scenarios) * first.plant.n
+        slice_steps = max(1, SLICE_STEPS // channels)
+        if self.packed[0].python:
+            slice_steps = min(slice_steps, PYTHON_STEPS)
         if first.plant.own:
             slice_steps = USER_MODEL_STEPS
-        else:
-            slice_steps = max(1, SLICE_STEPS // channels)
         while steps:
             count = min(steps, slice_steps)
-            self.run_alive(
-                lambda alive, count=count: self.batch.step(alive, nstep=count), count * first.stages
-            )
+            step = functools.partial(self.batch.step, nstep=count)
+            self.run_alive(step, count * first.stages)
             report(count * channels)
             steps -= count
 
@@ -399,8 +404,10 @@ class ScenarioBatch:
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
         before, self.calls = self.calls, self.calls + calls
+        called = [function for packed in self.packed for function in packed.python]
         try:
-            action(alive)
+            with python_functions.hearing_ctrl_c(called):
+                action(alive)
         except SimulationError as error:
             for i in error.ids:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
@@ -424,11 +431,10 @@ class ScenarioBatch:
         """Return the Trace of simulation i."""
         code = int(self.records["failure"][i])
         step = int(self.records["failed_step"][i])
-        if code == state.FINE:
-            failure = None
-        else:
+        failure = None
+        if code != state.FINE:
             failure = self.failure(i, code)
-        if failure is None and self.lost_contacts(i):
+        elif self.lost_contacts(i):
             failure = LOST_CONTACTS
             step = 0
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
@@ -448,50 +454,59 @@ class ScenarioBatch:
             return interrupted(self.replaced)
         if code == state.DISTURBANCE_NOT_FINITE:
             return DISTURBANCE_NOT_FINITE
-        if told := [str(one.error) for one in self.packed[i].python if one.error]:
-            return told[0].replace(
-                "in channel 0", f"in channel {int(self.records['seen']['i'][i])}"
-            )
-        scenario = self.scenarios[i]
-        of_law = code in (state.LAW_RAISED, state.NOT_FINITE)
-        if of_law and (told := law_failure(scenario, self.records[i], self.packed[i])):
-            return told
+        if why := self.python_failure(i):
+            return why
+        if code in (state.LAW_RAISED, state.NOT_FINITE) and (why := self.law_failure(i)):
+            return why
         if self.python:
-            return "a function of the run failed, though not in Python"
-        again = ScenarioBatch(
-            [self.prepared[i]], 1, python=True
-        )  # compiled code keeps no text of an exception
+            return "a compiled function of the run failed, and the same in Python did not"
+        again = ScenarioBatch([self.prepared[i]], threads=1, python=True)
         again.simulate(lambda steps: None)
         return again.failure(0, int(again.records["failure"][0]))
 
+    def python_failure(self, i: int) -> str:
+        """Return what a function of simulation i that is called in Python raised; "" if none did."""
+        for function in self.packed[i].python:
+            if function.error is not None:
+                return told(function.error, int(self.records["seen"]["i"][i]))
+        return ""
 
-def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
-    """Return in words why a law failed: its exception, or the u and s in the record.
+    def law_failure(self, i: int) -> str:
+        """Return what the law of simulation i raised, or the u and s in its record.
 
-    Compiled code keeps no text of an exception, so the law is called again in Python. Return None
-    if that raises none.
-    """
-    n = s.plant.n
-    i = int(record["seen"]["i"])
-    width = int(record["width"])
-    memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
-    function = PythonComponent(s.law, n, memory)
-    try:
+        Compiled code keeps no text of an exception, so its law is called again in Python. Return ""
+        if it raises none there, because it had changed its memory before it raised.
+        """
+        s = self.scenarios[i]
+        record = self.records[i]
+        numbers = self.packed[i].numbers
+        n = s.plant.n
+        channel = int(record["seen"]["i"])
+        width = int(record["width"])
+        commands = state.view(numbers, int(record["commands"]), (2, width))
+        memory = state.view(numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
         if s.law.joint:
-            dtype = joint_law.stored_dtype(n)
-            numbers = state.view(
-                packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,)
-            )
-            stored = numbers.copy().view(dtype)[0]
-            dynamics = NominalDynamics(s, stored["x"], stored["v"])
-            function.call_joint(joint_law.measurement_of(stored, dynamics))
+            law = s.law
+            y = int(record["joint"]["head"])
         else:
-            function(i, Measurement(*record["y"].tolist()))
-    except Failure as failure:
-        return str(failure)
-    if record["failure"] == state.LAW_RAISED:  # the law had changed its memory before it raised
-        return None
-    u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[
-        :, i % width
-    ].tolist()
-    return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
+            law = s.law.of_channel(channel)
+            memory = memory[channel]
+            y = state.address(self.records[i : i + 1]) + state.AT.y
+        if not self.packed[i].python:
+            function = python_functions.of_component(law, s)
+            outputs = np.empty(2 * width)
+            places = (y, 0, memory.ctypes.data, outputs.ctypes.data)
+            function.call(*map(python_functions.pointer, places))
+            if function.error is not None:
+                return told(function.error, channel)
+        if record["failure"] == state.LAW_RAISED:
+            return ""
+        u, sliding = commands[:, channel % width].tolist()
+        return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {channel}"
+
+
+def told(error: BaseException, channel: int) -> str:
+    """Return an exception of a function in words, with its channel if it was called for one."""
+    if isinstance(error, Failure) and error.channel is not None:
+        error.channel = channel
+    return str(error)

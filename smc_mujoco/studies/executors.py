@@ -34,7 +34,7 @@ from smc_mujoco.studies import run_key
 MAX_WORK_PER_THREAD = 500_000  # of a batch, see `Scenario.work`: 2 to 5 s of a core
 MAX_WORK = 1_000_000  # of a batch: bounds the memory
 MAX_RUNS = 1000  # of a batch
-LOOP_SLOWDOWN = 40  # time of the reference loop over that of compiled laws, roughly
+PYTHON_SLOWDOWN = 10  # time of a law that is called in Python over that of a compiled one, roughly
 MAX_BATCHES_SENT = 1000  # to workers, and not finished; chosen
 ADDRESS, DASK_ADDRESS = "dask://", "tcp://"  # beginnings of a scheduler's address, here and in dask
 LOGGERS = (
@@ -71,7 +71,9 @@ def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Prepar
     for prepared in map(prepare, scenarios):
         groups.setdefault((prepared.key, bool(prepared.why_not)), []).append(prepared)
     for group in groups.values():
-        work = max(1, group[0].scenario.work) * (LOOP_SLOWDOWN * threads if group[0].why_not else 1)
+        work = max(1, group[0].scenario.work) * (
+            PYTHON_SLOWDOWN * threads if group[0].why_not else 1
+        )
         size = max(1, min(MAX_RUNS, min(MAX_WORK_PER_THREAD * threads, MAX_WORK) // work))
         yield from (group[i : i + size] for i in range(0, len(group), size))
 

@@ -136,31 +136,22 @@ def in_thread(work):
     return done
 
 
-def test_another_thread_compiles_once_the_run_of_a_policy_is_over():
+def test_another_thread_compiles_during_the_run_of_a_policy():
     asked = threading.Event()
     let = threading.Event()
-    found = []
+    failures = []
 
     def act(observation):
         asked.set()
         assert let.wait(60)
         return [0.0]
 
-    over = in_thread(lambda: found.append(run_of(smc.policy(act)).failure))
+    over = in_thread(lambda: failures.append(run_of(smc.policy(act)).failure))
     assert asked.wait(60)
-    compiled = in_thread(lambda: found.append(smc.plant("duffing").load().nv))
-    assert not compiled.wait(0.2)
+    assert in_thread(lambda: smc.plant("duffing").load()).wait(60)
     let.set()
     assert over.wait(60)
-    assert compiled.wait(60)
-    assert sorted(map(str, found)) == ["1", "None"]
-
-
-def test_a_native_run_is_not_waited_for():
-    with callback.installed():
-        before = mujoco.get_mjcb_control()
-        assert in_thread(lambda: smc.plant("duffing").load()).wait(60)
-        assert mujoco.get_mjcb_control() is before
+    assert failures == [None]
 
 
 class Slow:
@@ -174,25 +165,6 @@ class Slow:
         self.begun.set()
         assert self.let.wait(60)
         return mujoco.MjSpec().compile()
-
-
-@pytest.mark.parametrize("python", [True, False], ids=["python", "native"])
-def test_no_python_callback_comes_while_a_model_compiles(python):
-    slow = Slow()
-    entered = threading.Event()
-    native = callback.callback().ctypes
-
-    def enter():
-        with mjcb.installed((lambda model, data: None) if python else native):
-            entered.set()
-
-    compiled = in_thread(lambda: mjcb.compiled(slow))  # pyright: ignore[reportArgumentType]
-    assert slow.begun.wait(60)
-    left = in_thread(enter)
-    assert entered.wait(0.2 if python else 60) is not python
-    slow.let.set()
-    assert compiled.wait(60)
-    assert left.wait(60)
 
 
 def test_a_model_that_does_not_compile_leaves_the_callback():
@@ -403,7 +375,7 @@ def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkey
     assert smc.run(scenario).failure is None
 
 
-def test_a_callback_that_is_cleared_beside_the_reference_loop_is_one_sentence():
+def test_a_callback_that_is_cleared_during_the_run_of_a_policy_is_one_sentence():
     law = smc.policy(lambda observation: [-0.5 * observation[0]])
     stop = threading.Event()
 
@@ -436,7 +408,5 @@ def test_a_law_that_clears_the_callback_fails_its_run(integrator):
         smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.02, integrator=integrator)
     )
     assert "replaced MuJoCo's control callback" in (trace.failure or "")
-    assert trace.diverged_at == pytest.approx({"RK4": 0.003, "Euler": 0.004}[integrator])
-    k = round((trace.diverged_at or 0.0) / 1e-3)
-    assert np.isfinite(trace.x[:k]).all()
-    assert np.isnan(trace.x[k:]).all()
+    assert trace.diverged_at == 0.0  # of its slice
+    assert np.isnan(trace.x).all()

@@ -19,7 +19,7 @@ from smc_mujoco.control.component import gain_text
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import FREE_BODY, Measurement
-from smc_mujoco.simulation import python_controller
+from smc_mujoco.simulation import python_functions
 
 pytestmark = pytest.mark.quick
 
@@ -142,7 +142,7 @@ def computed(component, inputs):
     function = rebuild(component.function, lambda plain: plain)
     joint = component.joint
     memory = np.zeros((joints(component), component.memory) if joint else component.memory)
-    gains = python_controller.gains_of(component, joints(component))
+    gains = python_functions.gains_of(component, joints(component))
     results = np.array([function(y, gains, memory) for y in inputs]).reshape(COUNT, -1)
     weights = np.random.default_rng(8).uniform(0.5, 1.5, results.shape)
     last = memory.ravel()

@@ -9,7 +9,7 @@ from helpers.plants_ab import measured
 import smc_mujoco as smc
 from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.laws import observer_free_q15 as q15
-from smc_mujoco.simulation import python_controller
+from smc_mujoco.simulation import python_functions
 
 FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")
 LAM = 6.0
@@ -20,7 +20,7 @@ GRID = np.concatenate([-HALF[:0:-1], HALF])
 
 def forces(law, e, de):
     """u and s at many states, (N, 2)."""
-    gains = python_controller.gains_of(law)
+    gains = python_functions.gains_of(law)
     memory = np.zeros(law.memory)
     return np.array(
         [

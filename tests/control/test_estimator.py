@@ -14,7 +14,7 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.estimators.kalman import square_root
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.simulation import python_controller
+from smc_mujoco.simulation import python_functions
 
 pytestmark = pytest.mark.quick
 
@@ -27,7 +27,7 @@ SECOND = ("extended_state_observer", "kalman", "integral_chain", "savitzky_golay
 def both(estimator, x, v=None, h=H):
     """Velocities and accelerations on samples x and sensor readings v, (2, K)."""
     function = rebuild(estimator.function, lambda f: f)
-    gains = python_controller.gains_of(estimator)
+    gains = python_functions.gains_of(estimator)
     memory = np.zeros(estimator.memory)
     x = np.asarray(x, float)
     v = np.zeros_like(x) if v is None else v

@@ -14,7 +14,7 @@ from helpers.plants_ab import called, measured
 import smc_mujoco as smc
 from smc_mujoco.control.estimator import Reading, estimator
 from smc_mujoco.control.surface import surface
-from smc_mujoco.simulation import python_controller
+from smc_mujoco.simulation import python_functions
 
 opensmc = pytest.importorskip("opensmc")
 controllers, reaching, surfaces, estimators, metrics, utils, simulator, core, plants = (
@@ -218,7 +218,7 @@ def test_the_integral_of_a_pid_surface_agrees_but_for_one_sample():
 def estimated(ours, theirs, h, until):
     """Both estimates of the velocity of sin t: ours, theirs, (K,) each, from t = 0 on."""
     t = np.arange(0.0, until, h)
-    gains = python_controller.gains_of(ours)
+    gains = python_functions.gains_of(ours)
     memory = np.zeros(ours.memory)
     rows = []
     for x in np.sin(t):

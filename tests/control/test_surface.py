@@ -14,7 +14,7 @@ from scipy.integrate import quad
 import smc_mujoco as smc
 from smc_mujoco.control.law import laws
 from smc_mujoco.control.surface import surface
-from smc_mujoco.simulation import python_controller
+from smc_mujoco.simulation import python_functions
 
 pytestmark = pytest.mark.quick
 
@@ -29,7 +29,7 @@ SHAKEN = 1.2e-3 * 3.0  # bound on s from sampling: (k + D) dt for k = 2, and hal
 
 def at(slid, memory, e, de, t=0.0, a=0.0, h=1e-3):
     """s and eq of a surface."""
-    return slid.function(measured(e, de, dt=h, t=t, a=a), python_controller.gains_of(slid), memory)
+    return slid.function(measured(e, de, dt=h, t=t, a=a), python_functions.gains_of(slid), memory)
 
 
 def slide(name, e=1.0, de=0.0, duration=6.0, k=2.0, disturbance=HUM, **gains):

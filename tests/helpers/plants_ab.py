@@ -23,7 +23,7 @@ from scipy.linalg import expm
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.law import Law, Measurement
-from smc_mujoco.simulation import cfunctions, python_controller
+from smc_mujoco.simulation import cfunctions, python_functions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +77,7 @@ def on_surface(s, dt=1e-3, eq=0.0, **y):
 def called(law: Law, y: Measurement, memory: np.ndarray):
     """u and s of a law that keeps its memory."""
     assert law.function is not None
-    return law.function(y, python_controller.gains_of(law), memory)
+    return law.function(y, python_functions.gains_of(law), memory)
 
 
 def one(law: Law, **y):

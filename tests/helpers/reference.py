@@ -1,69 +1,41 @@
-"""The reference loop: mj_step, controlled by the `Controller` in Python.
+"""The oracle of runs: mj_step, controlled by the `Controller` in Python.
 
-It runs what does not compile. The tests compare the compiled callback with it: the same Scenario
-must give the same Trace. It is written to be read, with numpy's Philox and none of the callback's
-code. A step takes tens of microseconds.
+The tests compare the compiled callback with it: the same Scenario must give the same Trace. It is
+written to be read, with numpy's Philox and none of the callback's code. A step takes tens of
+microseconds.
 """
 
-import contextlib
 import math
 from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import jit, mjcb
+from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation import philox, trace
+from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
 from smc_mujoco.simulation.prepare import motors_at_start, pause_phase
-from smc_mujoco.simulation.python_controller import (
-    USER_EXCEPTIONS,
-    Controller,
-    Failure,
-    as_floats,
-    evaluate,
-    failure_of,
-)
+from smc_mujoco.simulation.python_controller import Controller
+from smc_mujoco.simulation.python_functions import Failure, evaluate, evaluate_friction
+from smc_mujoco.simulation.run import DISTURBANCE_NOT_FINITE, PLANT_DIVERGED
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push, Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
-CALLBACK_STEPS = 100  # physics steps after which MuJoCo's callbacks are compared with ours; chosen
-DISTURBANCE_NOT_FINITE = "the disturbance became NaN or inf"
-PLANT_DIVERGED = f"{trace.PLANT_DIVERGED} (|x| or |v| above {MAX_STATE:g}, or NaN)"
 
-
-def interrupted(name: str) -> str:
-    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the
-    control callback.
-    """
-    name = name or "control"
-    so = ", so that its law was not called" * (name == "control")
-    return (
-        f"other code replaced MuJoCo's {name} callback during the run{so}: "
-        f"call mujoco.set_mjcb_{name} before or after the run, or restore what mujoco.get_mjcb_{name}() returned"
-    )
-
-
-def run(scenario: Scenario, mechanism: models.Mechanism | None = None) -> Trace:
-    """Return the trace of a scenario, run in the reference loop.
-
-    `mechanism`: the scenario's, if it is made already.
-    """
-    mechanism = mechanism or models.mechanism(scenario)
+def run(scenario: Scenario) -> Trace:
+    """Return the trace of a scenario."""
     with installed():
-        loop = Loop(scenario, mechanism)
-    with (
-        installed(loop.control),
-        np.errstate(all="ignore"),
-    ):  # the loop itself checks for NaN and inf
+        loop = Loop(scenario, models.mechanism(scenario))
+    # the loop itself checks for NaN and inf
+    with installed(loop.control), np.errstate(all="ignore"):
         for step in range(loop.total + 1):
             loop.step(step)
             if loop.failure:
@@ -110,10 +82,8 @@ class Loop:
         self.model = models.with_values(self.base, scenario)
         self.data = mujoco.MjData(self.model)
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
-        self.driven, self.hinged = (
-            self.channels["ctrl"] >= 0,
-            self.channels["hinge_body"] >= 0,
-        )  # (n,) bool
+        self.driven = self.channels["ctrl"] >= 0
+        self.hinged = self.channels["hinge_body"] >= 0
         self.has_friction = self.channels["friction_force"] >= 0
         self.has_drive = self.channels["force"] >= 0
         models.put_initial_state(self.model, self.data, scenario)
@@ -127,39 +97,28 @@ class Loop:
         self.streams = [scenario.noise_stream(j) for j in range(len(scenario.disturbance))]
         self.commands: list[np.ndarray] = []
         self.d = np.zeros(n)  # disturbances at the last stage
-        self.forces = np.zeros(
-            (2, n)
-        )  # sums over a control period: of the drives, of friction and contacts
+        # sums over a control period: of the drives, of friction and contacts
+        self.forces = np.zeros((2, n))
         self.drive_step = scenario.drive_step
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
-        self.middle, self.rise = np.zeros(
-            (2, n)
-        )  # the mean force in a step of RK4, and its rise to the last stage
+        # the mean force in a step of RK4, and its rise to the last stage
+        self.middle, self.rise = np.zeros((2, n))
         inertia = self.model.dof_M0[self.channels["qvel"]]
         formula = self.scenario.formula_friction
-        if formula is None:
-            self.bristles = []
-        else:
+        if formula is not None:
+            record = jit.named(formula.names)
             self.bristles = [formula.bristle(i, inertia[i]) for i in range(n)]
-        if formula is None:
-            self.numbers = []
-        else:
-            self.numbers = [friction_numbers(formula, i) for i in range(n)]
-        self.stuck_at, self.speed = (
-            [math.nan] * n,
-            [0.0] * n,
-        )  # positions of joints that stick, or NaN; last speeds
-        self.rubbing, self.held = (
-            np.zeros((n, 4)),
-            np.zeros(n),
-        )  # of Coulomb friction, see `apply_exact_friction`
-        if scenario.stepper is None:
-            self.motors = []
-        else:
-            self.motors = [
-                Motor(scenario.stepper, values) for values in motors_at_start(self.scenario)
-            ]
+            self.numbers = [record(*(formula.parameters(i) or [0.0])) for i in range(n)]
+        self.stuck_at = [math.nan] * n  # positions of joints that stick, or NaN
+        self.speed = [0.0] * n  # at the step before
+        # of Coulomb friction, see `apply_exact_friction`
+        self.rubbing = np.zeros((n, 4))
+        self.held = np.zeros(n)
+        self.motors = []
+        if scenario.stepper is not None:
+            for values in motors_at_start(self.scenario):
+                self.motors.append(Motor(scenario.stepper, values))
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -173,28 +132,17 @@ class Loop:
         if step == self.scenario.jump_step:
             models.put_values(self.model, self.base, self.scenario, step)
             mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
-        with contextlib.suppress(
-            mujoco.UnexpectedError
-        ):  # MuJoCo's, where our Python callback is taken away
-            if step < self.total:
-                mujoco.mj_step(self.model, self.data)
-            else:
-                mujoco.mj_forward(self.model, self.data)
-        expected_calls = min(step + 1, self.total) * self.scenario.stages + (step == self.total)
-        if step % CALLBACK_STEPS == 0 or step == self.total:
-            other = mjcb.replaced()
+        if step < self.total:
+            mujoco.mj_step(self.model, self.data)
         else:
-            other = ""
-        if (other or self.calls != expected_calls) and self.failure is None:
-            self.failure = interrupted(other)
-            self.failed_step = step
+            mujoco.mj_forward(self.model, self.data)
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Control callback: run the law at the first stage of a sample, and apply the disturbances
         at every stage.
         """
-        if self.failure or data._address != self.data._address:
-            return  # a law or another thread may step another model
+        if self.failure:
+            return
         step, stage = divmod(self.calls, self.scenario.stages)
         self.calls += 1
         try:
@@ -435,7 +383,7 @@ class Loop:
                 motor = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             load += float(data.qfrc_constraint[dof] + d[i])
-            friction, low, high = sliding_friction(formula, self.numbers[i], v, motor, load)
+            friction, low, high = evaluate_friction(formula, self.numbers[i], v, motor, load)
             stuck = not math.isnan(self.stuck_at[i])
             before = self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
@@ -494,22 +442,3 @@ class Loop:
             self.forces[1, self.has_friction] += data.actuator_force[
                 self.channels["friction_force"][self.has_friction]
             ]
-
-
-def friction_numbers(formula: Sliding, i: int) -> tuple:
-    """Return the numbers of channel i as the record that the formula of a friction reads."""
-    return jit.named(formula.names)(*(formula.parameters(i) or [0.0]))
-
-
-def sliding_friction(
-    formula: Sliding, numbers: tuple, v: float, motor: float, load: float
-) -> list[float]:
-    """Return the sliding friction by a formula with the `friction_numbers` of a channel, and its
-    bounds at rest.
-    """
-    name = f"friction {type(formula).__name__}"
-    try:
-        out = type(formula).value(v, motor, load, numbers)
-    except USER_EXCEPTIONS as error:
-        raise failure_of(name, error) from error
-    return as_floats(name, out, "a force and two bounds", 3)

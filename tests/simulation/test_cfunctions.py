@@ -12,6 +12,7 @@ from types import FunctionType
 import numba
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.runs import assert_same
 from numba import njit
 from numba.extending import overload
@@ -21,7 +22,7 @@ from smc_mujoco.common import fingerprint, jit
 from smc_mujoco.common.jit import NUMBERS
 from smc_mujoco.common.numba_internals import FunctionIdentity
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import cfunctions, reference
+from smc_mujoco.simulation import cfunctions
 
 
 @pytest.fixture(autouse=True)

@@ -9,7 +9,8 @@ import pytest
 from helpers import arms
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.python_controller import Controller, Failure
+from smc_mujoco.simulation.python_controller import Controller
+from smc_mujoco.simulation.python_functions import Failure
 
 NOISE = smc.Noise(position=0.001, velocity=0.01)
 SCENARIOS = {

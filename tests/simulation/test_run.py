@@ -406,7 +406,7 @@ def test_extreme_sensor_noise_is_no_exception():
         assert trace.diverged_at is None or "law 'classical' returned" in trace.failure
 
 
-# the reference loop
+# laws that do not compile
 
 
 def native(y, gains, memory):
@@ -456,7 +456,7 @@ def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin():
     }
     twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
     for function in (with_json, WithClass(), Unhashable(), with_array):
-        with pytest.warns(smc.errors.PlainLoopWarning, match="reference loop"):
+        with pytest.warns(smc.errors.PlainLoopWarning, match="it is called in Python"):
             trace = smc.run(scenario(made(function, {"k": 2.0}), **rich))
         for name in ARRAYS:
             np.testing.assert_allclose(
@@ -557,7 +557,7 @@ def test_a_callback_that_was_installed_is_put_back():
 
 
 @pytest.mark.parametrize(
-    "law", ["classical", made(with_json, {"k": 2.0})], ids=["callback", "reference loop"]
+    "law", ["classical", made(with_json, {"k": 2.0})], ids=["compiled", "in Python"]
 )
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
 def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):

@@ -27,6 +27,7 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 from numba.core import caching
@@ -36,7 +37,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import fingerprint, numba_internals
 from smc_mujoco.common.jit import compiled
 from smc_mujoco.control.law import Measurement, catalogue
-from smc_mujoco.simulation import callback, controller, reference, state
+from smc_mujoco.simulation import callback, controller, state
 from smc_mujoco.simulation.controller import lever
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare

@@ -13,11 +13,12 @@ import pickle
 import mujoco
 import numpy as np
 import pytest
+from helpers import reference
 
 import smc_mujoco as smc
 from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.mechanisms.hardware.part import Part
-from smc_mujoco.simulation import cfunctions, reference, serialise
+from smc_mujoco.simulation import cfunctions, serialise
 from smc_mujoco.simulation.controller import lever
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.signals import (

@@ -78,7 +78,7 @@ class EquationRun:
         at = state.address(self.scratch)
         self.seen = np.array([(0, n, at + 16 * n, at + 24 * n, at)], SEEN)
         self.parameters = [_parameters(plant, s.factors(step)) for step in (0, max(s.jump_step, 0))]
-        self.nominal = cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters))
+        self.nominal = cfunctions.compile_nominal(plant)
         functions = callback.callback().address, self.nominal.address
         owners = self.model._address, self.data._address, state.address(self.record)
         fields = {name: getattr(self.data, name) for name in FIELDS}

@@ -6,7 +6,7 @@
 A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator
 prepares them once, puts the gains of each candidate into the buffers that compiled code reads, and
 takes J from the logs. It has three engines: MuJoCo, in a Batch that lasts; the plant's `equation`,
-which may only find gains; and the reference loop, for laws that do not compile. J is that of
+which may only find gains; and `run`, for laws that do not compile. J is that of
 `Objective.terms_of_run`.
 """
 
@@ -36,7 +36,7 @@ from smc_mujoco.simulation.run import (
 )
 from smc_mujoco.simulation.scenario import Scenario
 
-MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "the reference loop"  # engines
+MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "Python"  # engines
 Gains = tuple[float, ...]
 Costs = tuple[float, float]  # tracking and variation of a run
 # number of a case, when it failed, s, (K + 1, n) LOG -> costs

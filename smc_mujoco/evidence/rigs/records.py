@@ -17,7 +17,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import trace as traces
-from smc_mujoco.simulation.python_controller import evaluate
+from smc_mujoco.simulation.python_functions import evaluate
 from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)

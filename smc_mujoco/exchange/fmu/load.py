@@ -4,7 +4,7 @@
 
 An FMU from Simulink, Modelica or `law_to_fmu` keeps its own state. So each channel of each run has
 its own instance, which is made at the first sample and freed with the run. The instance is called
-from Python, in the reference loop. The FMU is first tried in a separate process, which may crash or
+from Python. The FMU is first tried in a separate process, which may crash or
 hang.
 """
 

@@ -4,7 +4,7 @@ field that steps.
     u, in rad/s^2 -> speed -> rate of steps -> queue of steps
       -> the motor's field -> torque ~ sin(field - shaft)
 
-Three functions simulate it, compiled in the callback and as they are in the reference loop:
+Three functions simulate it, compiled in the callback:
 `command` is the firmware's part at a control sample, `advance` fills the queue, and `field` turns
 the field. They know no MuJoCo. g, the state of one motor, is a record of GENERATOR; p is a
 `Pulsing`; the queue has two numbers for a step, its time and its direction.

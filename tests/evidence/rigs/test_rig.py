@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs.controllers import state_feedback
-from smc_mujoco.simulation import python_controller
+from smc_mujoco.simulation import python_functions
 
 QUBE = smc.rig("qube_servo")
 
@@ -169,12 +169,12 @@ def test_the_replay_is_the_controllers_own_command(record):
     scenario = QUBE.replay(changed, start=start)
     memory = np.zeros(5)
     first = round(start / 2e-3)
-    gains = python_controller.Values(**scenario.law.gains)
+    gains = python_functions.Values(**scenario.law.gains)
     for k in range(400):
-        r = python_controller.evaluate(scenario.reference, k * 2e-3)[0]
+        r = python_functions.evaluate(scenario.reference, k * 2e-3)[0]
         x = theta[first + k]
         y = SimpleNamespace(dt=2e-3, e=x - r, q=alpha[first + k])
-        added = python_controller.evaluate(scenario.feedforward, k * 2e-3)[0]
+        added = python_functions.evaluate(scenario.feedforward, k * 2e-3)[0]
         command = state_feedback.function(y, gains, memory)[0] + added
         assert command == pytest.approx(u[first + k], abs=1e-9)
 

@@ -25,7 +25,7 @@ from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.exchange.c.load import CLaw
 from smc_mujoco.simulation import cfunctions
-from smc_mujoco.simulation.python_controller import gains_of
+from smc_mujoco.simulation.python_functions import gains_of
 
 pytestmark = needs_compiler
 

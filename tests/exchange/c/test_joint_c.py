@@ -29,8 +29,8 @@ from smc_mujoco.control.joint_law import (
 )
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build, export, sandbox
-from smc_mujoco.simulation import python_controller
-from smc_mujoco.simulation.python_controller import gains_of
+from smc_mujoco.simulation import python_functions
+from smc_mujoco.simulation.python_functions import gains_of
 
 pytestmark = needs_compiler
 
@@ -324,7 +324,7 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
     law = LAWS[name]()
     rng = np.random.default_rng(3)
     memory = np.zeros((3, law.memory))
-    theirs = python_controller.PythonComponent(law, 3)
+    theirs = python_functions.PythonComponent(law, 3)
     for k in range(20):
         vectors = rng.normal(size=(9, 3)).astype(np.float32).astype(float)
         M = np.eye(3) + 0.1

@@ -26,7 +26,7 @@ from smc_mujoco.common.guard import Fault  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
 from smc_mujoco.exchange.fmu import load, slave  # noqa: E402
 from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
-from smc_mujoco.simulation.python_controller import gains_of  # noqa: E402
+from smc_mujoco.simulation.python_functions import gains_of  # noqa: E402
 
 pytestmark = [
     needs_compiler,
