@@ -2,7 +2,7 @@
 
 `pip install 'smc-mujoco[dm]'`.
 
-    environment = suite.load("duffing", "regulate", task_kwargs={"random": 0})
+    environment = suite.load("duffing", "regulate", random=0)
     timestep = environment.reset()
     while not timestep.last():
         timestep = environment.step(agent(timestep))
@@ -14,7 +14,6 @@ environment: viewer.launch(environment).
 """
 
 import contextlib
-import functools
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
@@ -23,21 +22,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.extras import MissingPackageError, cure, extra
 from smc_mujoco.envs.episode import Episode, Setting, bounded
-from smc_mujoco.envs.tasks import tasks
-from smc_mujoco.mechanisms.plant import Plant, plants
+from smc_mujoco.mechanisms.plant import Plant
 
 with extra("dm", "smc_mujoco.envs.dm_control_env"):
     from dm_control.mujoco import Physics
     from dm_control.mujoco.wrapper import MjModel
     from dm_control.rl import control
     from dm_env import specs
-
-# Names of dm_control's suite -> names here.
-TASK_KWARGS = {"random": "random", "time_limit": "duration"}
-ENVIRONMENT_KWARGS = {"flat_observation": "flat_observation", "control_timestep": "control_period"}
 
 
 class PlantPhysics(Physics):
@@ -86,20 +79,16 @@ class PlantTask(Episode, control.Task):
         self.read_state(physics.data.ptr)
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the spec of an action: commands of the driven channels, divided by their limits."""
+        """Return the spec of an action: commands of the driven channels over their limits."""
         return specs.BoundedArray(
             self.setting.action_shape, float, minimum=-1.0, maximum=1.0, name="u"
         )
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return positions and velocities, and the reference if the task has one."""
+        observation = OrderedDict(position=self.x, velocity=self.v)
         if self.diverged:
-            x = bounded(self.x)
-            v = bounded(self.v)
-        else:
-            x = self.x
-            v = self.v
-        observation = OrderedDict(position=x, velocity=v)
+            observation = OrderedDict(position=bounded(self.x), velocity=bounded(self.v))
         if self.setting.task.moving:
             observation["reference"] = self.setting.reference(self.sample)
         return observation
@@ -116,8 +105,6 @@ class PlantTask(Episode, control.Task):
 def load(
     domain: Plant | str,
     task: str = "regulate",
-    task_kwargs: Mapping[str, Any] | None = None,
-    environment_kwargs: Mapping[str, Any] | None = None,
     *,
     random: int | np.random.RandomState | np.random.Generator | None = None,
     changes: Mapping[str, Any] | None = None,
@@ -128,11 +115,6 @@ def load(
     Args:
       domain: a Plant or the name of one.
       task: one of `smc_mujoco.envs.tasks.tasks(domain)`.
-      task_kwargs: arguments of dm_control's suite: random, and time_limit in s, which is the field
-        duration.
-      environment_kwargs: arguments of dm_control's suite: flat_observation, and control_timestep in
-        s, which is the field control_period. These and task_kwargs take precedence over the
-        arguments below.
       random: a seed or a numpy generator for the starts; None for different starts every time.
       changes: Scenario field -> value, such as {"duration": 5.0, "control_period": 0.01, "u_max":
         3.0}.
@@ -144,48 +126,20 @@ def load(
         of range.
       MissingPackageError: dm_control does not fit the MuJoCo that is installed.
     """
-    values = _renamed("task_kwargs", task_kwargs, TASK_KWARGS)
-    values |= _renamed("environment_kwargs", environment_kwargs, ENVIRONMENT_KWARGS)
-    random = values.pop("random", random)
-    flat_observation = values.pop("flat_observation", flat_observation)
-    if values and isinstance(changes, Mapping | None):
-        changes = {**(changes or {}), **values}
     setting = Setting(domain, task, changes)
     if not isinstance(random, np.random.RandomState | np.random.Generator):
-        try:
-            random = np.random.default_rng(random)
-        except (TypeError, ValueError):
-            choices = "a seed, a whole number from 0, or a generator"
-            raise ScenarioError(f"random is {shown(random)}: give {choices}") from None
+        random = np.random.default_rng(random)
     scenario = setting.scenario
     return control.Environment(
         _physics(setting.model),
         PlantTask(setting, random),
-        time_limit=(scenario.samples - 0.5)
-        * scenario.control_period,  # half a sample less: sums of floats miss it
+        # half a sample less: sums of floats miss it
+        time_limit=(scenario.samples - 0.5) * scenario.control_period,
         n_sub_steps=scenario.steps,
         flat_observation=flat_observation,
         # observations need positions and velocities only, which are already current
         legacy_step=False,
     )
-
-
-@functools.cache
-def __getattr__(name: str) -> object:
-    """Return ALL_TASKS, pairs of every plant and each of its tasks.
-
-    It is made on demand, since it loads all models.
-    """
-    if name == "ALL_TASKS":
-        return tuple((plant, task) for plant in plants() for task in tasks(plant))
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def _renamed(what: str, values: Any, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return values with the names of dm_control's suite replaced by the names here."""
-    if not isinstance(values, Mapping | None):
-        raise ScenarioError(f"{what} is {shown(values)}: give a mapping of {', '.join(names)}")
-    return {find(f"name in {what}", name, names): value for name, value in (values or {}).items()}
 
 
 def _physics(model: mujoco.MjModel) -> PlantPhysics:

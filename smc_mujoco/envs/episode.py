@@ -70,8 +70,10 @@ class Setting:
         self.task = find("task", task, TASKS)
         known = FLIGHT_TASKS if flies else tasks(plant)
         if plant.pose and not flies:
-            cure = "make its environment by gymnasium.make, and copies by make_vec(..., vectorization_mode='sync')"
-            raise ScenarioError(f"{plant.name} is a free body: {cure}")
+            raise ScenarioError(
+                f"{plant.name} is a free body: make its environment by gymnasium.make, and copies "
+                "by make_vec(..., vectorization_mode='sync')"
+            )
         if flies and not plant.pose:
             raise ScenarioError(
                 f"{plant.name} is no free body: make its environment by gymnasium.make"
@@ -84,15 +86,12 @@ class Setting:
         # the run that equals an episode
         scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
         self.scenario = stepped_by_mujoco(scenario).resolved
-        if flies:
-            self.flown = dataclasses.replace(scenario, law=commanded())
-        else:
-            self.flown = scenario
+        self.flown = dataclasses.replace(scenario, law=commanded()) if flies else scenario
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if self.scenario.stepper is not None:
             raise ScenarioError(
-                "environments have no Stepper, whose queue the callback keeps: give another actuator"
+                "environments have no Stepper, whose queue the callback keeps: take another drive"
             )
         if self.scenario.formula_friction is not None:
             name = type(self.scenario.formula_friction).__name__
@@ -103,48 +102,39 @@ class Setting:
             raise ScenarioError(
                 "u_max is inf: give a finite one, because actions are fractions of it"
             )
-        fixed = np.array(self.scenario.x0)
         # bounds of the initial positions, (n,) each
-        if changes.get("x0") is None:
-            self.low, self.high = starts(self.task, plant)
-        else:
-            self.low = fixed
-            self.high = fixed
+        self.low, self.high = starts(self.task, plant)
+        if changes.get("x0") is not None:
+            self.low = self.high = np.array(self.scenario.x0)
         spec = models.spec(self.scenario)
         edit(spec)
         self.model = models.with_values(models.compiled(spec, self.scenario), self.scenario)
         table = channels(self.model)
-        self.qpos, self.qvel = table["qpos"], table["qvel"]  # addresses of the channels, (n,) each
+        self.qpos = table["qpos"]  # addresses of the channels, (n,)
+        self.qvel = table["qvel"]
         self.joints = models.moving_joints(self.model)
         # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,)
-        # each
-        self.ctrl, self.shafts = (table[name][: plant.driven] for name in ("ctrl", "shaft"))
+        self.ctrl = table["ctrl"][: plant.driven]
+        self.shafts = table["shaft"][: plant.driven]
         # the largest commands, (driven,), and the actuators' inputs per unit of them
-        self.limits, self.scale = (
-            np.array(self.scenario.limits),
-            math.prod(p.scale for p in self.scenario.actuator),
-        )
-        # the channels that the task treats differently, (n,) of bool, and from where positions
-        # count in errors, (n,)
-        self.selected, self.rest_x = self.task.selected(plant), rest(plant)
+        self.limits = np.array(self.scenario.limits)
+        self.scale = math.prod(part.scale for part in self.scenario.actuator)
+        # the channels that the task treats differently, (n,) of bool
+        self.selected = self.task.selected(plant)
+        self.rest_x = rest(plant)  # from where positions count in errors, (n,)
         # the channels that the reward counts: not the tilt of a body that leans to move
-        if flies:
-            self.counted = list(plant.judged)
-        else:
-            self.counted = slice(None)
-        self.references = _references(
-            self.scenario, self.scenario.samples + 1 if self.task.moving else 1
-        )
+        self.counted: Any = list(plant.judged) if flies else slice(None)
+        samples = self.scenario.samples + 1 if self.task.moving else 1
+        self.references = _references(self.scenario, samples)
         width = self.references.shape[1]
-        self.observation_size = 2 * plant.n + width * self.task.moving
+        self.observation_size = 2 * plant.n
+        if self.task.moving:
+            self.observation_size += width
         self.action_shape = (plant.driven,)
-        self.rest_r = np.zeros(
-            width
-        )  # from where the references count: the rest of each that has one, then zeros
+        # from where the references count: the rest of each that has one, then zeros
+        self.rest_r = np.zeros(width)
         if plant.rest:
             self.rest_r[: width // 3] = self.rest_x[: width // 3]
-        else:
-            self.rest_r[: width // 3] = 0.0
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
         """Return the commands of an action, (*copies, driven): its saturated values times the
@@ -185,9 +175,8 @@ class Setting:
             yield steps
             return
         for _ in range(steps):
-            states = drive_states[0], drive_states[1]
             force, drive_states[0], drive_states[1] = effect(
-                command, *states, qvel[..., self.shafts]
+                command, drive_states[0], drive_states[1], qvel[..., self.shafts]
             )
             ctrl[..., self.ctrl] = self.scale * force
             yield 1
@@ -202,9 +191,11 @@ class Setting:
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
             state = np.array(coerce.state(name, value, self.scenario))
-            if name == "x0":
+            if name == "v0":
+                v = state
+            else:
                 check_ranges(self.scenario.plant.name, self.scenario.plant.ranges, state)
-            x, v = (state, v) if name == "x0" else (x, state)
+                x = state
         return x, v
 
     def reference(self, k: Any) -> np.ndarray:
@@ -248,7 +239,8 @@ class Episode:
         data.qpos[:], data.qvel[:] = models.state_with(
             self.setting.model, self.setting.joints, *start
         )
-        self.episodes, self.sample = self.episodes + 1, 0
+        self.episodes += 1
+        self.sample = 0
         self.drive_states[:] = self.setting.drive_start(data.qvel)
         self.read_state(data)
 
@@ -293,7 +285,7 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
             raise unknown("field of an environment", name, FIELDS)
     if "reference" in changes and not TASKS[task].moving:
         raise ScenarioError(
-            f"reference is {shown(changes['reference'])}, but task {task!r} follows none: take 'track'"
+            f"reference is {shown(changes['reference'])}, and {task!r} follows none: take 'track'"
         )
     return dict(changes)
 

@@ -60,7 +60,8 @@ class FlightEnv(PlantEnv):
             model, free_joint(model), drives.tolist()
         )
         self.least, self.most = model.actuator_ctrlrange[drives].T
-        self.setting.action_shape, self.setting.limits = (len(drives),), np.ones(len(drives))
+        self.setting.action_shape = (len(drives),)
+        self.setting.limits = np.ones(len(drives))
         self.action_space = action_space(self.setting)
         self.begin(self.data, self.np_random)
 
@@ -74,20 +75,19 @@ class FlightEnv(PlantEnv):
         )
         with callback.installed():
             self.batch = ScenarioBatch([prepare(start)], threads=1)
-        self.memory = state.view(
-            self.batch.packed[0].numbers, int(self.batch.records["law"]["memory"][0]), (len(x0),)
-        )
-        self.episodes, self.sample = self.episodes + 1, 0
+        place = int(self.batch.records["law"]["memory"][0])
+        self.memory = state.view(self.batch.packed[0].numbers, place, (len(x0),))
+        self.episodes += 1
+        self.sample = 0
         self.read_state(data)
 
     def advance(self, action: Any) -> None:
         """Take one control period and read the pose."""
         share = 0.5 + 0.5 * self.setting.command(action)
         wrench = (self.least + share * (self.most - self.least)) @ self.wrenches
-        self.memory[:] = (
-            *rotation.turned(rotation.quaternion(*self.x[3:]), *wrench[:3]),
-            *wrench[3:],
-        )
+        attitude = rotation.quaternion(*self.x[3:])
+        self.memory[:3] = rotation.turned(attitude, *wrench[:3])
+        self.memory[3:] = wrench[3:]
         self.sample += 1
         with callback.installed():
             self.batch.advance_to(self.sample * self.setting.scenario.steps)
@@ -121,4 +121,5 @@ def environment(plant: Plant | str, *args: Any, **kwargs: Any) -> gymnasium.Env:
 
     Arguments are those of both.
     """
-    return (FlightEnv if as_plant(plant).pose else PlantEnv)(plant, *args, **kwargs)
+    made = FlightEnv if as_plant(plant).pose else PlantEnv
+    return made(plant, *args, **kwargs)

@@ -4,12 +4,11 @@
 
 An observation is one array of positions and velocities, and for `track` also r, r', r''. An action
 is the command of the driven channels, divided by their limits. An episode is truncated at the
-scenario's duration, the max_episode_steps of its spec, and terminated if the plant diverges. The
+scenario's duration, and terminated if the plant diverges. The
 info has "time", s since the start, and "error", the e of the task in each channel. The module
 `tasks` describes tasks and rewards; `vector_env` has many copies of a plant in one batch.
 """
 
-import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -27,7 +26,6 @@ from smc_mujoco.simulation.controller import MAX_STATE
 with extra("rl", "smc_mujoco.envs.gymnasium_env"):
     import gymnasium
     from gymnasium import spaces
-    from gymnasium.envs.registration import EnvSpec
 
 registration.register()  # also if only this module is imported
 
@@ -40,39 +38,11 @@ def action_space(setting: Setting) -> spaces.Box:
 
 
 def observation_space(setting: Setting) -> spaces.Box:
-    """Return the space of observations: up to the largest state of a run, or up to the largest r,
-    r', r'' beyond it.
-    """
-    high = np.full(setting.observation_size, MAX_STATE)
-    if setting.task.moving:
-        high[2 * setting.scenario.plant.n :] = np.maximum(
-            MAX_STATE, np.abs(setting.references).max(axis=0)
-        )
-    return spaces.Box(-high, high, dtype=np.float64)
+    """Return the space of observations: up to the largest state of a run."""
+    return spaces.Box(-MAX_STATE, MAX_STATE, (setting.observation_size,), np.float64)
 
 
-class TimeLimited:
-    """An environment that writes the length of its episodes to its spec, which `gymnasium.make`
-    sets.
-    """
-
-    max_samples: int  # control samples after which an episode is truncated
-    _spec: EnvSpec | None = None
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The spec that gymnasium made the environment from."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        """Copy a spec, with the length of the episode as its max_episode_steps."""
-        self._spec = copy.copy(spec)
-        if self._spec is not None:
-            self._spec.max_episode_steps = self.max_samples
-
-
-class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
+class PlantEnv(Episode, gymnasium.Env):
     """One plant with a task. It has the attributes of an Episode too."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
@@ -96,10 +66,8 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         self.render_mode = render_mode
         self.max_samples = scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / scenario.control_period))}
-        self.action_space, self.observation_space = (
-            action_space(self.setting),
-            observation_space(self.setting),
-        )
+        self.action_space = action_space(self.setting)
+        self.observation_space = observation_space(self.setting)
         self.renderer: mujoco.Renderer | None = None
         self.data = mujoco.MjData(self.setting.model)
 

@@ -20,9 +20,8 @@ NAMESPACE = "smc"  # of all plants
 
 def register_when_imported() -> None:
     """Register the ids at once if gymnasium has been imported, else as soon as it is."""
-    if (
-        getattr(sys.modules.get(LIBRARY), "envs", None) is not None
-    ):  # set once gymnasium has registered its own ids
+    # set once gymnasium has registered its own ids
+    if getattr(sys.modules.get(LIBRARY), "envs", None) is not None:
         register()
     else:
         # finders of other packages; an earlier import of this module may have left its own
@@ -64,10 +63,10 @@ def register() -> None:
         if str(spec.entry_point).startswith(f"{LIBRARY}."):
             taken.add(spec.name)
     for plant in plants():
-        for name in (
-            f"{NAMESPACE}/{camel(plant)}-v0",
-            *([] if camel(plant) in taken else [f"{camel(plant)}-v0"]),
-        ):
+        names = [f"{NAMESPACE}/{camel(plant)}-v0"]
+        if camel(plant) not in taken:
+            names.append(f"{camel(plant)}-v0")
+        for name in names:
             if name not in theirs.registry:
                 theirs.register(
                     id=name,

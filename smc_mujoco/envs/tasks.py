@@ -6,11 +6,11 @@ in [0, 1], where rms is taken over the channels. T is dm_control's tolerance abo
 (Tassa et al., DeepMind Control Suite, 2018), and the form is that of its cart-pole. The margins, 1
 (rad or m) for e and 5 (per second) for w, are chosen.
 
-    task          e                                          w                  an episode starts with |x| up to
-    regulate      x                                          x'                 the plant's x0
-    track         x - r in driven channels, x in others      x' - r', x'        the plant's x0
-    swing_up      1 - cos x of toppling hinges, x of others  x'                 within 0.1 rad of hanging, others at 0
-    synchronise   x - mean of the channels                   x' - its mean      the largest of the plant's x0
+    task          e                                          w              |x| at the start
+    regulate      x                                          x'             up to the plant's x0
+    track         x - r in driven channels, x in others      x' - r', x'    up to the plant's x0
+    swing_up      1 - cos x of toppling hinges, x of others  x'             hanging within 0.1 rad
+    synchronise   x - mean of the channels                   x' - its mean  up to the largest x0
 
 Of an arm such as `panda`, whose rest is a pose, x and the spread of starts count from this pose,
 and r is a reference for each joint. An arm is neither swung up nor synchronised. If joints have
@@ -101,15 +101,11 @@ class Track(Task):
         low, high = _ranges(plant)
         room = AMPLITUDE_SHARE * np.minimum(high - plant.rest, plant.rest - low)
         amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)
-        amplitudes = (amplitudes * np.isin(np.arange(plant.n), plant.judged))[
-            : plant.driven
-        ].tolist()
-        return {
-            "reference": [
-                OffsetSine(middle, amplitude, TRACK_REFERENCE.omega)
-                for middle, amplitude in zip(plant.rest, amplitudes, strict=False)
-            ]
-        }
+        amplitudes[~np.isin(np.arange(plant.n), plant.judged)] = 0.0
+        references = []
+        for middle, amplitude in zip(plant.rest, amplitudes[: plant.driven].tolist(), strict=False):
+            references.append(OffsetSine(middle, amplitude, TRACK_REFERENCE.omega))
+        return {"reference": references}
 
     def selected(self, plant: Plant) -> np.ndarray:
         """Return the channels with an actuator."""
@@ -159,7 +155,7 @@ class SwingUp(Task):
         return (math.pi - SWING_UP_SPREAD) * down, (math.pi + SWING_UP_SPREAD) * down
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
-        """Return the distance of the toppling channels from upright, and the state of the others."""
+        """Return the distance of toppling channels from upright, and the state of others."""
         return np.where(selected, 1.0 - np.cos(x), x), v
 
 
@@ -216,9 +212,9 @@ def rest(plant: Plant) -> np.ndarray:
 
 def _ranges(plant: Plant) -> Pair:
     """Return the lowest and the highest positions of the joints, (n,) each."""
-    ranges = np.array(
-        [(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n
-    )
+    if not plant.ranges:
+        return np.full(plant.n, -math.inf), np.full(plant.n, math.inf)
+    ranges = np.array([bounds[1:] for bounds in plant.ranges])
     return ranges[:, 0], ranges[:, 1]
 
 
@@ -230,5 +226,6 @@ def toppling(plant: Plant) -> np.ndarray:
     model = plant.load()
     hinged = model.jnt_type[joint_ids(model)] == mujoco.mjtJoint.mjJNT_HINGE
     lean = 0.1 * hinged
-    f = [plant.nominal(lean, 0.0 * lean, i, Values(**plant.parameters))[0] for i in range(plant.n)]
+    parameters = Values(**plant.parameters)
+    f = [plant.nominal(lean, 0.0 * lean, i, parameters)[0] for i in range(plant.n)]
     return hinged & (np.array(f) > 0.0)

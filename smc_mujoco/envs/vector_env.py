@@ -16,9 +16,9 @@ import numpy as np
 
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.constraints import Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.envs.episode import Setting, bounded
-from smc_mujoco.envs.gymnasium_env import TimeLimited, action_space, observation_space
+from smc_mujoco.envs.gymnasium_env import action_space, observation_space
 from smc_mujoco.envs.tasks import Pair, reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
@@ -32,10 +32,9 @@ from gymnasium.vector.utils import batch_space
 from mujoco.batch import Batch, SimulationError  # already imported with simulation.run
 
 MAX_COPIES = 1_000_000  # a larger number is a mistake
-SEEDS = 2**64
 
 
-class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
+class BatchEnv(VectorEnv):
     """Copies of one plant with one task; they are not rendered."""
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  # as gymnasium has it
@@ -61,19 +60,16 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         """
         if render_mode is not None:
             raise ScenarioError(
-                f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment"
+                f"render_mode is {shown(render_mode)}: copies are not drawn, make one environment"
             )
         self.num_envs = num_envs
         self.setting = Setting(plant, task, changes, edit=remove_scenery)
-        if (
-            smooth(self.setting.model) and not self.setting.model.nflex
-        ):  # no constraints: a tenth of MuJoCo's time
+        if smooth(self.setting.model) and not self.setting.model.nflex:
+            # no constraints: a tenth of MuJoCo's time
             self.setting.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
-        samples = self.setting.scenario.samples
-        if max_episode_steps is None:
-            self.max_samples = samples
-        else:
-            self.max_samples = min(samples, max_episode_steps)
+        self.max_samples = self.setting.scenario.samples
+        if max_episode_steps is not None:
+            self.max_samples = min(self.max_samples, max_episode_steps)
         self.single_action_space = action_space(self.setting)
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -82,12 +78,12 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         self.qpos, self.qvel, self.ctrl = (
             self.batch.bind(name) for name in ("qpos", "qvel", "ctrl")
         )
-        self.drive_states = np.zeros(
-            (2, self.num_envs, *self.setting.action_shape)
-        )  # of `DriveStep`
+        # of `DriveStep`
+        self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))
         self.randoms: list[np.random.Generator] = []
         # control samples since each episode began, and the copies whose episode has ended
-        self.samples, self.ended = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
+        self.samples = np.zeros(self.num_envs, int)
+        self.ended = np.zeros(self.num_envs, bool)
 
     def reset(
         self,
@@ -99,11 +95,21 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
 
         Options x0 and v0 hold for all copies.
         """
-        generators = self.randoms or [None] * self.num_envs
-        self.randoms = [
-            seeding.np_random(number)[0] if random is None or number is not None else random
-            for random, number in zip(generators, self._seeds(seed), strict=True)
-        ]
+        seeds: Sequence[int | None] = [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            seeds = range(seed, seed + self.num_envs)
+        elif seed is not None:
+            seeds = seed
+        if len(seeds) != self.num_envs:
+            raise ScenarioError(
+                f"seed has {len(seeds)} values: give {self.num_envs}, or one number"
+            )
+        randoms = []
+        for number, random in zip(seeds, self.randoms or seeds, strict=True):
+            if number is not None or not self.randoms:
+                random = seeding.np_random(number)[0]  # noqa: PLW2901
+            randoms.append(random)
+        self.randoms = randoms
         self.begin(np.ones(self.num_envs, bool), options)
         return self.observe(self.setting.diverged(*self.state())), self.infos(self.errors()[0])
 
@@ -117,9 +123,10 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             raise ScenarioError("no episode has begun: call reset first")
         restarts = self.ended.copy()
         commands = self.setting.command(actions, (self.num_envs,))
-        terminated = self.advance(
-            np.flatnonzero(~restarts).astype(np.int32) if restarts.any() else None, commands
-        )
+        moving = None
+        if restarts.any():
+            moving = np.flatnonzero(~restarts).astype(np.int32)
+        terminated = self.advance(moving, commands)
         self.samples += 1
         if restarts.any():
             self.begin(restarts)
@@ -142,7 +149,8 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         for i in ids:
             start = self.setting.draw_start(self.randoms[i], options)
             self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)
-        self.samples[mask], self.ended[mask] = 0, False
+        self.samples[mask] = 0
+        self.ended[mask] = False
         self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
@@ -153,15 +161,13 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states, self.qvel):
             try:
-                with mjcb.installed(
-                    None
-                ):  # a Batch refuses Python callbacks, which runs of other threads may have set
+                # a Batch refuses Python callbacks, which runs of other threads may have set
+                with mjcb.installed(None):
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
-                ids = np.setdiff1d(
-                    np.arange(self.num_envs) if ids is None else ids, error.ids
-                ).astype(np.int32)
+                moving = np.arange(self.num_envs) if ids is None else ids
+                ids = np.setdiff1d(moving, error.ids).astype(np.int32)
         return failed
 
     def observe(self, diverged: np.ndarray) -> np.ndarray:
@@ -189,19 +195,6 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities of all copies, (num_envs, n) each."""
         return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        """Return one seed for each copy."""
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            if len(seed) != self.num_envs:
-                raise ScenarioError(
-                    f"seed has {len(seed)} values for {self.num_envs} copies: give one number or all"
-                )
-            return [None if number is None else whole("seed", number, 0, SEEDS) for number in seed]
-        first = whole("seed", seed, 0, SEEDS)
-        return range(first, first + self.num_envs)
 
 
 def remove_scenery(spec: mujoco.MjSpec) -> None:

@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
-from smc_mujoco.common import gl
 
 gymnasium = pytest.importorskip(
     "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
@@ -104,13 +103,3 @@ def test_what_is_no_free_body_or_wants_copies_is_told_where_to_go():
         smc.envs.agent("geometric", FlightEnv("quadrotor"))
     with pytest.raises(smc.ScenarioError, match="task 'swing_up' is not for quadrotor"):
         FlightEnv("quadrotor", "swing_up")
-
-
-@pytest.mark.skipif(bool(gl.missing()), reason=gl.missing() or "")
-def test_a_picture_shows_the_body_where_it_is():
-    environment = FlightEnv("quadrotor", render_mode="rgb_array")
-    environment.reset(seed=0)
-    picture = environment.render()
-    environment.close()
-    assert picture is not None
-    assert np.ptp(picture) > 100
