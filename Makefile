@@ -59,8 +59,8 @@ lowest: ## the quick tests under the oldest versions that pyproject.toml allows,
 	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all]" --group test
 	.cache/lowest/bin/python -m pytest --quick
 
-entered: setup ## the one entry that differs from the commit BASE, or that of NAME, in a suite
-	@test -z "$$BASE" || git fetch --quiet --depth=1 origin "$$BASE"
+entered: setup ## the one entry that differs from the commit BASE, in a suite
+	@git fetch --quiet --depth=1 origin "$$BASE"
 	$(BIN)/python .github/entered.py
 
 tagged: ## whether TAG, such as v0.1.0, is the tag of this version

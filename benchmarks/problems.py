@@ -1,20 +1,20 @@
 """The benchmark's targets, controls and rank correlations, from runs of the catalogue.
 
     python benchmarks/problems.py measure laws visible.json
-    python benchmarks/problems.py measure controls controls.json --number random --instances 24
+    python benchmarks/problems.py measure controls controls.json --seed random --instances 24
     python benchmarks/problems.py measure controls seen.json --instances 15
     python benchmarks/problems.py freeze visible.json controls.json seen.json  # writes the targets
     into the rules
     python benchmarks/problems.py hold                     # do both controls hold on every problem of every suite?
-    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of
-    the rules? python benchmarks/problems.py measure laws hidden.json --number random
-    python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
+    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets the rules'?
+    python benchmarks/problems.py measure laws drawn.json --seed random
+    python benchmarks/problems.py agree visible.json drawn.json       # rank correlations of the boards
     python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's
 plants, `measure controls` the controls on all problems; ten minutes of processor time each. With
 `--version 2`, `measure` and `freeze` are for the rules of flight, where levels come from no law.
-`measure` and `enter` go on where they were stopped. `smc-mujoco site` shows the results of `enter`.
+`measure` and `enter` go on where they were stopped. `smc-mujoco enter --site` shows the results of `enter`.
 """
 
 import argparse
@@ -77,14 +77,14 @@ def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
     }
 
 
-def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[str]) -> None:
+def measure(kind: str, out: Path, seed: int, instances: int, names: Sequence[str]) -> None:
     """Run laws or controls on some problems, and write their measures."""
     done: dict
     if out.exists():
         done = json.loads(out.read_text())
     else:
-        done = {"number": number, "runs": {}}
-    number = done["number"]
+        done = {"seed": seed, "runs": {}}
+    seed = done["seed"]
     runs = done["runs"]
     out.write_text(json.dumps(done))
     for name in (name for name in names if name not in runs):
@@ -102,7 +102,7 @@ def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[s
             continue
         scenarios = []
         for law in laws.values():
-            for s in one.scenarios(law, range(count), number):
+            for s in one.scenarios(law, range(count), seed):
                 scenarios.append(s)
         found = [[math.nan]] * len(scenarios)
         for i, trace in stream(scenarios):
@@ -188,9 +188,11 @@ def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
     """
     rules = problems.rules(version)
     folder.mkdir(parents=True, exist_ok=True)
-    measure("laws", folder / "laws.json", "", INSTANCES, names)
-    measure("controls", folder / "controls.json", rules["frozen"]["number"], CONTROLLED, names)
-    measure("controls", folder / "seen.json", "", rules["visible"], names)
+    measure("laws", folder / "laws.json", 0, INSTANCES, names)
+    measure(
+        "controls", folder / "controls.json", int(rules["frozen"]["number"], 16), CONTROLLED, names
+    )
+    measure("controls", folder / "seen.json", 0, rules["visible"], names)
     visible, of_controls, seen = (
         read(folder / f"{kind}.json") for kind in ("laws", "controls", "seen")
     )
@@ -215,7 +217,7 @@ def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
 
 
 def margins(
-    one: problems.Problem, instances: str | Sequence[int], number: str
+    one: problems.Problem, instances: str | Sequence[int], seed: int
 ) -> tuple[float, float, int]:
     """Return by what factors both controls hold on instances of a problem, above 1 if they do, and
     their failures.
@@ -228,7 +230,7 @@ def margins(
     zero = math.inf
     failures = 0
     for control, law in one.controls.items():
-        for _, trace in stream(one.scenarios(law, instances, number)):
+        for _, trace in stream(one.scenarios(law, instances, seed)):
             values = one.measures(trace)
             reached = []
             for key, t in values.items():
@@ -245,7 +247,7 @@ def margins(
     return oracle, zero, failures
 
 
-def hold(number: str, instances: int | None) -> bool:
+def hold(seed: int, instances: int | None) -> bool:
     """Print the margins of both controls on every problem of every suite, and return whether both
     hold on all.
     """
@@ -259,7 +261,7 @@ def hold(number: str, instances: int | None) -> bool:
             count = range(min(instances, ATTACKED) if "/worst" in name else instances)
         else:
             count = "visible"
-        oracle, zero, failures = margins(one, count, number)
+        oracle, zero, failures = margins(one, count, seed)
         every.append((oracle, zero, name))
         if failures:
             failing += [f"{name}: {failures} targets"]
@@ -283,7 +285,7 @@ def hold(number: str, instances: int | None) -> bool:
     return not failing
 
 
-def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str, version: int) -> None:
+def freeze(visible: Runs, of_controls: Runs, seen: Runs, seed: int, version: int) -> None:
     """Write targets and what is left out below the mark in the rules."""
     path = problems.RULES / f"{version}.toml"
     lines = ["[targets]"]
@@ -300,9 +302,7 @@ def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str, version: i
         )
     write_suites(left_out, version)
     text = path.read_text().partition(MARK)[0] + MARK
-    head = (
-        f'[frozen]\nnumber = "{number}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
-    )
+    head = f'[frozen]\nnumber = "{seed:064x}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
     path.write_text(text + head + "\n".join(lines) + "\n")
     print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
 
@@ -350,19 +350,19 @@ def board(runs: Runs, names: Sequence[str], question: str) -> np.ndarray:
     return np.mean(ranks, axis=0)
 
 
-def agree(visible: Runs, hidden: Runs) -> None:
-    """Print the rank correlations of boards, visible with hidden, and those of smc-30 with the
+def agree(visible: Runs, drawn: Runs) -> None:
+    """Print the rank correlations of boards, visible with drawn ones, and those of smc-30 with the
     problems left out.
     """
     chosen = suite.suite("smc-30@1")
     whole = suite.suite("smc-50@1")
     others = [name for name in whole if name not in chosen]
-    print("board | visible with hidden, tau (rho) | with the problems left out, tau (rho)")
+    print("board | visible with drawn, tau (rho) | with the problems left out, tau (rho)")
     for question in BOARDS:
         mine = board(visible, chosen, question)
         cells = []
         for other in (
-            board(hidden, chosen, question),
+            board(drawn, chosen, question),
             board(visible, others, question),
         ):
             cells.append((kendalltau(mine, other)[0], spearmanr(mine, other)[0]))
@@ -385,13 +385,11 @@ def parser() -> argparse.ArgumentParser:
     measured = commands.add_parser("measure")
     measured.add_argument("kind", choices=("laws", "controls"))
     measured.add_argument("out", type=Path)
-    measured.add_argument(
-        "--number", default="", help='"random", or 64 hex digits; none for visible instances'
-    )
+    measured.add_argument("--seed", default="0", help='a number, or "random"; 0: visible instances')
     measured.add_argument("--instances", type=int, default=INSTANCES)
     for name, files in (
         ("freeze", ("visible", "controls", "seen")),
-        ("agree", ("visible", "hidden")),
+        ("agree", ("visible", "drawn")),
     ):
         command = commands.add_parser(name)
         for file in files:
@@ -399,9 +397,7 @@ def parser() -> argparse.ArgumentParser:
     for command in (measured, commands.choices["freeze"]):
         command.add_argument("--version", type=int, default=1, help="of the rules; default 1")
     held = commands.add_parser("hold")
-    held.add_argument(
-        "--number", default="", help='"random", or 64 hex digits; none for visible instances'
-    )
+    held.add_argument("--seed", default="0", help='a number, or "random"; 0: visible instances')
     held.add_argument("--instances", type=int, help="of each problem; default: all visible ones")
     repeated = commands.add_parser("repeat")
     repeated.add_argument("folder", type=Path)
@@ -412,13 +408,13 @@ def parser() -> argparse.ArgumentParser:
 
 if __name__ == "__main__":
     given = parser().parse_args()
-    if (number := getattr(given, "number", "")) == "random":
-        number = secrets.token_hex(32)
-        print(f"number {number}", file=sys.stderr)
+    seed = getattr(given, "seed", "0")
+    seed = secrets.randbits(256) if seed == "random" else int(seed)
+    print(f"seed {seed}", file=sys.stderr)
     if given.command == "measure":
-        measure(given.kind, given.out, number, given.instances, cells(given.version))
+        measure(given.kind, given.out, seed, given.instances, cells(given.version))
     elif given.command == "hold":
-        sys.exit(not hold(number, given.instances))
+        sys.exit(not hold(seed, given.instances))
     elif given.command == "repeat":
         named = given.problems or cells()
         same = []
@@ -429,9 +425,9 @@ if __name__ == "__main__":
     elif given.command == "freeze":
         controlled = read(given.controls)
         seen = read(given.seen)
-        number = json.loads(given.controls.read_text())["number"]
-        freeze(read(given.visible), controlled, seen, number, given.version)
+        seed = json.loads(given.controls.read_text())["seed"]
+        freeze(read(given.visible), controlled, seen, seed, given.version)
     elif given.command == "enter":
         enter_all(given.results)
     else:
-        agree(read(given.visible), read(given.hidden))
+        agree(read(given.visible), read(given.drawn))

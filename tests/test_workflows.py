@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -19,7 +18,6 @@ pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[1]
 ACTION = ROOT / ".github" / "actions" / "enter" / "action.yml"
-HIDDEN = ROOT / ".github" / "workflows" / "hidden.yml"
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 PAGES = ("docs/install.md", "CONTRIBUTING.md", "docs/enter.md")
 TARGETS = set(
@@ -107,11 +105,7 @@ def test_a_workflow_may_read_and_no_more(workflow):
     data = yaml.safe_load(workflow.read_text(encoding="utf-8"))
     assert data["permissions"] == {"contents": "read"}
     for job in data["jobs"].values():
-        if job == jobs(HIDDEN)["write"]:
-            more = {"contents"}
-        else:
-            more = set()
-        assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations", *more}
+        assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations"}
         for step in job["steps"]:
             if step.get("uses", "").startswith("actions/checkout"):
                 assert step["with"] == {"persist-credentials": False}
@@ -137,23 +131,13 @@ def test_a_release_has_the_tag_of_its_version():
         assert (done.returncode, f"the tag is '{tag}'" in done.stderr) == (code, code != 0)
 
 
-def test_a_stranger_s_code_meets_no_secret_that_it_could_tell_and_nothing_that_it_could_write():
-    """Pull requests get no secret; a job that may write has no checkout, so no code, and no secret
-    but its token.
-    """
+def test_a_stranger_s_code_meets_no_secret():
+    """A workflow for pull requests has none, and none runs with the rights of the repository."""
     for workflow in WORKFLOWS:
         text = workflow.read_text(encoding="utf-8")
-        events = yaml.safe_load(text)[True]
-        assert "pull_request_target" not in events
-        assert "workflow_run" not in events
-        if "pull_request" in events:
-            assert "secrets." not in text
-        for job in jobs(workflow).values():
-            uses = [step.get("uses", "").partition("@")[0] for step in job["steps"]]
-            if "contents" in job.get("permissions", {}):
-                assert uses[0] == "actions/download-artifact"
-                assert "secrets." not in yaml.safe_dump(job)
-                assert not any("make" in step.get("run", "") for step in job["steps"])
+        events = yaml.safe_load(text)[True]  # YAML 1.1 reads `on` as true
+        assert not {"pull_request_target", "workflow_run"} & {*events}
+        assert "pull_request" not in events or "secrets." not in text
 
 
 SPEC = importlib.util.spec_from_file_location("entered", ROOT / ".github" / "entered.py")
@@ -184,45 +168,6 @@ def test_a_change_brings_one_entry_and_nothing_else(paths, found, monkeypatch):
             ENTERED.changed("0" * 40)
     with pytest.raises(SystemExit, match="40 hex digits"):
         ENTERED.changed("--output=x")
-
-
-@pytest.mark.skipif(
-    not hasattr(os, "getuid") or os.getuid() != 0 or not shutil.which("unshare"),
-    reason="needs root",
-)
-def test_an_entry_runs_without_network_rights_and_environment(monkeypatch):
-    monkeypatch.setenv("TOKEN", "a secret")
-    command = ENTERED.alone(["sh", "-c", "cat /proc/net/dev /proc/self/status; env"])
-    seen = subprocess.run(
-        command[command.index("unshare") :], check=True, capture_output=True, text=True
-    ).stdout
-    assert re.findall(r"^ *(\w+):.*\d$", seen.partition("Name:")[0], re.MULTILINE) == ["lo"]
-    assert "NoNewPrivs:\t1" in seen
-    assert "a secret" not in seen
-
-
-@pytest.mark.parametrize("name", ["soft_relay", "pd_in_c", "reader"])
-def test_no_code_that_could_read_the_number_runs_beside_it(name, monkeypatch, tmp_path):
-    """A process can read the environment of those that started it: in the job with the number only
-    read laws run.
-    """
-    shutil.copytree(ROOT / "examples" / "entries", tmp_path / "entries")
-    shutil.copytree(tmp_path / "entries" / "soft_relay", tmp_path / "entries" / "reader")
-    with (tmp_path / "entries" / "reader" / "law.py").open("a", encoding="utf-8") as file:
-        file.write("\nNUMBER = open('/proc/self/environ').read()\n")
-    ran = list[list[str]]()
-    monkeypatch.setattr(
-        subprocess,
-        "run",
-        lambda command, check: (ran.append(command), SimpleNamespace(returncode=9))[1],
-    )
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NAME", name)
-    monkeypatch.setenv("NUMBER", "5d" * 32)
-    with pytest.raises(SystemExit) as ended:
-        ENTERED.main()
-    assert (ended.value.code == 9, len(ran)) == ((True, 1) if name == "soft_relay" else (False, 0))
-    assert name == "soft_relay" or "before their number is published" in str(ended.value.code)
 
 
 @pytest.mark.parametrize("against", ["", "older results.zip"])

@@ -100,7 +100,7 @@ def is_oracle(one: Law) -> bool:
 
 
 def told(scenario: Scenario) -> Scenario:
-    """Return a scenario that hands the truth to an oracle; the same scenario under any other law."""
+    """Return a scenario that hands the truth to an oracle; the same one under any other law."""
     if not is_oracle(scenario.law):
         return scenario
     if scenario.plant.pose:

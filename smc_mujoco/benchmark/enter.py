@@ -1,123 +1,96 @@
 """Enter a law in a suite: check its folder, run it, and write what it did.
 
-    results/smc-30@1/soft relay/runs.parquet    # a row a run
-    results/smc-30@1/soft relay/result.json     # the entry, hashes, versions, machine, time a sample, marks
+    results/smc-30@1/soft relay/runs.parquet  # a row a run
+    results/smc-30@1/soft relay/result.json   # the entry, failed runs, time a sample, versions
 
-The law runs in a process of its own. A first run of one instance says whether it ends at all, and
-how long all take. A law that is not checked (see `Law.checked`) runs twice, in two processes and
-opposite orders, on fewer instances. If its answers differ, it keeps something between runs.
+The law runs in another process, so that one that crashes, never ends or fills the memory ends in a
+sentence. That process is no sandbox.
 """
 
-import contextlib
 import hashlib
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from smc_mujoco.benchmark import entrant, runs, suite
 from smc_mujoco.benchmark import entry as entries
-from smc_mujoco.benchmark.problem import problem, rules
+from smc_mujoco.benchmark import runs, suite
+from smc_mujoco.benchmark.problem import Problem, problem
+from smc_mujoco.common import guard
 from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
-from smc_mujoco.common.progress import bar
 from smc_mujoco.common.version import versions
 
-TRIAL_TIME = 120.0  # s, for the first run, compilation included; chosen
-LEAST_TIME, SLACK = (
-    120.0,
-    20.0,
-)  # s for all runs, and how much longer than in the trial a run may take; chosen
-UNCHECKED_INSTANCES = (
-    5  # of each problem, for laws that are not checked: a run of theirs takes half a second
-)
-APART, CHANCE = (
-    0.1,
-    1e-3,
-)  # by how much ITAE is larger, and with which probability by chance; chosen
-TABLE, RESULT = "runs.parquet", "result.json"  # of visible instances
-HIDDEN = {TABLE: "hidden.parquet", RESULT: "hidden.json"}
+START_TIME = 120.0  # s, for imports and compilation; chosen
+RUN_TIME = 1.0  # s a run, thirty times what a compiled law takes; chosen
+FAILURES = 3  # that a result shows
+TABLE = "runs.parquet"
+RESULT = "result.json"
 
 
 @constrained
 def enter(
     folder: str | os.PathLike[str],
     name: str = "smc-30@1",
-    number: str = "",
+    seed: int = 0,
     out: Annotated[str | os.PathLike[str], FilePath()] = "results",
     instances: int | None = None,
     verify: bool = False,
-    progress: bool = False,
 ) -> Path:
     """Run an entry on a suite. Return the folder of its result.
 
     Args:
       folder: of the entry, see `entry`.
       name: of the suite.
-      number: "" for the visible instances, or the 64 hex digits from which hidden ones are drawn.
+      seed: of the instances; 0: the visible ones. A seed that is drawn when no entry can be changed
+        any more gives instances that nobody could know.
       out: folder of the results.
-      instances: of each problem; None: as many as the rules say, 5 for a law that is not checked.
+      instances: of each problem; None: as many as the rules say.
       verify: whether to write nothing, but compare the runs with those of the result that is there.
-      progress: whether to show a progress bar.
 
     Raises:
-      ScenarioError: a folder that is no entry, a law that crashes, never ends, or takes too much
-        memory; or a result that is not what the entry gives.
+      ScenarioError: a folder that is no entry; a law that crashes, never ends, or takes too much
+        memory; or, to verify, a result that is not what the entry gives.
     """
     entry = entries.read(folder)
-    problems = suite.suite(name)
-    target = Path(out) / name / slug(entry.name)
-    if (other := _entered(target)) not in ("", entry.name):
-        raise ScenarioError(
-            f"{target} is the result of {shown(other)}: give the entry another name"
-        )
-    table, result = (target / (HIDDEN[file] if number else file) for file in (TABLE, RESULT))
+    problems = [problem(cell) for cell in suite.suite(name)]
+    count = instances or problems[0].visible
+    target = Path(out) / suite.folder(name, seed) / slug(entry.name)
+    if (target / RESULT).exists():
+        other = read_json(target / RESULT)["entry"]["name"]
+        if other != entry.name:
+            raise ScenarioError(
+                f"{target} is the result of {shown(other)}: give the entry another name"
+            )
     with scratch() as temporary:
-        made = temporary / TABLE
-        first, count = _first_run(folder, problems, number, made, instances, progress)
-        order = _order(folder, problems, range(count), number, made)
-        report, marks = _all_runs(entry.name, order, first, progress)
-        content = made.read_bytes()
-        if verify:
-            with reading(table, "table of runs", "enter the law first, without verify") as file:
-                same = file.read_bytes() == content
-            if not same:
-                raise ScenarioError(
-                    f"{table} is not what {folder} gives here: enter it again, with the same versions"
-                )
-            return target
-        target.mkdir(parents=True, exist_ok=True)
-        with replacing(table) as file:
-            file.write_bytes(content)
-    if number and (target / TABLE).exists():
-        marks += _better_on_visible(runs.Runs(target / TABLE), runs.Runs(table))
+        table = temporary / TABLE
+        report = _isolated(folder, problems, count, seed, table)
+        content = table.read_bytes()
+    if verify:
+        with reading(target / TABLE, "table of runs", "enter the law first") as file:
+            same = file.read_bytes() == content
+        if not same:
+            raise ScenarioError(
+                f"{target / TABLE} is not what {folder} gives here: enter it again, with the same "
+                "versions"
+            )
+        return target
+    target.mkdir(parents=True, exist_ok=True)
+    with replacing(target / TABLE) as file:
+        file.write_bytes(content)
     about = {
         "suite": name,
-        "hidden": hashlib.sha256(number.encode()).hexdigest() if number else None,
+        "seed": seed,
         "instances": count,
         "entry": entry.about,
-        "checked": not first["why_unchecked"],
-        "marks": marks,
-        "sample": first["sample"],
-        "run": report["seconds"],
-        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(problems),
+        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(suite.suite(name)),
         "versions": versions(),
         "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
     }
-    write_json(result, about)
+    write_json(target / RESULT, about | report)
     return target
-
-
-def _entered(target: Path) -> str:
-    """Return the name of the entry whose result is in a folder; "" if there is none that can be
-    read.
-    """
-    for file in (RESULT, HIDDEN[RESULT]):
-        with contextlib.suppress(OSError, ValueError, KeyError, TypeError, ScenarioError):
-            return str(read_json(target / file)["entry"]["name"])
-    return ""
 
 
 def made_under(problems: Sequence[str]) -> dict[str, str]:
@@ -126,89 +99,61 @@ def made_under(problems: Sequence[str]) -> dict[str, str]:
     return {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 
-def _order(
+def _isolated(
     folder: str | os.PathLike[str],
-    problems: Sequence[str],
-    instances: Iterable[int],
-    number: str,
+    problems: Sequence[Problem],
+    instances: int,
+    seed: int,
     table: Path,
 ) -> dict[str, Any]:
-    """Return the order for the process of an entry, see `entrant.run_isolated`."""
-    if os.path.isdir(folder):
-        where = os.path.abspath(folder)
-    else:
-        where = str(folder)
-    runs_of = {"problems": list(problems), "instances": list(instances), "number": number}
-    return runs_of | {"folder": where, "rows": str(table), "timed": False}
+    """Run an entry in another process, which writes the table; return its report."""
+    job = {
+        "folder": os.path.abspath(folder) if os.path.isdir(folder) else str(folder),
+        "problems": [one.id for one in problems],
+        "instances": instances,
+        "seed": seed,
+        "table": str(table),
+    }
+    runs_in_all = instances * sum(one.budget for one in problems)
+    limit = START_TIME + RUN_TIME * runs_in_all
+    try:
+        return guard.run_isolated(__name__, job, limit)
+    except guard.Failed as failed:
+        if failed.fault or failed.code is not None:
+            raise ScenarioError(f"the entry failed while {failed.stage}: {failed}") from failed
+        raise ScenarioError(
+            f"the entry is not done with {failed.stage} within {limit:.0f} s: let its law end"
+        ) from failed
 
 
-def _first_run(
-    folder: str | os.PathLike[str],
-    problems: Sequence[str],
-    number: str,
-    made: Path,
-    instances: int | None,
-    progress: bool,
-) -> tuple[dict[str, Any], int]:
-    """Run one instance.
+def worker(job: Mapping[str, Any], report: Callable[[str], None]) -> dict[str, Any]:
+    """Run an entry in this process as a job says, and write its rows.
 
-    Return what is known of the law then, and how many instances of each problem it runs.
+    Return how runs failed, and the law's time a sample, see `law_time`.
     """
-    with bar("first run", shown=progress):
-        order = _order(folder, problems[:1], [0], number, made) | {"timed": True}
-        first = entrant.run_isolated(order, TRIAL_TIME)
-    as_usual = rules(problem(problems[0]).version)["visible"]
-    return first, instances or (UNCHECKED_INSTANCES if first["why_unchecked"] else as_usual)
+    from smc_mujoco.analysis.law_time import law_time
 
+    report("reading its folder")
+    entry = entries.read(job["folder"])
+    instances = range(job["instances"])
+    failures = list[str]()
 
-def _all_runs(
-    name: str, order: Mapping[str, Any], first: Mapping[str, Any], progress: bool
-) -> tuple[dict[str, Any], list[str]]:
-    """Run all instances.
+    def groups() -> Iterator[list[runs.Row]]:
+        for name in job["problems"]:
+            one = problem(name)
+            report(f"making its law for {one.plant}")
+            law = entry.law(one.plant)
+            report(f"running {name}")
+            scenarios = one.scenarios(law, instances, job["seed"])
+            yield runs.rows(one, scenarios, instances, failures)
 
-    Return the report, and the marks that stand beside the entry wherever it is ranked.
-    """
-    unchecked = first["why_unchecked"]
-    whole = len(order["problems"]) * len(order["instances"])
-    limit = LEAST_TIME + SLACK * whole * first["seconds"]
-    with bar(name, whole * (2 if unchecked else 1), progress, counted=True) as shown:
-        report = entrant.run_isolated(order, limit, lambda done: shown.reached(done, shown.whole))
-        if unchecked:
-            marks = [f"unchecked: {unchecked}"]
-        else:
-            marks = []
-        if report["failed"]:
-            marks.append(
-                f"{report['failed']} of {whole} runs fail, as {'; '.join(report['failures'])}"
-            )
-        if unchecked:
-            once = Path(order["rows"])
-            again = once.with_name(f"again {once.name}")
-            turned = {key: order[key][::-1] for key in ("problems", "instances")} | {
-                "rows": str(again)
-            }
-            entrant.run_isolated(
-                dict(order) | turned, limit, lambda done: shown.reached(whole + done, shown.whole)
-            )
-            if where := entrant.same(once, again, order["problems"]):
-                marks.append(
-                    f"it answers {where} otherwise after other runs: it keeps something between runs"
-                )
-    return report, marks
-
-
-def _better_on_visible(visible: runs.Runs, hidden: runs.Runs) -> list[str]:
-    """Return a mark if an entry is worse on hidden instances, on more problems than chance would
-    make it.
-    """
-    from scipy.stats import binomtest
-
-    shown = visible.medians()
-    kept = hidden.medians()
-    both = [name for name in shown if name in kept and shown[name]["itae"] != kept[name]["itae"]]
-    worse = sum(kept[name]["itae"] > (1.0 + APART) * shown[name]["itae"] for name in both)
-    if not both or binomtest(worse, len(both), 0.5, "greater").pvalue > CHANCE:
-        return []
-    return [
-        f"its ITAE is larger on hidden instances in {worse} of {len(both)} problems: it may know the visible ones"
-    ]
+    runs.write(Path(job["table"]), groups())
+    report("timing its law")
+    first = problem(job["problems"][0])
+    (scenario,) = first.scenarios(entry.law(first.plant), [0])
+    time = law_time(scenario)
+    return {
+        "failed": len(failures),
+        "failures": failures[:FAILURES],
+        "sample": None if time is None else list(time),
+    }

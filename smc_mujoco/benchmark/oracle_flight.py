@@ -10,7 +10,7 @@ of
 
     p'''' + 4 w (p''' - x''') + 6 w^2 (p'' - x'') + 4 w^3 (p' - x') + w^4 (p - x)       across b,
     p''' + 3 w (p'' - x'') + 3 w^2 (p' - x') + w^3 (p - x)                              along b,
-    p'' + 2 w (p' - x') + w^2 (p - x)                                                  of the heading.
+    p'' + 2 w (p' - x') + w^2 (p - x)                                              of the heading.
 
 m x''' = T' b + T b' and its derivative give T' and the angular acceleration; M and h of the plant
 then the torques. Source: D. Mellinger & V. Kumar, "Minimum snap trajectory generation and control

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from smc_mujoco.benchmark import suite
 from smc_mujoco.benchmark.results import MEASURE, TITLES, WORDS, Board, Results, sound
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
@@ -39,41 +40,31 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
     Raises:
       ScenarioError: no results there, or a folder that cannot be written.
     """
-    suites, refused = sound(results, hidden=False)
+    suites, refused = sound(results)
     if not suites:
-        if refused:
-            why = str(refused[0])
-        else:
-            why = "enter a law first, with smc-mujoco enter FOLDER"
+        why = str(refused[0]) if refused else "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
-    kept, refused_hidden = sound(results, hidden=True)
-    hidden = {found.suite: found for found in kept}
     made = _environment()
-    left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused + refused_hidden]
+    left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused]
     for found in suites:
-        values = {"hidden": hidden.get(found.suite), "up": "", "title": found.suite}
-        _write(out / f"{found.suite}.html", made, "suite.jinja", found=found, **values)
+        folder = suite.folder(found.suite, found.seed)
+        page = {"found": found, "folder": folder}
+        _write(out / f"{folder}.html", made, "suite.jinja", page, title=found.title, up="")
         for name in found.entries:
-            page = out / found.suite / f"{slug(name)}.html"
-            _write(page, made, "entry.jinja", found=found, name=name, up="../", title=name)
-    _write(
-        out / "index.html",
-        made,
-        "index.jinja",
-        suites=suites,
-        left_out=left_out,
-        up="",
-        title="Results",
-    )
+            file = out / folder / f"{slug(name)}.html"
+            _write(file, made, "entry.jinja", page, name=name, title=name, up="../")
+    index = {"suites": suites, "left_out": left_out}
+    _write(out / "index.html", made, "index.jinja", index, title="Results", up="")
     return out / "index.html", left_out
 
 
-def _write(path: Path, made: "Environment", template: str, **values: Any) -> None:
+def _write(
+    path: Path, made: "Environment", template: str, values: Mapping[str, Any], **more: Any
+) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
+    page = made.get_template(template).render(values, **more)
     with replacing(path) as file:
-        file.write_text(
-            made.get_template(template).render(values), encoding="utf-8", errors="replace"
-        )
+        file.write_text(page, encoding="utf-8", errors="replace")
 
 
 def _environment() -> "Environment":
@@ -92,6 +83,7 @@ def _environment() -> "Environment":
         "extremes": extremes,
         "number": number,
         "slug": slug,
+        "folder_of": suite.folder,
         "curve": CURVE,
     }
     return made
@@ -118,17 +110,11 @@ def extremes(found: Results, name: str) -> Mapping[str, list[tuple[str, str, int
     entries, median.
     """
     names = list(found.entries)
+    medians = found.entries[name].medians
     rows = []
     for question in found.boards():
         ranks = found.ranks(question, names)[names.index(name)]
         for cell, rank in zip(found.on(question), ranks, strict=True):
-            rows.append(
-                (
-                    question,
-                    cell,
-                    int(np.ceil(rank)),
-                    found.entries[name].medians[cell][MEASURE[question]],
-                )
-            )
+            rows.append((question, cell, int(np.ceil(rank)), medians[cell][MEASURE[question]]))
     rows.sort(key=lambda row: row[2])
     return {"best": rows[:SHOWN], "worst": rows[::-1][:SHOWN]}

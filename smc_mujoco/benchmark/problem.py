@@ -5,8 +5,8 @@
     print([problem.measures(trace) for trace in traces])
 
 An ID is plant/condition@version. The version's rules, `rules/VERSION.toml`, have the duration, the
-bound on u, the ranges and the order of the draws, and the targets. Visible instances are drawn from
-the ID alone, hidden ones from the ID and a number of 256 bits that is told later.
+bound on u, the ranges and the order of the draws, and the targets. Instances are drawn from the ID
+and a seed; those of the seed 0 are the visible ones.
 """
 
 import dataclasses
@@ -36,12 +36,11 @@ from smc_mujoco.simulation.trace import Trace
 
 RULES = Path(__file__).parent / "rules"
 ID = re.compile(r"(\w+)/(\w+)@(\d+)")
-NUMBER = re.compile(r"[0-9a-f]{64}|")
+MAX_SEED = 2**256 - 1
 DRAWS = 8  # of an instance, see the rules
 STEP = 4096  # of the generator's counter from one instance to the next
 MAX_INSTANCE = 10**9  # chosen
 MEASURES = "accuracy", "settling", "calm"  # that have targets
-FACTORS = "mass", "disturbance"
 SIZES = "sigma", "amplitude", "x", "y", "z", "w20"  # fields of a disturbance that scale it
 
 
@@ -104,6 +103,16 @@ class Problem:
         return self._values["duration"]
 
     @property
+    def visible(self) -> int:
+        """Number of visible instances."""
+        return self._values["visible"]
+
+    @property
+    def budget(self) -> int:
+        """How many runs an instance takes: 1, or those of the adversary's search."""
+        return self._values["budget"] if self._attacked else 1
+
+    @property
     def oracles(self) -> tuple[tuple[float, float], ...]:
         """The bandwidths, rad/s, and shares, or times of its move, from which the oracle's are
         chosen.
@@ -128,31 +137,25 @@ class Problem:
             "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"]),
         }
 
-    def instance(self, index: int, number: str = "") -> Instance:
-        """Return what an instance has drawn; `number` as in `scenarios`."""
-        key = hashlib.sha256(f"{self.id}{_number(number)}".encode()).digest()[:16]
+    def instance(self, index: int, seed: int = 0) -> Instance:
+        """Return what an instance has drawn; `seed` as in `scenarios`."""
+        seed = whole("the seed of the instances", seed, 0, MAX_SEED)
+        number = f"{seed:064x}" if seed else ""  # NUMBER of the rules
+        key = int.from_bytes(hashlib.sha256(f"{self.id}{number}".encode()).digest()[:16])
         index = whole("an instance", index, 0, MAX_INSTANCE)
-        words = (
-            np.random.Philox(key=int.from_bytes(key), counter=STEP * index)
-            .random_raw(DRAWS)
-            .tolist()
-        )
+        words = np.random.Philox(key=key, counter=STEP * index).random_raw(DRAWS).tolist()
         u = [(word >> 11) * 2.0**-53 for word in words]
-        of = self._values
-        start, mass, disturbance = (
-            low + (high - low) * u[i]
-            for i, (low, high) in enumerate((of[name] for name in ("start", *FACTORS)), 1)
-        )
-        side = -1.0 if u[0] < 0.5 else 1.0
-        return Instance(
-            side=side, start=start, mass=mass, disturbance=disturbance, seed=words[4] % 2**52
-        )
+        factors = {}
+        for i, name in enumerate(("start", "mass", "disturbance"), 1):
+            low, high = self._values[name]
+            factors[name] = low + (high - low) * u[i]
+        return Instance(side=-1.0 if u[0] < 0.5 else 1.0, **factors, seed=words[4] % 2**52)
 
     def scenarios(
         self,
         law: str | Law | Template,
         instances: str | Iterable[int] = "visible",
-        number: str = "",
+        seed: int = 0,
     ) -> tuple[Scenario, ...]:
         """Return the scenarios of a law, one for each instance.
 
@@ -160,36 +163,29 @@ class Problem:
           law: a name, which gets its best shipped gains for the plant if there are some, or a law
             with its own gains.
           instances: "visible", the first of the rules' number of them, or the instances themselves.
-          number: "" for visible instances, or the 64 hex digits from which hidden ones are drawn.
+          seed: from which instances are drawn; 0: the visible ones.
 
         Raises:
-          ScenarioError: instances or a number that do not exist, or a law that the plant cannot
-            have.
+          ScenarioError: instances or a seed that do not exist, or a law that the plant cannot have.
         """
         if isinstance(instances, str):
             find("kind of instances", instances, {"visible": None})
-            instances = range(self._values["visible"])
+            instances = range(self.visible)
         base = self._base(law)
-        return tuple(
-            self._place(base, self.instance(i, number)) for i in items_of("instances", instances)
-        )
+        indices = items_of("instances", instances)
+        return tuple(self._place(base, self.instance(index, seed)) for index in indices)
 
     def _base(self, law: str | Law | Template) -> Scenario:
         """Return the scenario before anything is drawn."""
         if isinstance(law, str) and law in known_laws():
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
-            if shipped:
-                law = gain_sets.law(self.plant, law)
-            else:
-                law = gain_sets.law(self.plant, law, "default")
+            law = gain_sets.law(self.plant, law, "tuned" if shipped else "default")
         changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
-        text = self._values.get("texts", {}).get(self.condition, "")
+        condition = self.condition
         if self._attacked:
             condition = "nominal"
-        elif text:
-            condition = f"{self.condition}: {text}"
-        else:
-            condition = self.condition
+        elif text := self._values.get("texts", {}).get(condition):
+            condition = f"{condition}: {text}"
         return case(
             self.plant, law, condition, self.duration, starts=Starts(spread=0.0), changes=changes
         )
@@ -197,27 +193,24 @@ class Problem:
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
         """Return the scenario of an instance."""
         plant = base.plant
-        resolved = base.resolved
         force = drawn.disturbance * self._values.get("scale", 1.0)
         mismatch = {}
         for name, value in base.mismatch.items():
             mismatch[name] = value * (force if name in plant.added else 1.0)
         mismatch["mass"] = drawn.mass * mismatch.pop("mass", mismatch.pop(plant.mass, 1.0))
-        rest = (
-            plant.rest or (-0.0,) * plant.n
-        )  # to which a number is added without a change of a bit
+        # a number is added to -0.0 without a change of a bit
+        rest = plant.rest or (-0.0,) * plant.n
+        x0 = []
+        for place, origin in zip(base.resolved.x0, rest, strict=True):
+            x0.append(origin + drawn.side * drawn.start * (place - origin))
+        disturbance = [_scaled(signal, force) for signal in base.disturbance]
         scenario = dataclasses.replace(
-            base,
-            x0=[
-                r + drawn.side * drawn.start * (x - r)
-                for x, r in zip(resolved.x0, rest, strict=True)
-            ],
-            mismatch=mismatch,
-            disturbance=[_scaled(signal, force) for signal in base.disturbance],
-            seed=drawn.seed,
+            base, x0=x0, mismatch=mismatch, disturbance=disturbance, seed=drawn.seed
         )
         scenario = controls.told(scenario)
-        return (self._worst(scenario) if self._attacked else scenario).named(self.condition)
+        if self._attacked:
+            scenario = self._worst(scenario)
+        return scenario.named(self.condition)
 
     def _worst(self, scenario: Scenario) -> Scenario:
         """Return the worst run that an adversary finds for the scenario's law."""
@@ -225,11 +218,8 @@ class Problem:
         from smc_mujoco.studies.worst_case import worst_case
 
         within = Uncertainty(**self._values["conditions"][self.condition])
-        return controls.told(
-            worst_case(
-                scenario, within=within, budget=self._values["budget"], seed=scenario.seed
-            ).scenario
-        )
+        found = worst_case(scenario, within=within, budget=self.budget, seed=scenario.seed)
+        return controls.told(found.scenario)
 
     def measures(self, trace: Trace) -> dict[str, float]:
         """Return the measures of a run, and the time from which each target is reached and kept, s
@@ -242,10 +232,8 @@ class Problem:
         the error does.
         """
         if trace.failure is not None or trace.diverged_at is not None:
-            values = {"failed": 1.0} | dict.fromkeys(
-                ("accuracy", "itae", "settling", "calm"), math.inf
-            )
-            return values | dict.fromkeys(self._names(), math.nan)
+            values = dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
+            return {"failed": 1.0} | values | dict.fromkeys(self._names(), math.nan)
         groups = conventions.by_group(trace).values()
         relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
@@ -253,17 +241,16 @@ class Problem:
         plant = trace.scenario.plant
         if plant.pose:
             bounds = mixer(plant)[:, -1]
+            commands = trace.applied  # of the rotors
         else:
             bounds = np.array(trace.scenario.limits[: plant.driven])
-        commands = (trace.applied if plant.pose else trace.u)[
-            :, : len(bounds)
-        ]  # of a free body, of its actuators
-        variation = np.abs(np.diff(commands, axis=0)).sum(axis=0) / bounds
+            commands = trace.u
+        steps = np.abs(np.diff(commands[:, : len(bounds)], axis=0))
+        variation = steps.sum(axis=0) / bounds
+        last = float(worst[conventions.last_part(trace)].max())
         values = {
             "failed": 0.0,
-            "accuracy": max(
-                float(worst[conventions.last_part(trace)].max()), self._values["floor"]
-            ),
+            "accuracy": max(last, self._values["floor"]),
             "itae": float(np.trapezoid(trace.t * total, trace.t)),
             "settling": _kept(trace, worst, conventions.SETTLING_BAND),
             "calm": float(variation.max() / self.duration),
@@ -282,17 +269,15 @@ class Problem:
         }
         for measure, time in counted.items():
             for i, level in enumerate(self.targets.get(measure, ()), 1):
-                if values[measure] <= level:
-                    times[f"{measure}_{i}"] = time
-                else:
-                    times[f"{measure}_{i}"] = math.nan
+                times[f"{measure}_{i}"] = time if values[measure] <= level else math.nan
         return times
 
     def _names(self) -> list[str]:
         """List the names of the targets' times."""
-        return [
-            f"{name}_{i}" for name in MEASURES for i, _ in enumerate(self.targets.get(name, ()), 1)
-        ]
+        names = []
+        for measure in MEASURES:
+            names += [f"{measure}_{i}" for i, _ in enumerate(self.targets.get(measure, ()), 1)]
+        return names
 
 
 def problem(name: str) -> Problem:
@@ -301,10 +286,7 @@ def problem(name: str) -> Problem:
     Raises:
       ScenarioError: a text that is no such name, or an unknown version, plant or condition.
     """
-    if isinstance(name, str):
-        parts = ID.fullmatch(name)
-    else:
-        parts = None
+    parts = ID.fullmatch(name) if isinstance(name, str) else None
     if parts is None:
         raise ScenarioError(
             f"problem {shown(name)} is no plant/condition@version: write it as duffing/noise@1"
@@ -312,10 +294,12 @@ def problem(name: str) -> Problem:
     plant, condition, version = parts.groups()
     find("version of the rules", version, dict.fromkeys(versions()))
     of = rules(int(version))
-    known = dict.fromkeys(cells(int(version)))
-    find("plant of the problems", plant, dict.fromkeys(cell.partition("/")[0] for cell in known))
-    conditions = [cell.partition("/")[2] for cell in known if cell.startswith(f"{plant}/")]
-    find(f"condition of problems of {plant}", condition, dict.fromkeys(conditions))
+    conditions: dict[str, dict[str, None]] = {}
+    for cell in cells(int(version)):
+        of_plant, _, of_condition = cell.partition("/")
+        conditions.setdefault(of_plant, {})[of_condition] = None
+    find("plant of the problems", plant, conditions)
+    find(f"condition of problems of {plant}", condition, conditions[plant])
     if f"{plant}/{condition}" in of.get("frozen", {}).get("left_out", ()):
         raise ScenarioError(
             f"problem {name!r} is left out by rule, as a control forbids it: choose another"
@@ -329,12 +313,15 @@ def cells(version: int) -> list[str]:
     """List every plant/condition of the rules, also those that are left out."""
     of = rules(version)
     plants = of.get("plants", [])
-    each = [*((plant, of) for plant in plants), *of["more"].items()]
-    of_each = []
-    for plant, fields in each:
-        for condition in fields["conditions"]:
-            of_each.append(f"{plant}/{condition}")
-    return of_each + [f"{plant}/{condition}" for plant in plants for condition in _attacks(version)]
+    conditions = dict.fromkeys(plants, of.get("conditions", ()))
+    for plant, fields in of["more"].items():
+        conditions[plant] = fields["conditions"]
+    listed = []
+    for plant, of_plant in conditions.items():
+        listed += [f"{plant}/{condition}" for condition in of_plant]
+    for plant in plants:
+        listed += [f"{plant}/{condition}" for condition in _attacks(version)]
+    return listed
 
 
 def _attacks(version: int) -> Mapping[str, Any]:
@@ -358,19 +345,13 @@ def rules(version: int) -> Mapping[str, Any]:
     return tomllib.loads(_text(version))
 
 
-def _number(number: object) -> str:
-    """Return the number of hidden instances, or ""."""
-    if not isinstance(number, str) or not NUMBER.fullmatch(number):
-        raise ScenarioError(
-            f"the number of hidden instances is {shown(number)}: give 64 hex digits, 0-9 and a-f"
-        )
-    return number
-
-
 def _scaled(signal: Any, factor: float) -> Any:
     """Return a disturbance times a factor."""
-    sizes = [field.name for field in dataclasses.fields(signal) if field.name in SIZES]
-    return dataclasses.replace(signal, **{name: factor * getattr(signal, name) for name in sizes})
+    sizes = {}
+    for field in dataclasses.fields(signal):
+        if field.name in SIZES:
+            sizes[field.name] = factor * getattr(signal, field.name)
+    return dataclasses.replace(signal, **sizes)
 
 
 def _kept(trace: Trace, error: np.ndarray, level: float) -> float:

@@ -7,8 +7,7 @@ compared.
 
 There is no single number. A board is a question: accuracy under forces, accuracy under sensors,
 speed, calm. An entry has the mean rank of its medians over the board's problems, with an interval
-over problems, and the share of the targets that it reaches and keeps. On hidden instances only
-checked laws have places.
+over problems, and the share of the targets that it reaches and keeps.
 """
 
 import dataclasses
@@ -25,17 +24,12 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.benchmark import enter, runs, suite
-from smc_mujoco.benchmark.enter import HIDDEN, RESULT, TABLE
+from smc_mujoco.benchmark.enter import RESULT, TABLE
 from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
 
-MEASURE = {
-    "forces": "accuracy",
-    "sensors": "accuracy",
-    "speed": "settling",
-    "calm": "calm",
-}  # of each board
+MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 TITLES = {
     "forces": "Accuracy under forces",
     "sensors": "Accuracy under sensors",
@@ -47,30 +41,36 @@ WORDS = {
     "settling": "settling time",
     "calm": "variation of u",
 }
-DRAWS, LEVEL = 4000, 90.0  # resamples of the problems; %, of the intervals
+DRAWS = 4000  # resamples of the problems
+LEVEL = 90.0  # %, of the intervals
 CHANGE = 0.01  # a median that changes by less counts as the same; chosen
 MOMENTS = 81  # of a curve of targets
-MAX_UNPACKED = 4 * 10**9  # bytes of an archive; chosen
 CURE = "enter the law again"
-ABOUT: dict[str, Any] = {  # what a result says, and of which type
+ABOUT = {  # what a result has, and of which type
     "suite": str,
+    "seed": int,
     "instances": int,
     "entry": dict,
-    "checked": bool,
-    "marks": list,
+    "failed": int,
+    "failures": list,
     "sample": list | NoneType,
     "hashes": dict,
     "versions": dict,
     "machine": str,
 }
-OF_ENTRY: dict[str, Any] = dict.fromkeys(
-    ("name", "source", "licence", "division", "digest"), str
-) | {"authors": list}
-HASHES: dict[str, Any] = dict.fromkeys(("table", "rules", "suite"), str)
+OF_ENTRY = {
+    "name": str,
+    "authors": list,
+    "source": str,
+    "licence": str,
+    "division": str,
+    "digest": str,
+}
+HASHES = {"table": str, "rules": str, "suite": str}
 
 
 def _check(values: Any, fields: Mapping[str, Any]) -> None:
-    """Raise ScenarioError if values are no mapping with a value of the right type for each field."""
+    """Raise ScenarioError unless values are a mapping with fields of these types."""
     if not isinstance(values, dict):
         raise ScenarioError(f"it has {shown(values)} where names and values are")
     for name, kind in fields.items():
@@ -83,9 +83,7 @@ class Standing:
     """The place of an entry on a board."""
 
     entry: str
-    place: (
-        int | None
-    )  # None: beside the others, as its law is not checked and the instances are hidden
+    place: int
     rank: float  # the mean over the problems, 1 is best
     low: float  # ends of the interval over problems
     high: float
@@ -102,41 +100,36 @@ class Board:
     standings: tuple[Standing, ...]
 
     def __str__(self) -> str:
-        head = f"{TITLES[self.question]}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"
-        lines = []
+        title = TITLES[self.question]
+        lines = [f"{title}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"]
         for one in self.standings:
-            lines.append(
-                f"{one.place or '-':>3} {one.entry:<28} {one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}] "
-                f"{100 * one.reached:4.0f} %{' level' if one.level and one.place != 1 else ''}"
-            )
-        return "\n".join([head, *lines])
+            rank = f"{one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}]"
+            level = " level" if one.level and one.place > 1 else ""
+            lines.append(f"{one.place:>3} {one.entry:<28} {rank} {100 * one.reached:4.0f} %{level}")
+        return "\n".join(lines)
 
 
 class Result:
     """What an entry did. Its runs are read when they are asked for."""
 
-    def __init__(self, folder: Path, hidden: bool):
+    def __init__(self, folder: Path):
         self.folder = folder
-        self.hidden = hidden
-        self.table = folder / (HIDDEN[TABLE] if hidden else TABLE)
-        with reading(folder / (HIDDEN[RESULT] if hidden else RESULT), "result", CURE) as file:
+        self.table = folder / TABLE
+        with reading(folder / RESULT, "result", CURE) as file:
             self.about: dict[str, Any] = read_json(file)
             _check(self.about, ABOUT)
             _check(self.about["entry"], OF_ENTRY)
             _check(self.about["hashes"], HASHES)
-            if (sample := self.about["sample"]) is not None and [*map(type, sample)] != [float] * 3:
-                raise ScenarioError(f"its sample is {shown(sample)}")
+            if slug(self.name) != folder.name:
+                raise ScenarioError(f"it is the result of {shown(self.name)}, in another's folder")
             self.problems = suite.suite(self.about["suite"])
             for what, digest in enter.made_under(self.problems).items():
                 if digest != self.about["hashes"][what]:
                     raise ScenarioError(f"it is of another {what} than {self.about['suite']} here")
         with reading(self.table, "table of runs", CURE) as file:
             digest = hashlib.sha256(file.read_bytes()).hexdigest()
-        if digest != self.about["hashes"]["table"]:
-            raise ScenarioError(
-                f"{self.table} is not the table that its result was written for: {CURE}"
-            )
-        with reading(self.table, "table of runs", CURE):
+            if digest != self.about["hashes"]["table"]:
+                raise ScenarioError("it is not the table that its result was written for")
             self.runs.check(self.problems, self.about["instances"])
 
     @property
@@ -151,51 +144,44 @@ class Result:
 
     @functools.cached_property
     def medians(self) -> dict[str, dict[str, float]]:
-        """Problem -> measure -> the median over its instances; calm counts where the easiest
-        accuracy is kept.
-        """
+        """Problem -> measure -> the median over its instances, see `Runs.medians`."""
         return self.runs.medians()
 
     def targets(self, problems: Sequence[str], measure: str) -> np.ndarray:
         """Return the times from which the targets of a measure are reached and kept, s, inf for
         never, (targets,).
         """
-        times = []
+        times = [np.zeros(0)]
         for name in problems:
             columns = self.runs.columns(name)
-            times += [
-                columns[f"{measure}_{i}"]
-                for i, _ in enumerate(problem(name).targets.get(measure, ()), 1)
-            ]
-        if times:
-            return np.nan_to_num(np.concatenate(times), nan=np.inf)
-        return np.zeros(0)
+            levels = problem(name).targets.get(measure, ())
+            times += [columns[f"{measure}_{i}"] for i, _ in enumerate(levels, 1)]
+        return np.nan_to_num(np.concatenate(times), nan=np.inf)
 
 
 class Results:
-    """What entries did on a suite."""
+    """What entries did on a suite, on the instances of a seed."""
 
-    def __init__(self, name: str, entries: Mapping[str, Result], hidden: bool):
+    def __init__(self, name: str, seed: int, entries: Mapping[str, Result]):
         self.suite = name
+        self.seed = seed
         self.entries = dict(entries)
-        self.hidden = hidden
         self.problems = suite.suite(name)
-        informed = {cell: suite.boards(cell) for cell in self.problems}
-        self._informing = {
-            question: tuple(c for c in informed if question in informed[c]) for question in MEASURE
-        }
-        self._boards, self._curves = (
-            dict[str, Board](),
-            dict[tuple[str, str], np.ndarray](),
-        )  # that were asked for
+        self._informing: dict[str, list[str]] = {question: [] for question in MEASURE}
+        for cell in self.problems:
+            for question in suite.boards(cell):
+                self._informing[question].append(cell)
+        self._boards: dict[str, Board] = {}
 
     def __repr__(self) -> str:
-        return (
-            f"results of {len(self.entries)} entries on {self.suite}"
-            + ", hidden instances" * self.hidden
-        )
+        return f"results of {len(self.entries)} entries on {self.title}"
 
-    def on(self, question: str) -> tuple[str, ...]:
+    @property
+    def title(self) -> str:
+        """The suite, and the seed unless that is 0."""
+        return f"{self.suite}, seed {self.seed}" if self.seed else self.suite
+
+    def on(self, question: str) -> list[str]:
         """Return the problems that inform a board."""
         return self._informing[question]
 
@@ -205,11 +191,10 @@ class Results:
         """
         from scipy.stats import rankdata
 
-        measure = MEASURE[question]
-        medians = [
-            [self.entries[name].medians[cell][measure] for cell in self.on(question)]
-            for name in names
-        ]
+        medians = []
+        for name in names:
+            of_entry = self.entries[name].medians
+            medians.append([of_entry[cell][MEASURE[question]] for cell in self.on(question)])
         return rankdata(np.array(medians), axis=0)
 
     def boards(self) -> dict[str, Board]:
@@ -217,29 +202,15 @@ class Results:
         return {question: self.board(question) for question in MEASURE if self.on(question)}
 
     def board(self, question: str) -> Board:
-        """Return the board of a question."""
+        """Return the board of a question, the best entry first."""
         find("board", question, MEASURE)
         if question not in self._boards:
-            self._boards[question] = self._made(question)
-        return self._boards[question]
-
-    def _made(self, question: str) -> Board:
-        """Return the board of a question, from the runs."""
-        ranked = [
-            name for name, one in self.entries.items() if one.about["checked"] or not self.hidden
-        ]
-        beside = [name for name in self.entries if name not in ranked]
-        if ranked:
-            standings = self._places(question, ranked)
-        else:
-            standings = []
-        for name in beside:
-            rank = float(self.ranks(question, [*ranked, name])[-1].mean())
-            place = {"place": None, "low": np.nan, "high": np.nan, "level": False}
-            standings.append(
-                Standing(entry=name, rank=rank, reached=self.reached(name, question), **place)
+            standings = tuple(self._places(question, list(self.entries)))
+            problems = tuple(self.on(question))
+            self._boards[question] = Board(
+                question=question, problems=problems, standings=standings
             )
-        return Board(question=question, problems=self.on(question), standings=tuple(standings))
+        return self._boards[question]
 
     def _places(self, question: str, names: Sequence[str]) -> list[Standing]:
         """Return the places of entries on a board, the best first."""
@@ -248,57 +219,60 @@ class Results:
         means = ranks.mean(axis=1)
         draws = np.random.default_rng(0).integers(count, size=(DRAWS, count))
         drawn = ranks[:, draws].mean(axis=2)  # (entries, DRAWS)
-        order = np.argsort(means, kind="stable")
+        order = np.argsort(means, kind="stable").tolist()
         tails = (50.0 - LEVEL / 2, 50.0 + LEVEL / 2)
         standings = []
-        for i in order.tolist():
+        for i in order:
             low, high = np.percentile(drawn[i], tails).tolist()
+            behind = drawn[i] - drawn[order[0]]
             standings.append(
                 Standing(
-                    entry=str(names[i]),
+                    entry=names[i],
                     place=1 + int((means < means[i] - 1e-9).sum()),
                     rank=float(means[i]),
                     low=low,
                     high=high,
-                    level=bool(np.percentile(drawn[i] - drawn[order[0]], tails[0]) <= 0.0),
-                    reached=self.reached(str(names[i]), question),
+                    level=bool(np.percentile(behind, tails[0]) <= 0.0),
+                    reached=float(self.curve(names[i], question)[1][-1]),
                 )
             )
         return standings
 
-    def reached(self, entry: str, question: str) -> float:
-        """Return the share of a board's targets that an entry reaches and keeps, over all runs."""
-        return float(self.curve(entry, question)[1][-1])
-
+    @functools.cache  # noqa: B019 (results live as long as their process)
     def curve(self, entry: str, question: str) -> tuple[np.ndarray, np.ndarray]:
         """Return times, s, and the share of a board's targets that are reached by then and kept,
         (MOMENTS,) each.
         """
         moments = np.linspace(0.0, problem(self.problems[0]).duration, MOMENTS)
-        if (entry, question) not in self._curves:
-            times = np.sort(self.entries[entry].targets(self.on(question), MEASURE[question]))
-            self._curves[entry, question] = np.searchsorted(times, moments, side="right") / max(
-                len(times), 1
-            )
-        return moments, self._curves[entry, question]
+        times = np.sort(self.entries[entry].targets(self.on(question), MEASURE[question]))
+        return moments, np.searchsorted(times, moments, side="right") / max(len(times), 1)
 
     def compare(self, other: "Results") -> "Changes":
         """Return what changed from other results on the suite to these, of the entries that both
         have.
         """
-        if other.suite != self.suite:
+        if other.title != self.title:
             raise ScenarioError(
-                f"these are results on {self.suite}, the others on {other.suite}: give the same suite"
+                f"these are results on {self.title}, the others on {other.title}: give the same"
             )
-        both = [name for name in self.entries if name in other.entries]
-        return Changes(
-            changes=tuple(
-                _change(self, other, name, question)
-                for name in both
-                for question in MEASURE
-                if self.on(question)
-            )
-        )
+        changes = []
+        for name in self.entries:
+            if name in other.entries:
+                for question in self.boards():
+                    changes.append(self._change(other, name, question))
+        return Changes(changes=tuple(changes))
+
+    def _change(self, old: "Results", name: str, question: str) -> "Change":
+        """Return how an entry changed on a board."""
+        ratios = {}
+        for cell in self.on(question):
+            now = self.entries[name].medians[cell][MEASURE[question]]
+            before = old.entries[name].medians[cell][MEASURE[question]]
+            if now == before:
+                ratios[cell] = 1.0
+            else:
+                ratios[cell] = now / before if before else np.inf
+        return Change(entry=name, question=question, ratios=ratios)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -309,22 +283,25 @@ class Change:
 
     entry: str
     question: str
-    worse: Mapping[str, float]
-    better: Mapping[str, float]
-    count: int  # problems of the board
+    ratios: Mapping[str, float]
+
+    @property
+    def worse(self) -> list[str]:
+        """The problems on which the median became larger."""
+        return [cell for cell, ratio in self.ratios.items() if ratio > 1.0 + CHANGE]
+
+    @property
+    def better(self) -> list[str]:
+        """The problems on which the median became smaller."""
+        return [cell for cell, ratio in self.ratios.items() if ratio < 1.0 / (1.0 + CHANGE)]
 
     def __str__(self) -> str:
-        told = []
-        for word, found, pick in (("worse", self.worse, max), ("better", self.better, min)):
-            if found:
-                where = pick(found, key=found.__getitem__)
-                ratio = found[where]
-                if ratio >= 2.0:
-                    amount = f"{ratio:.3g} times"
-                else:
-                    amount = f"{100 * abs(ratio - 1):.2g} %"
-                told.append(f"{word} on {len(found)} of {self.count}, by up to {amount} ({where})")
-        return f"{self.entry}, {TITLES[self.question].lower()}: {'; '.join(told) or 'the same'}"
+        line = f"{self.entry}, {TITLES[self.question].lower()}: {len(self.worse)} worse, "
+        line += f"{len(self.better)} better, of {len(self.ratios)}"
+        if self.worse:
+            cell = max(self.ratios, key=self.ratios.__getitem__)
+            line += f"; at most {self.ratios[cell]:.3g} times, in {cell}"
+        return line
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -342,80 +319,53 @@ class Changes:
         return "\n".join(map(str, self.changes)) or "no entry is in both"
 
 
-def _change(new: Results, old: Results, name: str, question: str) -> Change:
-    """Return how an entry changed on a board."""
-    measure = MEASURE[question]
-    ratios = {}
-    for cell in new.on(question):
-        now, before = (one.entries[name].medians[cell][measure] for one in (new, old))
-        if now == before:
-            ratios[cell] = 1.0
-        else:
-            ratios[cell] = now / before if before else np.inf
-    worse = {cell: ratio for cell, ratio in ratios.items() if ratio > 1.0 + CHANGE}
-    better = {cell: ratio for cell, ratio in ratios.items() if ratio < 1.0 / (1.0 + CHANGE)}
-    return Change(entry=name, question=question, worse=worse, better=better, count=len(ratios))
-
-
-def results(source: str | os.PathLike[str] = "smc-30@1", hidden: bool = False) -> Results:
+def results(source: str | os.PathLike[str] = "smc-30@1", seed: int = 0) -> Results:
     """Return the results on a suite.
 
     Args:
       source: a suite's name, whose results are in the folder "results"; or the folder of a suite's
         results, such as "results/smc-30@1"; or a .zip of such a folder.
-      hidden: whether those on hidden instances, in place of the visible ones.
+      seed: of the instances, if a suite's name is given.
 
     Raises:
-      ScenarioError: no results there, results on several suites, or a table that was changed since
-        it was written.
+      ScenarioError: no results there, results on several suites or seeds, or a table that was
+        changed since it was written.
     """
     if source in suite.suites():
-        path = Path("results") / source
+        path = Path("results") / suite.folder(str(source), seed)
     else:
         path = as_path(source)
-    found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path, hidden)
+    found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path)
     if refused:
         raise refused[0]
-    if not found:
+    if len(found) != 1:
+        several = " and ".join(one.title for one in found) or "none"
         raise ScenarioError(
-            f"no results at {shown(str(path))}: enter a law first, with smc-mujoco enter FOLDER"
+            f"{shown(str(path))} has results on {several}: give a folder of one suite and seed, "
+            "which smc-mujoco enter FOLDER writes"
         )
-    if len(found) > 1:
-        names = " and ".join(one.suite for one in found)
-        raise ScenarioError(f"{shown(str(path))} has results on {names}: give a folder of one")
     return found[0]
 
 
-def sound(folder: Path, hidden: bool) -> tuple[list[Results], list[ScenarioError]]:
-    """Return the results in a folder, by suite, and why others are left out.
-
-    Names that share a folder's name are one: the result stands that is in the folder of its name.
-    """
-    wanted = HIDDEN[RESULT] if hidden else RESULT
-    of_suite = dict[str, dict[str, Result]]()
+def sound(folder: Path) -> tuple[list[Results], list[ScenarioError]]:
+    """Return the results in a folder, by suite and seed, and why others are left out."""
+    places = [Path(place) for place, _, files in os.walk(folder) if RESULT in files]
     refused = []
-    for place in sorted(
-        Path(place) for place, _, files in os.walk(folder) if wanted in files
-    ):  # skips what vanishes
+    entries: dict[tuple[str, int], dict[str, Result]] = {}
+    for place in sorted(places):
         try:
-            one = Result(place, hidden)
+            one = Result(place)
         except ScenarioError as error:
             refused.append(error)
             continue
-        its = of_suite.setdefault(one.about["suite"], {})
-        first = its.setdefault(slug(one.name), one)
-        if first is one:
-            continue
-        if one.folder.name == slug(one.name):
-            its[slug(one.name)], one = one, first
-        refused.append(
-            ScenarioError(f"{one.folder} is another result of {shown(one.name)}: remove it")
-        )
-    made = [
-        Results(name, {one.name: one for one in its.values()}, hidden)
-        for name, its in sorted(of_suite.items())
-    ]
-    return made, refused
+        others = entries.setdefault((one.about["suite"], one.about["seed"]), {})
+        if slug(one.name) in map(slug, others):
+            refused.append(
+                ScenarioError(f"{place} is another result of {shown(one.name)}: remove it")
+            )
+        else:
+            others[one.name] = one
+    return [Results(*key, of_key) for key, of_key in sorted(entries.items())], refused
 
 
 _UNPACKED: list[TemporaryDirectory[str]] = []  # archives, which are read until the process ends
@@ -423,15 +373,12 @@ _UNPACKED: list[TemporaryDirectory[str]] = []  # archives, which are read until 
 
 def _unpacked(path: Path) -> Path:
     """Return a temporary folder with the content of an archive."""
+    folder = TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True)
+    _UNPACKED.append(folder)
     with reading(path, "archive of results", "give a .zip of a folder of results") as file:
         try:
             with zipfile.ZipFile(file) as archive:
-                if sum(one.file_size for one in archive.infolist()) > MAX_UNPACKED:
-                    raise ScenarioError(f"it unpacks to more than {MAX_UNPACKED / 1e9:g} GB")
-                _UNPACKED.append(
-                    TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True)
-                )
-                archive.extractall(_UNPACKED[-1].name)
+                archive.extractall(folder.name)
         except zipfile.BadZipFile as error:
             raise ScenarioError(f"it is no archive: {error}") from None
-    return Path(_UNPACKED[-1].name)
+    return Path(folder.name)

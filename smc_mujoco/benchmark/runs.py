@@ -6,7 +6,7 @@ NaN for never. The same runs give the same bytes.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,16 +47,15 @@ def write(path: Path, groups: Iterable[list[Row]]) -> None:
     """Write the rows of each problem as they come."""
     import pyarrow as pa
 
-    kinds = [
-        ("problem", pa.string()),
-        ("instance", pa.int64()),
-        *((name, pa.float64()) for name in COLUMNS),
-    ]
-    schema = pa.schema(kinds)
-    filled = (
-        [{name: row.get(name, math.nan) for name, _ in kinds} for row in group] for group in groups
-    )
-    tables.write(path, schema, (pa.Table.from_pylist(group, schema=schema) for group in filled))
+    fields = {"problem": pa.string(), "instance": pa.int64()}
+    schema = pa.schema(fields | dict.fromkeys(COLUMNS, pa.float64()))
+    never = dict.fromkeys(COLUMNS, math.nan)
+
+    def parts() -> Iterator[pa.Table]:
+        for group in groups:
+            yield pa.Table.from_pylist([never | row for row in group], schema=schema)
+
+    tables.write(path, schema, parts())
 
 
 class Runs:
@@ -72,29 +71,25 @@ class Runs:
     def _problem(self, group: int) -> str:
         """Return the problem of a row group, from its statistics."""
         statistics = self.file.metadata.row_group(group).column(0).statistics
-        if statistics is not None:
-            return statistics.min
-        return ""
+        return "" if statistics is None else statistics.min
 
     def __len__(self) -> int:
         return self.file.metadata.num_rows
 
     def check(self, problems: Sequence[str], instances: int) -> None:
         """Raise ScenarioError unless the table has every problem's instances and all columns."""
-        if missing := [
-            name for name in ("instance", *COLUMNS) if name not in self.file.schema_arrow.names
-        ]:
-            raise ScenarioError(f"it has no column {missing[0]!r}")
+        for name in ("instance", *COLUMNS):
+            if name not in self.file.schema_arrow.names:
+                raise ScenarioError(f"it has no column {name!r}")
         for name in problems:
+            count = 0
             if name in self.groups:
                 count = self.file.metadata.row_group(self.groups[name]).num_rows
-            else:
-                count = 0
             if count != instances:
                 raise ScenarioError(f"it has {count} runs of {name}, not {instances}")
 
     def columns(self, name: str) -> Mapping[str, np.ndarray]:
-        """Return the columns of a problem's runs, (instances,) each, in the order of the instances."""
+        """Return the columns of a problem's runs, (instances,) each, in order of the instances."""
         data: pa.Table = self.file.read_row_group(self.groups[name]).sort_by("instance")
         return {column: data[column].to_numpy() for column in ("instance", *COLUMNS)}
 
@@ -110,7 +105,6 @@ class Runs:
         """Return measure -> median over a problem's instances."""
         columns = dict(self.columns(name))
         if count := len(problem(name).targets.get("accuracy", ())):
-            columns["calm"] = np.where(
-                np.isnan(columns[f"accuracy_{count}"]), np.inf, columns["calm"]
-            )
+            never = np.isnan(columns[f"accuracy_{count}"])
+            columns["calm"] = np.where(never, np.inf, columns["calm"])
         return {value: float(np.median(columns[value])) for value in VALUES}

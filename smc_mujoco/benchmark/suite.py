@@ -26,13 +26,19 @@ def suite(name: str) -> tuple[str, ...]:
     return tuple(line for line in lines if line and not line.startswith("#"))
 
 
+def folder(name: str, seed: int) -> str:
+    """Return the folder of a suite's results: its name, with the seed unless that is 0."""
+    return f"{name}-seed-{seed}" if seed else name
+
+
 def boards(name: str) -> tuple[str, ...]:
     """Return the questions that a problem informs, of "forces", "sensors", "speed" and "calm"."""
     one = problem(name)
-    informing = rules(one.version)["boards"]
-    return tuple(
-        board for board, conditions in informing.items() if {"*", one.condition} & {*conditions}
-    )
+    informed = []
+    for board, conditions in rules(one.version)["boards"].items():
+        if {"*", one.condition} & {*conditions}:
+            informed.append(board)
+    return tuple(informed)
 
 
 def pattern(version: int, share: int) -> tuple[str, ...]:
@@ -40,9 +46,9 @@ def pattern(version: int, share: int) -> tuple[str, ...]:
     conditions.
     """
     of = rules(version)
-    return tuple(
-        f"{plant}/{condition}@{version}"
-        for j, plant in enumerate(of["plants"])
-        for i, condition in enumerate(of["conditions"])
-        if (i + 2 * j + version) % PERIOD < share
-    )
+    chosen = []
+    for j, plant in enumerate(of["plants"]):
+        for i, condition in enumerate(of["conditions"]):
+            if (i + 2 * j + version) % PERIOD < share:
+                chosen.append(f"{plant}/{condition}@{version}")
+    return tuple(chosen)

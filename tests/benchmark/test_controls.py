@@ -60,11 +60,10 @@ def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
     compiled = smc.run(short)
     plain = reference.run(short)
     np.testing.assert_allclose(compiled.u, plain.u, rtol=0, atol=1e-9)
-    assert scenario.checked
 
 
 def test_no_law_of_an_entry_is_told_anything():
-    """Not even one that asks for the model: only the oracle's own function gets it, under any name."""
+    """Only the oracle's own function gets the model, under any name."""
     (scenario,) = smc.problem("duffing/noise@1").scenarios(told(), [0])
     assert (scenario.model, scenario.noise.position) == (None, 0.01)
     assert controls.is_oracle(controls.oracle().named("mine"))
