@@ -149,10 +149,16 @@ class Metric:
         """Return why the metric has no single value for the plant, or ""."""
         driven = [group for group in groups(plant) if group.driven]
         if not any(map(self.applies_to, driven)):
-            return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
+            return (
+                f"{self.name} compares channels and {plant.name} has one of a kind: give a "
+                "network, n >= 2"
+            )
         if ("{" in self.unit or self.unit == UNIT_OF_S) and len(driven) > 1 and not plant.pose:
             units = " and ".join(group.unit for group in driven)
-            return f"{self.name} has no one value where channels are in {units}, as in {plant.name}: use smc.scores"
+            return (
+                f"{self.name} has no one value where channels are in {units}, as in {plant.name}: "
+                "use smc.scores"
+            )
         return ""
 
     @property

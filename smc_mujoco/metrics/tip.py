@@ -123,7 +123,8 @@ def contacts(trace: Trace) -> Contacts:
     if hidden := _with_hidden_state(scenario):
         part = type(hidden[0]).__name__
         raise ScenarioError(
-            f"the state of {part} is not in a trace, so its contacts are unknown: run without {part}"
+            f"the state of {part} is not in a trace, so its contacts are unknown: run without "
+            f"{part}"
         )
     compiled = models.compile_model(scenario)
     model = models.with_values(compiled, scenario)

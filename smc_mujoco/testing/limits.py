@@ -63,7 +63,8 @@ def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
     ]:
         rows = [(*line, "yes" if within else "NO") for *line, within in limits]
         raise AssertionError(
-            f"{'; '.join(missed)} ({note})\n{Tabular(headings=('metric', 'value', kind, 'ok'), rows=rows)}"
+            f"{'; '.join(missed)} "
+            f"({note})\n{Tabular(headings=('metric', 'value', kind, 'ok'), rows=rows)}"
         )
 
 

@@ -57,8 +57,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker."""
     config.addinivalue_line(
         "markers",
-        "smc(plants=[...], conditions=[...]): run the test with each plant and condition of smc_mujoco's study, "
-        "as its arguments `plant` and `condition`.",
+        "smc(plants=[...], conditions=[...]): run the test with each plant and condition of "
+        "smc_mujoco's study, as its arguments `plant` and `condition`.",
     )
 
 

@@ -41,7 +41,6 @@ def certificate(plant="duffing", law="observer_free", gains=None, parts=PARTS, *
             "mechanism": "equation",
         },
         "law": {"name": law, "gains": gains or {"lam": 6.0, "k1": 3.0}},
-        "leaves_out": {"delay": {"input_delay": {"time": 0.004}}, "noise": {}},
         "parts": parts,
         "seal": "y",
     }

@@ -8,7 +8,6 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,33 +24,28 @@ from smc_mujoco.mechanisms.plant import EFFORT
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
-# Condition -> unit of its margin (x: unit of position, F: of force), what it asks, and what it
-# means where it fails.
+# Condition -> unit of its margin (x: unit of position, F: of force), and what it asks.
 CONDITIONS = {
-    "damping": ("F s/x", "D(x) >= 0 for every x", "the plant itself feeds the motion"),
-    "restoring": (
-        "",
-        "sigma(c x) > phi(x) for every x > 0",
-        "the plant pulls harder than the law pushes",
-    ),
-    "actuator": ("F", "|u| <= u_max", "the law asks for more than the actuator gives"),
-    "coupling": (
-        "F/x",
-        "the coupling is a spring that pulls together",
-        "the coupling can push apart",
-    ),
-    "local": ("F/x", "sigma'(0) c > phi'(0)", "the law is too soft near 0"),
-    "start": ("", "the scenario's start lies in the region", "the start lies outside of it"),
-    "reaching": ("F", "k > |phi + (M c - D) v| + d0", "k does not exceed d and the plant together"),
-    "integral": ("F/s", "k2 > d'", "the integral is slower than d"),
-    "slope": ("F/s", "|delta'| <= L", "what the integral must follow is too fast"),
+    "damping": ("F s/x", "D(x) >= 0 for every x"),
+    "restoring": ("", "sigma(c x) > phi(x) for every x > 0"),
+    "actuator": ("F", "|u| <= u_max"),
+    "coupling": ("F/x", "the coupling is a spring that pulls together"),
+    "local": ("F/x", "sigma'(0) c > phi'(0)"),
+    "start": ("", "the scenario's start lies in the region"),
+    "reaching": ("F", "k > |phi + (M c - D) v| + d0"),
+    "integral": ("F/s", "k2 > d'"),
+    "slope": ("F/s", "|delta'| <= L"),
 }
-THEOREMS = {  # theorem -> what it says
-    "saturated PD": "V = M v²/2 + ∫ σ(c y) − φ(y) dy never rises, and only rest keeps it (LaSalle)",
-    "level sets": "W falls between two of its levels, whatever d does within its bound",
+THEOREMS = {  # theorem -> what it proves where its conditions hold
+    "saturated PD": "without d every start comes to rest at 0",
+    "level sets": "whatever d does within its bound, W falls between two of its levels",
     "reaching": "s = 0 is reached and kept, and x decays on it",
-    "super-twisting": "a quadratic form of (√|s| sgn s, w + δ) falls until s = s' = 0 (Moreno and Osorio 2012)",
+    "super-twisting": "s = s' = 0 is reached (Moreno and Osorio 2012)",
 }
+NOT_ABOUT = (
+    "no theorem here is about sampling, delay, noise, estimators, dry friction, contact, drives, "
+    "other parameters or rounding"
+)
 
 
 class Condition(NamedTuple):
@@ -61,7 +55,7 @@ class Condition(NamedTuple):
     name: str  # as in the certificate's data
     margin: float  # by how much it holds, negative where it fails
     unit: str  # of the margin; "" for a share
-    words: str  # what it asks, or what its failure means
+    asks: str
     holds: bool
 
 
@@ -81,31 +75,23 @@ class Certificate:
 
     Attributes:
       data: all of it, as in its file: plant, law, bounds of the disturbance, theorems with their
-        conditions and what proves them (polynomials, boxes, numbers), what is left out, and a seal.
+        conditions and what proves them (polynomials, boxes, numbers), and a seal.
     """
 
     data: Mapping[str, Any]
 
     def __repr__(self) -> str:
-        return printable(
-            f"<Certificate of {self.law} on {self.plant}: {'; '.join(self.sentences[:-1])}>"
-        )
+        return printable(f"<Certificate of {self.law} on {self.plant}: {self.sentences[0]}>")
 
     def _repr_html_(self) -> str:
         rows = []
         for row in self.conditions:
-            rows.append(
-                (
-                    row.theorem,
-                    row.name,
-                    "yes" if row.holds else "no",
-                    f"{number(row.margin)} {row.unit}",
-                    row.words,
-                )
-            )
-        return html.table(
-            ("theorem", "condition", "holds", "margin", ""), rows, note=". ".join(self.sentences)
-        )
+            margin = f"{number(row.margin)} {row.unit}"
+            rows.append((row.theorem, row.name, "yes" if row.holds else "no", margin, row.asks))
+        for theorem, what, value, unit in self.ranges:
+            rows.append((theorem, what, "", f"{number(value)} {unit}", ""))
+        heads = ("theorem", "condition", "holds", "margin", "asks")
+        return html.table(heads, rows, note=". ".join(self.sentences))
 
     @property
     def plant(self) -> str:
@@ -131,9 +117,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether the scenario's start provably comes to rest or into the bound, apart from what
-        `leaves_out` names.
-        """
+        """Whether the scenario's start provably comes to rest or into the bound."""
         return self.bound is not None
 
     @property
@@ -166,102 +150,66 @@ class Certificate:
         x = self.data["unit"]
         made = []
         for part in self.data["parts"]:
-            for name, margin in ((row["name"], row["margin"]) for row in part["conditions"]):
-                unit, asks, fails = CONDITIONS[name]
-                unit, held = unit.replace("x", x).replace("F", EFFORT[x]), holds(name, margin)
+            for row in part["conditions"]:
+                unit, asks = CONDITIONS[row["name"]]
+                unit = unit.replace("x", x).replace("F", EFFORT[x])
+                held = holds(row["name"], row["margin"])
                 made.append(
-                    Condition(part["theorem"], name, margin, unit, asks if held else fails, held)
+                    Condition(part["theorem"], row["name"], row["margin"], unit, asks, held)
                 )
         return tuple(made)
 
     @property
-    def leaves_out(self) -> Mapping[str, str]:
-        """What no theorem here is about -> what the scenario has of it, such as "Lag(tau=0.01)"; ""
-        for nothing.
-        """
-
-        def said(word: str, numbers: Mapping[str, float]) -> str:
-            if numbers:
-                return (
-                    f"{word}({', '.join(f'{name}={value:g}' for name, value in numbers.items())})"
-                )
-            return word
-
-        return {
-            what: ", ".join(starmap(said, its.items()))
-            for what, its in self.data["leaves_out"].items()
-        }
+    def ranges(self) -> tuple[tuple[str, str, float, str], ...]:
+        """From where and how far the theorems hold: (theorem, what, value, unit)."""
+        x = self.data["unit"]
+        found = []
+        for part in self.data["parts"]:
+            theorem = part["theorem"]
+            if theorem == "level sets":
+                found.append((theorem, "starts at rest up to |x|", self._widest(part), x))
+                end = 0.0 if self.rests else part["bound"]
+                found.append((theorem, "end in |x| up to", end, x))
+            elif "X" in part and part["holds"]:
+                found.append((theorem, "|x| up to", part["X"], x))
+                gains = self.data["law"]["gains"]
+                if part.get("S"):
+                    found.append((theorem, "|s| up to", part["S"], f"{x}/s"))
+                elif "p" in gains:
+                    time = part["X"] ** (1.0 - gains["p"]) / (gains["b"] * (1.0 - gains["p"]))
+                    found.append((theorem, "on s = 0 at x = 0 after", time, "s"))
+        return tuple(found)
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What is proven: a sentence for each theorem, one if none is about d, and one on what all
-        leave out.
-        """
-        here = "; ".join(f"{name} ({what})" for name, what in self.leaves_out.items() if what)
-        absent = ", ".join(name for name, what in self.leaves_out.items() if not what)
-        left_out = (
-            f"no theorem here is about {here}"
-            + f"; nor about what is not here: {absent}" * bool(absent)
-        )
-        d0 = self.data["disturbance"]
-        unit = EFFORT[self.data["unit"]]
-        silent = d0 > 0.0 and self.theorems == ("saturated PD",)
-        nothing = (f"nothing is proven under every |d| <= {d0:g} {unit}",) * silent
-        return *(self._sentence(part) for part in self.data["parts"]), *nothing, left_out
-
-    def _sentence(self, part: Mapping[str, Any]) -> str:
-        """Return what a theorem says of this plant, or which of its conditions fail and by how
-        much.
-        """
-        theorem = part["theorem"]
-        x = self.data["unit"]
-        d0 = self.data["disturbance"]
-        if d0:
-            under = f"under every |d| <= {d0:g} {EFFORT[x]}"
-        else:
-            under = "without d"
-        failing = [row for row in self.conditions if row.theorem == theorem and not row.holds]
-        if theorem == "level sets":
-            wide = f"starts up to |x| = {number(self._widest(part))} {x} at rest"
-            if self.rests:
-                ends = "come to rest"
+        """What each theorem proves, or which of its conditions fail, and what none is about."""
+        told = []
+        for part in self.data["parts"]:
+            theorem = part["theorem"]
+            rows = [row for row in self.conditions if row.theorem == theorem and not row.holds]
+            fails = ", ".join(row.name for row in rows)
+            if theorem == "level sets":  # the region is proven also where the start lies outside
+                fails = ""
+            if fails:
+                told.append(f"not proven by {theorem}: {fails}")
             else:
-                ends = f"end in |x| <= {number(part['bound'])} {x}"
-            outside = "; the scenario's start is not among them" * bool(failing)
-            return f"proven by level sets: {wide} {ends} {under}{outside}"
-        if failing:
-            margins = []
-            for row in failing:
-                margins.append(
-                    f"{row.name} {number(row.margin)} {row.unit}".strip() + f" ({row.words})"
-                )
-            return f"not proven by {theorem}: {', '.join(margins)}"
-        if theorem == "saturated PD":
-            near = ", exponentially in the end" * any(
-                row.name == "local" for row in self.conditions
-            )
-            return f"proven by saturated PD: without d every start comes to rest at 0{near}"
-        if theorem == "reaching":
-            where = f"|x| <= {number(part['X'])} {x}"
-            if part["S"]:
-                where += f" with |s| <= {number(part['S'])} {x}/s"
-                return f"proven by reaching: from {where} s = 0 is reached and kept, and x decays, {under}"
-            gains = self.data["law"]["gains"]
-            after = part["X"] ** (1.0 - gains["p"]) / (gains["b"] * (1.0 - gains["p"]))
-            return (
-                f"proven by reaching: on s = 0 in {where} x is 0 after {number(after)} s, {under}"
-            )
-        rate = f" and |d'| <= {self.data['slope']:g} {EFFORT[x]}/s" * bool(self.data["slope"])
-        where = f"|x| <= {number(part['X'])} {x}"
-        return f"proven by super-twisting: from a set in {where} s = 0 is reached, {under}{rate}"
+                told.append(f"proven by {theorem}: {THEOREMS[theorem]}")
+        if self.data["disturbance"]:
+            unit = EFFORT[self.data["unit"]]
+            under = f"|d| <= {self.data['disturbance']:g} {unit}"
+            if self.data["slope"]:
+                under += f" and |d'| <= {self.data['slope']:g} {unit}/s"
+            what = "d is any force with"
+            if self.theorems == ("saturated PD",):
+                what = "nothing is proven under"
+            told.append(f"{what} {under}")
+        return *told, NOT_ABOUT
 
     def _widest(self, part: Mapping[str, Any]) -> float:
         """Return the largest x up to which all states at rest lie in the level sets."""
         x = np.linspace(0.0, part["x"][-1], 2001)
-        outside = self.level(x, np.zeros_like(x)) > part["outer"]
-        if outside.any():
-            return float(x[max(int(np.argmax(outside)) - 1, 0)])
-        return float(x[-1])
+        outside = np.flatnonzero(self.level(x, np.zeros_like(x)) > part["outer"])
+        return float(x[max(outside[0] - 1, 0)] if len(outside) else x[-1])
 
     def contains(self, x: Any, v: Any) -> np.ndarray:
         """Return whether each state lies in the region from which all come to rest or into the
@@ -288,11 +236,11 @@ class Certificate:
         part = self._part("level sets")
         if part is None:
             raise ScenarioError(f"the certificate of {self.law} on {self.plant} has no level sets")
-        x, v, c = np.asarray(x, float), np.asarray(v, float), self.surface
+        x, v = np.asarray(x, float), np.asarray(v, float)
         xs, ss, W = (np.array(part[key]) for key in ("x", "s", "W"))
         sign = np.where(x >= 0.0, 1.0, -1.0)
         px = x * sign
-        ps = (v + c * x) * sign
+        ps = (v + self.surface * x) * sign
         i = np.clip(np.searchsorted(xs, px, side="right") - 1, 0, xs.size - 2)
         j = np.clip(np.searchsorted(ss, ps, side="right") - 1, 0, ss.size - 2)
         f = (px - xs[i]) / (xs[i + 1] - xs[i])
@@ -308,11 +256,10 @@ class Certificate:
         return loops.loop_of(self.data)[0].c
 
     def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
-        parts = []
         for part in self.data["parts"]:
             if part["theorem"] == theorem and (part["holds"] or not holding):
-                parts.append(part)
-        return parts[0] if parts else None
+                return part
+        return None
 
     def check(self) -> None:
         """Prove it again by the checker, in ball arithmetic.
@@ -342,7 +289,7 @@ class Certificate:
           ScenarioError: no such file, or no certificate.
         """
         with reading(path, "certificate", "give a .json file that Certificate.save wrote") as file:
-            made = cls(data=json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_once))
+            made = cls(data=json.loads(file.read_text(encoding="utf-8")))
             made.sentences  # noqa: B018  # raises if the file is no certificate
             return made
 
@@ -366,13 +313,6 @@ class Certificate:
         from smc_mujoco.evidence.certificates.figure import draw
 
         return draw(self, traces, path, worst_of)
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the dict of a JSON object. Raise ValueError if it names a field twice."""
-    if len(dict(pairs)) < len(pairs):
-        raise ValueError("a field is there twice")
-    return dict(pairs)
 
 
 def finite(value: float) -> float | None:

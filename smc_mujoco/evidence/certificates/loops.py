@@ -45,9 +45,8 @@ class Loop:
         force = self.phi(x) - self.D(x) * v + self.M * self.c * v + d
         law = self.sigma(s)
         if self.switches:
-            law = np.where(
-                s == 0.0, np.clip(force, -self.sigma(np.ones(())), self.sigma(np.ones(()))), law
-            )
+            k = self.sigma(np.ones(()))
+            law = np.where(s == 0.0, np.clip(force, -k, k), law)
         return (force - law) / self.M
 
 
@@ -62,18 +61,6 @@ def loop_of(data: Mapping[str, Any]) -> tuple[Loop, list[float], SimpleNamespace
     return _loop(M, terms, law, data["u_max"], data["disturbance"]), terms, law
 
 
-def energy(data: Mapping[str, Any], x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V of "saturated PD" at states of one pendulum or cart:
-
-    M v^2 / 2 + int_0^x (sigma(c y) - phi(y)) dy.
-    """
-    loop, _, _ = loop_of(data)
-    y = np.linspace(0.0, float(np.abs(x).max()), 20001)
-    push = loop.sigma(loop.c * np.maximum(y, 1e-12)) - loop.phi(y)
-    W = np.concatenate([[0.0], np.cumsum(0.5 * (push[1:] + push[:-1]) * np.diff(y))])
-    return 0.5 * loop.M * v * v + np.interp(np.abs(x), y, W)
-
-
 def _loop(
     M: float, terms: list[float], law: SimpleNamespace, u_max: float | None, d0: float
 ) -> Loop:
@@ -81,33 +68,44 @@ def _loop(
     A, B, C, E, F = terms
     top = math.inf if u_max is None else u_max
     if law.name == "observer_free":
-        sigma = lambda s: np.clip(law.lam * np.tanh(s), -top, top)
         steep = law.lam
         c = law.k1
+
+        def sigma(s):
+            return np.clip(law.lam * np.tanh(s), -top, top)
+
     elif law.name in ("classical", "terminal", "super_twisting"):
         k = min(getattr(law, "k", 0.0), top)
-        sigma = lambda s: k * np.sign(s)
         steep = math.inf
         c = getattr(law, "c", 1.0)
+
+        def sigma(s):
+            return k * np.sign(s)
+
     else:
-        kp, kd = linear_gains(law)
+        kp, steep = linear_gains(law)
+        c = kp / steep
         if law.name == "boundary_layer":
             top = min(law.k, top)
-        sigma = lambda s: np.clip(kd * s, -top, top)
-        steep = kd
-        c = kp / kd
-    phi = lambda x: A * np.sin(x) + x * (B + C * x * x)
-    D = lambda x: E + F * x * x
-    return Loop(M=M, c=c, d0=d0, phi=phi, D=D, sigma=sigma, steep=steep)
+
+        def sigma(s):
+            return np.clip(steep * s, -top, top)
+
+    return Loop(
+        M=M,
+        c=c,
+        d0=d0,
+        phi=lambda x: A * np.sin(x) + x * (B + C * x * x),
+        D=lambda x: E + F * x * x,
+        sigma=sigma,
+        steep=steep,
+    )
 
 
 def linear_gains(law: SimpleNamespace) -> tuple[float, float]:
     """Return kp and kd of a law that is -(kp x + kd x') within its bound."""
     if law.name == "boundary_layer":
         return law.k * law.c / law.phi, law.k / law.phi
-    if law.name == "pid":
-        return law.kp, law.kd
     kp = (law.a1 + math.sqrt(law.a1**2 + law.b**2 * law.q1 / law.r)) / law.b
-    return kp, (
-        law.a2 + math.sqrt(law.a2**2 + 2.0 * law.b * kp + law.b**2 * law.q2 / law.r)
-    ) / law.b
+    kd = (law.a2 + math.sqrt(law.a2**2 + 2.0 * law.b * kp + law.b**2 * law.q2 / law.r)) / law.b
+    return kp, kd

@@ -3,18 +3,17 @@ can push.
 
     scenario = smc.Scenario(plant="duffing", law="observer_free")
     certificate = smc.certify(scenario, within=smc.Uncertainty(disturbance=1.0))
-    certificate.bound                               # |x| in the end, m, under every |d| <= 1 N
-    certificate.save("duffing.json")                # smc-mujoco certify --check duffing.json proves it again
+    certificate.bound                      # |x| in the end, m, under every |d| <= 1 N
+    certificate.save("duffing.json")       # smc-mujoco certify --check duffing.json proves it again
 
 The plant is its equation M x'' = phi(x) - D(x) x' + u + d, integrated exactly, and the law acts at
-every instant. What else a machine does is in `Certificate.leaves_out`.
+every instant. No theorem here is about what else a machine does.
 """
 
-import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,28 +29,14 @@ from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, bounds_of
 
-GRID_REACH = {
-    "rad": lambda plant: math.pi,
-    "m": lambda plant: 3.0 * max(map(abs, plant.x0)),
-}  # largest x: chosen
 MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
 BOX_COUNTS = (64, 256, 1024, 4096)  # tried in turn
 SET_FACTOR = 0.98  # factor on the largest set that a condition allows: chosen
-SIZE_HALVINGS = 40  # of a set's size, in search of the largest
-POSITIVE_GAINS = (
-    "lam",
-    "k",
-    "k1",
-    "c",
-    "phi",
-    "kp",
-    "kd",
-    "q1",
-)  # where a law has them, its theorems need them > 0
-LAWS = ("observer_free", "boundary_layer", "lqr", "pid", "classical", "terminal", "super_twisting")
-Judge = Callable[
-    [str, dict], dict[str, Any] | None
-]  # theorem, its data -> its margins, None where it is refused
+# where a law has them, its theorems need them > 0
+POSITIVE_GAINS = ("lam", "k", "k1", "c", "phi", "q1")
+LAWS = ("observer_free", "boundary_layer", "lqr", "classical", "terminal", "super_twisting")
+# theorem, its data -> its margins, None where it is refused
+Judge = Callable[[str, dict], dict[str, Any] | None]
 PLANTS = (
     "inverted_pendulum",
     "duffing",
@@ -64,8 +49,8 @@ PLANTS = (
 def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificate:
     """Return what is proven of a scenario's law on its plant, checked in ball arithmetic.
 
-    Laws: observer_free, boundary_layer, lqr and pid (without an integral), classical, terminal,
-    super_twisting; all without the nominal model or a separate surface. Plants: the pendulums and
+    Laws: observer_free, boundary_layer, lqr, classical, terminal, super_twisting; all without the
+    nominal model or a separate surface. Plants: the pendulums and
     their networks, duffing and van_der_pol, with any parameters and mismatch, and with 0 as the
     goal.
 
@@ -89,26 +74,28 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     _check(scenario)
     plant = scenario.plant
     law = scenario.law
-    d0, rate = (bound + more for bound, more in zip(_bounds(scenario), _class(within), strict=True))
-    u_max = scenario.limits[0]
-    values = {name: float(value) for name, value in vars(plant.values(scenario.mismatch)).items()}
+    d0, rate = _bounds(scenario)
+    if within is not None:
+        more, faster = _class(within)
+        d0 += more
+        rate += faster
+    values = vars(plant.values(scenario.mismatch))
     document: dict[str, Any] = {
         "format": checker.FORMAT,
         "plant": {
             "name": plant.name,
             "n": plant.n,
-            "parameters": values,
+            "parameters": {name: float(value) for name, value in values.items()},
             "mechanism": scenario.mechanism,
         },
         "law": {
             "name": law.name,
             "gains": {name: finite(value) for name, value in law.gains.items()},
         },
-        "u_max": finite(u_max),
+        "u_max": finite(scenario.limits[0]),
         "unit": plant.unit,
         "disturbance": d0,
         "slope": finite(rate),
-        "leaves_out": left_out(scenario),
     }
     document["parts"] = _parts(document, scenario, checker)
     document["seal"] = checker.seal(document)
@@ -117,64 +104,14 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     return certificate
 
 
-def left_out(scenario: Scenario) -> dict[str, dict[str, dict[str, float]]]:
-    """Return what the theorems leave out -> what this scenario has of it: words, each with its
-    numbers in SI units.
-    """
-    s = scenario.resolved
-    noise = {}
-    for name, value in (("position", s.noise.position), ("velocity", s.noise.velocity)):
-        if value:
-            noise[name] = value
-    measured = {"noise": noise} if noise else {}
-    if any(s.noise.errors):
-        measured |= {"chosen_errors": {}}
-    else:
-        measured |= {}
-    if s.velocity.name != "measured":
-        measured |= {s.velocity.name: {}}
-    else:
-        measured |= {}
-    if s.jump:
-        jump = {"time": s.jump.time} | dict(s.jump.factors)
-    else:
-        jump = {}
-    clock = {"period": s.control_period, "jitter": s.clock.jitter, "missed": s.clock.missed}
-    return {
-        "sampling": {"samples": {name: value for name, value in clock.items() if value}},
-        "delay": {"input_delay": {"time": s.input_delay}} if s.input_delay else {},
-        "noise": measured | _numbers([s.sensor] if s.sensor else []),
-        "dry friction": _numbers(s.friction),
-        "contact": {} if s.contact.kind == "none" else {s.contact.kind: {}},
-        "drive": _numbers(s.actuator),
-        "other parameters": {"jump": jump} if jump else {},
-        "rounding": {s.integrator: {"step": s.physics_step}},
-    }
-
-
-def _numbers(parts: Sequence[Any]) -> dict[str, dict[str, float]]:
-    """Return kind -> the numbers of parts; a second part of a kind has a number behind its name."""
-    found: dict[str, dict[str, float]] = {}
-    for part in parts:
-        values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
-        kind = type(part).__name__
-        kind += f"_{len(found) + 1}" * (kind in found)
-        found[kind] = {
-            n: float(v)
-            for n, v in values.items()
-            if isinstance(v, int | float) and math.isfinite(v)
-        }
-    return found
-
-
 def _check(scenario: Scenario) -> None:
     """Raise ScenarioError for a scenario that no theorem here is about."""
     plant = scenario.plant
     law = scenario.law
     if law.name not in LAWS or law.function is None or plant.name not in PLANTS or plant.own:
         raise ScenarioError(
-            f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} on one of "
-            f"{', '.join(PLANTS)}"
+            f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} "
+            f"on one of {', '.join(PLANTS)}"
         )
     zero = [name for name in POSITIVE_GAINS if law.uniform and law.gains.get(name, 1.0) <= 0.0]
     refused = {
@@ -188,7 +125,6 @@ def _check(scenario: Scenario) -> None:
         "gains or bounds by channel": not law.uniform or len(set(scenario.limits)) > 1,
         "a motor's voltage as u": scenario.voltage_motor is not None,
         "an acceleration as u": scenario.stepper is not None,
-        "pid with an integral": law.name == "pid" and law.gains["ki"] != 0.0,
         f"mechanism {scenario.mechanism!r}": scenario.mechanism != "equation" and plant.n == 1,
     }
     for what, there in refused.items():
@@ -198,35 +134,38 @@ def _check(scenario: Scenario) -> None:
 
 def _bounds(scenario: Scenario) -> tuple[float, float]:
     """Return bounds of |d| and |d'| of a scenario's disturbance."""
-    bound = slope = 0.0
+    bound = 0.0
+    slope = 0.0
     for signal in scenario.disturbance:
-        if (its := bounds_of(signal)) is None:
+        bounds = bounds_of(signal)
+        if bounds is None:
             raise ScenarioError(
-                f"{type(signal).__name__} has no bound: leave it out, and give within=smc.Uncertainty(disturbance=...)"
+                f"{type(signal).__name__} has no bound: leave it out, and give "
+                "within=smc.Uncertainty(disturbance=...)"
             )
-        bound, slope = bound + its[0], slope + its[1]
+        bound += bounds[0]
+        slope += bounds[1]
     return bound, slope
 
 
-def _class(within: Uncertainty | None) -> tuple[float, float]:
+def _class(within: Uncertainty) -> tuple[float, float]:
     """Return the bounds of |d| and |d'| of a class."""
-    if within is None:
-        return 0.0, 0.0
     if not isinstance(within, Uncertainty):
         raise ScenarioError(
             f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
         )
     if within != Uncertainty(disturbance=within.disturbance, slope=within.slope):
         raise ScenarioError(
-            "a certificate is about disturbances alone: give a class with disturbance and slope only"
+            "a certificate is about disturbances alone: give a class with disturbance and slope "
+            "only"
         )
     return within.disturbance, math.inf if within.slope is None else within.slope
 
 
 def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     """Return the theorems of a law on a plant with their data."""
-    plant, (loop, terms, law) = document["plant"], loop_of(document)
-    e = checker.equation(plant)
+    loop, terms, law = loop_of(document)
+    e = checker.equation(document["plant"])
     f = checker.feedback(document["law"], document["u_max"])
 
     def judge(theorem: str, data: dict) -> dict[str, Any] | None:
@@ -247,36 +186,40 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     if law.name == "super_twisting":
         return [_super_twisting(document, loop, law, judge)]
     parts = [_saturated(document, loop, terms, judge)]
-    single = plant["n"] == 1
-    reach = GRID_REACH[scenario.plant.unit](scenario.plant)
+    if document["plant"]["n"] > 1:
+        return parts
+    if scenario.plant.unit == "rad":
+        reach = math.pi
+    else:
+        reach = 3.0 * max(map(abs, scenario.plant.x0))  # chosen
     box = None
-    if single and law.name in ("classical", "terminal"):
+    if law.name in ("classical", "terminal"):
         reaching = _reaching(0.5 * loop.c if law.name == "classical" else 0.0, reach, judge)
         box = reaching["X"], reaching["S"]
         parts.append(reaching)
     bounded = document["disturbance"] > 0.0 or not parts[0]["holds"]
-    if single and bounded and law.name != "terminal" and f.room[0] >= 0:
+    if bounded and law.name != "terminal" and f.room[0] >= 0:
+        x0 = scenario.resolved.x0[0]
+        v0 = scenario.resolved.v0[0]
+        start = x0, v0 + loop.c * x0
         proven = functools.partial(checker.falls, e, f, checker.arb(document["disturbance"]))
-        if levels := search.levels(loop, reach, _start(scenario, loop), proven, attracts, box):
-            parts.append(_levels(float(f.room[0]), levels, scenario, _start(scenario, loop)))
+        if levels := search.levels(loop, reach, start, proven, attracts, box):
+            parts.append(_levels(float(f.room[0]), levels, (x0, v0), start))
     return parts
 
 
-def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
-    proven = all(holds(condition["name"], condition["margin"]) for condition in conditions)
+def _part(theorem: str, margins: dict[str, Any], **data: Any) -> dict:
+    """Return a theorem as data, with the margins of its conditions by name."""
+    conditions = [{"name": name, "margin": float(value)} for name, value in margins.items()]
+    proven = all(holds(one["name"], one["margin"]) for one in conditions)
     return {"theorem": theorem, "holds": proven, "conditions": conditions} | data
 
 
-def _told(margins: dict[str, Any]) -> list[dict]:
-    """Return conditions as data, from their names and margins."""
-    return [{"name": name, "margin": float(margin)} for name, margin in margins.items()]
-
-
 def _judged(theorem: str, data: dict, judge: Judge) -> dict:
-    """Return a theorem with the margins that the checker derives from its data."""
-    return _part(
-        theorem, _told(judge(theorem, data) or {}), **data
-    )  # data refused here is refused again in the end
+    """Return a theorem with the margins that the checker derives from its data; data refused here
+    are refused again in the end.
+    """
+    return _part(theorem, judge(theorem, data) or {}, **data)
 
 
 def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:
@@ -292,9 +235,9 @@ def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> 
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
     for told in _restoring(loop, terms):
         if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
-            derived = _told(margins | {"restoring": told["margin"]})
-            conditions = [told if one["name"] == "restoring" else one for one in derived]
-            return _part("saturated PD", conditions, V=V)
+            part = _part("saturated PD", margins | {"restoring": told["margin"]}, V=V)
+            part["conditions"][1] = told
+            return part
     raise ScenarioError(
         "found no boxes that prove that the law is stronger than the plant: give other gains"
     )
@@ -305,28 +248,29 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
     infinity.
     """
     A, B, C, _, _ = terms
+    tail = 1.0
     if C < 0.0:
         tail = math.sqrt(max(B, 0.0) / -C) * 1.01 + 0.1
-    else:
-        tail = 1.0
-    tail = max(tail, 2.0 * math.pi if A else 0.0)
+    if A:
+        tail = max(tail, 2.0 * math.pi)
     x = np.linspace(0.0, 2.0 * tail, 20001)[1:]
     share = 1.0 - loop.phi(x) / loop.sigma(loop.c * x)
-    smallest = min(
-        1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c)
-    )
+    smallest = min(1.0, float(share.min()))
+    if not loop.switches:
+        smallest = min(smallest, 1.0 - (A + B) / (loop.steep * loop.c))
     if smallest < 0.0 or C > 0.0 or (C == 0.0 and B > 0.0):
-        if share.min() < 0.0:
-            at = float(x[share.argmin()])
-        else:
+        at = float(x[share.argmin()])
+        if share.min() >= 0.0:
             at = _far(loop)
         yield {"name": "restoring", "margin": _share(loop, at), "at": at}
         return
-    margin = smallest - MARGIN_SHARE * max(abs(smallest), 0.1) * (smallest < 1.0)
+    margin = smallest
+    if smallest < 1.0:
+        margin -= MARGIN_SHARE * max(abs(smallest), 0.1)
     for count in BOX_COUNTS:
         edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
         boxes = [*map(list, itertools.pairwise(edges)), [edges[-1], None]]
-        yield {"name": "restoring", "margin": float(margin), "boxes": boxes}
+        yield {"name": "restoring", "margin": margin, "boxes": boxes}
 
 
 def _far(loop: Loop) -> float:
@@ -347,90 +291,71 @@ def _reaching(lean: float, reach: float, judge: Judge) -> dict:
     """Return the largest set |x| <= X, |s| <= lean X where s = 0 is surely reached; X = 0 if there
     is none.
     """
-    low = 0.0
-    high = reach
-    for _ in range(SIZE_HALVINGS):
-        middle = 0.5 * (low + high)
-        if judge("reaching", {"X": middle, "S": lean * middle}):
-            low, high = (middle, high)
-        else:
-            low, high = (low, middle)
-    return _judged("reaching", {"X": SET_FACTOR * low, "S": SET_FACTOR * lean * low}, judge)
 
+    def reached(X: float) -> bool:
+        return judge("reaching", {"X": X, "S": lean * X}) is not None
 
-def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
-    """Return x and s of a scenario's start."""
-    x = scenario.resolved.x0[0]
-    v = scenario.resolved.v0[0]
-    return x, v + loop.c * x
+    X = SET_FACTOR * search.largest(reached, 0.0, reach)
+    return _judged("reaching", {"X": X, "S": lean * X}, judge)
 
 
 def _levels(
-    room: float, levels: search.Levels, scenario: Scenario, start: tuple[float, float]
+    room: float, levels: search.Levels, at: tuple[float, float], start: tuple[float, float]
 ) -> dict:
-    """Return the levels of W as data."""
-    conditions = _told({"actuator": room, "start": levels.outer - _cell(levels, *start)})
+    """Return the levels of W as data; `at`, `start`: x and v, and x and s, at the start."""
+    margins = {"actuator": room, "start": levels.outer - _cell(levels, *start)}
     data = {"x": levels.x.tolist(), "s": levels.s.tolist(), "W": levels.W.tolist()}
-    data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | (
-        {"P": list(levels.P)} if levels.P else {}
-    )
-    return _part(
-        "level sets", conditions, **data, inner=levels.inner, outer=levels.outer, bound=levels.bound
-    )
+    data |= {"start": list(at), "inner": levels.inner, "outer": levels.outer}
+    if levels.P:
+        data["P"] = list(levels.P)
+    return _part("level sets", margins, **data, bound=levels.bound)
 
 
 def _cell(levels: search.Levels, x: float, s: float) -> float:
     """Return the largest W at the corners of a state's cell, 1 outside of the grid."""
-    x, s = (x, s) if x >= 0.0 else (-x, -s)
+    if x < 0.0:
+        x = -x
+        s = -s
     if x >= levels.x[-1] or abs(s) >= levels.s[-1]:
         return 1.0
-    i, j = (
-        int(np.searchsorted(edges, at, side="right")) - 1
-        for edges, at in ((levels.x, x), (levels.s, s))
-    )
+    i = int(np.searchsorted(levels.x, x, side="right")) - 1
+    j = int(np.searchsorted(levels.s, s, side="right")) - 1
     return float(levels.W[i : i + 2, j : j + 2].max())
 
 
 def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Judge) -> dict:
     """Return the largest set that Moreno & Osorio's quadratic form proves."""
-    d0 = document["disturbance"]
     slope = document["slope"]
-    best = None
     if slope is None:
-        cure = "give one, as in smc.Uncertainty(disturbance=1.0, slope=2.0)"
-        raise ScenarioError(f"super_twisting needs a bound of d': {cure}")
+        raise ScenarioError(
+            "super_twisting needs a bound of d': give one, as in "
+            "smc.Uncertainty(disturbance=1.0, slope=2.0)"
+        )
 
     def proven(data: dict) -> bool:
         margins = judge("super-twisting", data)
         return margins is not None and min(map(float, margins.values())) > 0.0
 
+    best = None
     for L in law.k2 * np.linspace(0.05, 0.95, 19):
-        if slope < L:
-            P = _form(law.k1 / loop.M, law.k2, L, loop.M)
-        else:
-            P = None
+        P = _form(law.k1 / loop.M, law.k2, L, loop.M) if slope < L else None
         if P is None:
             continue
-        low = 1e-12
-        high = 1e6
-        for _ in range(SIZE_HALVINGS):
-            middle = math.sqrt(low * high)
-            if proven(_ellipse(P, L, middle, loop.c)):
-                low, high = (middle, high)
-            else:
-                low, high = (low, middle)
-        data = _ellipse(P, L, SET_FACTOR * low, loop.c)
-        if proven(data) and (best is None or best["X"] < data["X"]):
-            best = data
+        data = functools.partial(_ellipse, P, L, loop.c)
+        size = search.largest(lambda q, data=data: proven(data(10.0**q)), -12.0, 6.0)
+        found = data(SET_FACTOR * 10.0**size)
+        if proven(found) and (best is None or best["X"] < found["X"]):
+            best = found
     if best is None:
         raise ScenarioError(
-            f"found no quadratic form for super_twisting with k1 = {law.k1:g}, k2 = {law.k2:g}, |d| <= {d0:g} and "
-            f"|d'| <= {slope:g}: give larger gains, or a smaller disturbance"
+            f"found no quadratic form for super_twisting with k1 = {law.k1:g}, k2 = {law.k2:g}, "
+            f"|d| <= {document['disturbance']:g} and |d'| <= {slope:g}: give larger gains, or a "
+            "smaller disturbance"
         )
     return _judged("super-twisting", best, judge)
 
 
-def _ellipse(P: np.ndarray, L: float, q: float, c: float) -> dict:
+def _ellipse(P: np.ndarray, L: float, c: float, q: float) -> dict:
     """Return the data of the set z' P z <= q, z1 = [s]^(1/2), where |x| <= X = max |s| / c."""
     X = q * float(np.linalg.inv(P)[0, 0]) / c * (1.0 + 1e-9)
     return {"P": [P[0, 0], P[0, 1], P[1, 1]], "L": float(L), "q": q, "X": X}
@@ -449,12 +374,11 @@ def _form(k1: float, k2: float, L: float, M: float) -> np.ndarray | None:
         rates = [np.linalg.eigvalsh(scale @ (A.T @ P + P @ A) @ scale).max() for A in ends]
         return max(*rates, -np.linalg.eigvalsh(P).min())
 
-    starts = []
+    found = []
     for share in (0.3, 1.0):
-        starts.append(
-            np.array([math.log(2.0 * k2 * M + 0.5 * (k1 * M) ** 2), -k1 * M / 2.0 * share])
-        )
-    best = min((minimize(worst, z, method="Nelder-Mead") for z in starts), key=lambda one: one.fun)
+        z = [math.log(2.0 * k2 * M + 0.5 * (k1 * M) ** 2), -k1 * M / 2.0 * share]
+        found.append(minimize(worst, z, method="Nelder-Mead"))
+    best = min(found, key=lambda one: one.fun)
     if best.fun < 0.0 and np.linalg.det(shape(best.x)) > 0.0:
         return shape(best.x)
     return None

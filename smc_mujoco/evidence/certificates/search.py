@@ -38,6 +38,7 @@ SWEEPS, SWEEP_TOLERANCE = 500, 1e-9  # of a solution
 SMOOTHING_COUNTS = (2, 8, 24)  # how often W is smoothed, which blunts its edges: chosen
 # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
 SPEED_RATIO = 3.0
+SIZE_HALVINGS = 40  # of a set's size, in search of the largest
 MIN_FALL_SHARE = 0.01  # least fall in a cell, as a share of the range of W' in it: chosen
 MIN_RANGE = 0.02  # range of levels that is worth a certificate: chosen
 RAMP_SHARE = 0.5  # of the target's size, over which the cost of time rises from 0 to 1: chosen
@@ -114,17 +115,22 @@ def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | Non
     if max(np.linalg.eigvals(A).real) >= 0.0:
         return None
     P = solve_continuous_lyapunov(A.T, -np.diag([1.0, 1.0 / max(1.0, loop.c) ** 2]))
-    low = 1e-9
-    high = (0.9 * reach) ** 2
-    for _ in range(60):
-        middle = (low * high) ** 0.5
-        if attracts(P / middle):
-            low, high = (middle, high)
-        else:
-            low, high = (low, middle)
-    if attracts(P / (0.9 * low)):
-        return P / (0.9 * low)
+    most = 2.0 * np.log10(0.9 * reach)
+    size = 0.9 * 10.0 ** largest(lambda q: attracts(P / 10.0**q), -9.0, most)
+    if attracts(P / size):
+        return P / size
     return None
+
+
+def largest(accepted: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the largest size up to `high` that is accepted, by bisection; `low` if none is."""
+    for _ in range(SIZE_HALVINGS):
+        middle = 0.5 * (low + high)
+        if accepted(middle):
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

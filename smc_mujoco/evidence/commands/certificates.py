@@ -52,8 +52,8 @@ def certify(
     disturbance pushes it.
 
     The plant is its equation, integrated exactly, and the law acts at every instant. The command
-    prints each theorem with its conditions and their margins, also where they fail, and what it
-    leaves out of your machine: the sampling, delay, noise, dry friction. A separate checker proves
+    prints each theorem with its conditions and their margins, also where they fail. No theorem is
+    about sampling, delay, noise or dry friction. A separate checker proves
     it in ball arithmetic before it is shown; --check runs that checker again, with exit code 2 if a
     statement is not proven.
 

@@ -20,15 +20,20 @@ def rig(
         str | None,
         typer.Argument(
             metavar="RIG",
-            help="A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint. None: all machines.",
+            help=(
+                "A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint. "
+                "None: all machines."
+            ),
         ),
     ] = None,
     files: Annotated[
         list[Path] | None,
         typer.Argument(
             metavar="FILE",
-            help="Records: CSV or npz files of columns; with --fit also traces. None: what the twin said of the public "
-            "records, and what the machine did.",
+            help=(
+                "Records: CSV or npz files of columns; with --fit also traces. None: what the twin "
+                "said of the public records, and what the machine did."
+            ),
         ),
     ] = None,
     columns: options.Columns = None,

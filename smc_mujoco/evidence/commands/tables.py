@@ -29,19 +29,15 @@ MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdic
 
 
 def certificate(made: Certificate) -> Table:
-    """Return a certificate's conditions with their margins."""
-    columns = ["condition", "holds", Column("margin", justify="right"), ""]
-    table = titled(f"{made.law} on {made.plant}", "theorem", *columns, pad_edge=False)
-    seen = ""
+    """Return a certificate's conditions with their margins, and from where it holds and how far."""
+    columns = ["theorem", "condition", "holds", Column("margin", justify="right"), "asks"]
+    table = titled(f"{made.law} on {made.plant}", *columns, pad_edge=False)
     for row in made.conditions:
-        theorem, seen = row.theorem if row.theorem != seen else "", row.theorem
-        if row.holds:
-            mark = Text("yes", style="blue")
-        else:
-            mark = Text("no", style="red")
-        table.add_row(
-            theorem, row.name, mark, f"{number(row.margin)} {row.unit}".strip(), row.words
-        )
+        mark = Text("yes", style="blue") if row.holds else Text("no", style="red")
+        margin = f"{number(row.margin)} {row.unit}".strip()
+        table.add_row(row.theorem, row.name, mark, margin, row.asks)
+    for theorem, what, value, unit in made.ranges:
+        table.add_row(theorem, what, "", f"{number(value)} {unit}", "")
     return table
 
 

@@ -54,8 +54,8 @@ def statistics(
     if singular[-1] < SINGULAR_RATIO * singular[0]:
         one, other = np.argsort(-np.abs(rows[-1]))[:2]
         raise ScenarioError(
-            f"the records of {replays.twin.name} cannot tell {names[one]} and {names[other]} apart: "
-            "leave one out, or give a longer record or one of a richer motion"
+            f"the records of {replays.twin.name} cannot tell {names[one]} and {names[other]} "
+            "apart: leave one out, or give a longer record or one of a richer motion"
         )
     covariance = jackknife(slopes)
     deviation = np.sqrt(np.diag(covariance))

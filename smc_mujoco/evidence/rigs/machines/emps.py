@@ -74,7 +74,10 @@ PERIOD, STEP = (
     5e-4,
 )  # s, under RK4. With steps h of first order, positions lead by h/2 v, which biases friction.
 BACK_EMF = 1e-6  # V s/m: too small to have an effect
-PUBLISHED = "A. Janot, M. Gautier and M. Brunot, Data set and reference models of EMPS, 2019 (no licence stated)"
+PUBLISHED = (
+    "A. Janot, M. Gautier and M. Brunot, Data set and reference models of EMPS, 2019 (no licence "
+    "stated)"
+)
 
 
 def machine(q):
@@ -162,7 +165,9 @@ EMPS = Rig(
     commands=commands,
     columns=Columns(x=("x",), u="u", reference="r"),
     free=("mass", "viscous", "coulomb", "offset"),
-    about="The numbers are the published ones. The program's tracking error is 0.578 mm rms, recorded 0.581; with the "
-    "reference a tick late 0.666. There is no ensemble, because no standard errors are published. The direction of dry "
-    "friction changes up to 0.5 ms late.",
+    about=(
+        "The numbers are the published ones. The program's tracking error is 0.578 mm rms, "
+        "recorded 0.581; with the reference a tick late 0.666. There is no ensemble, because no "
+        "standard errors are published. The direction of dry friction changes up to 0.5 ms late."
+    ),
 )

@@ -22,7 +22,10 @@ from smc_mujoco.simulation.signals import Constant
 
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"
-THESIS = "P. A. Bermeo Garcia and S. S. Guazhima Fernandez, Gemelo digital del pendulo de Furuta QUBE-Servo 3, 2026 (MIT)"
+THESIS = (
+    "P. A. Bermeo Garcia and S. S. Guazhima Fernandez, Gemelo digital del pendulo de Furuta "
+    "QUBE-Servo 3, 2026 (MIT)"
+)
 STEP = f"identified here from a step of 1 V and ten free falls of {THESIS}"
 IP02 = "Quanser, IP02 linear servo, user manual (no licence stated)"
 LONG_SOURCE = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN (no licence stated)"
@@ -151,7 +154,10 @@ QUBE_SERVO_2 = Rig(
         counts=2048.0,
     ),
     machine=rotary,
-    about="The arm's inertia is m r^2/12. With m r^2/3 a controller that balances the machine lets the twin fall.",
+    about=(
+        "The arm's inertia is m r^2/12. With m r^2/3 a controller that balances the machine lets "
+        "the twin fall."
+    ),
 )
 FOUND = (
     "resistance",
@@ -215,12 +221,15 @@ QUBE_SERVO_3 = Rig(
     ensemble=tuple(dict(zip(FOUND, values, strict=True)) for values in QUBE_3_SETS[1:]),
     laws=controllers.rotary(0.0422 / QUBE_3_SETS[0][0], QUBE_3_SURFACE),
     x0=(0.0, 0.1),
-    about="Standard errors, from a jackknife over eight blocks: resistance 0.36, arm_inertia 1.3e-5, arm_damping "
-    "5.3e-5, cable 5.5e-4, cable_friction 9.1e-4, cable_stiffness 1.9e-3. The step of 1 V is met to 0.020 rad rms, the "
-    "falls' 2.432 Hz to 1.0 %, their damping ratio 0.0261 to 4 %. The cable has hysteresis: it takes energy from a "
-    "turn of the arm, and hardly any from a fall. Without it the sum of squares is four times as large, and with an "
-    "amplifier that brakes in falls 1.7 times. The thesis measured 0.71e-3 N m and 1.19e-3 N m/rad of the cable at "
-    "rest, half of the friction and of the spring found here.",
+    about=(
+        "Standard errors, from a jackknife over eight blocks: resistance 0.36, arm_inertia 1.3e-5, "
+        "arm_damping 5.3e-5, cable 5.5e-4, cable_friction 9.1e-4, cable_stiffness 1.9e-3. The step "
+        "of 1 V is met to 0.020 rad rms, the falls' 2.432 Hz to 1.0 %, their damping ratio 0.0261 "
+        "to 4 %. The cable has hysteresis: it takes energy from a turn of the arm, and hardly any "
+        "from a fall. Without it the sum of squares is four times as large, and with an amplifier "
+        "that brakes in falls 1.7 times. The thesis measured 0.71e-3 N m and 1.19e-3 N m/rad of "
+        "the cable at rest, half of the friction and of the spring found here."
+    ),
 )
 FALLS = 25.0, 19.0, 13.0  # degrees, of falls that cover the machine's swings of 8 to 25
 
@@ -307,7 +316,9 @@ IP02_CART = Rig(
         "counts": Quantity(4096.0, "1/turn", f"{IP02}, of the pendulum", 2.0),
     },
     machine=linear,
-    about="The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is 0.6413 m from the "
-    "hinge. The cart's position has the pendulum's 4096 counts, for a metre in place of a turn. The counts of the "
-    "machine are 22.75 um.",
+    about=(
+        "The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is "
+        "0.6413 m from the hinge. The cart's position has the pendulum's 4096 counts, for a metre "
+        "in place of a turn. The counts of the machine are 22.75 um."
+    ),
 )

@@ -26,7 +26,10 @@ MIN_PROBABILITY = (
     0.95  # of the angles within a sixteenth of a pitch: below it a brush's is not known; chosen
 )
 PERIOD, STEP = 2e-3, 5e-4  # s; the fit is the same to 0.3 % at half the step
-ORIGIN = "identified here from eight records by least squares in closed loop, after a wide search with two of them"
+ORIGIN = (
+    "identified here from eight records by least squares in closed loop, after a wide search with "
+    "two of them"
+)
 RIPPLE_ORIGIN = (
     "identified here from eight records in open loop, by the likelihood of a Kalman filter"
 )
@@ -257,16 +260,19 @@ QUBE_SERVO = Rig(
         "quanser": DRIVER
         | {"arm_inertia": 4e-6 + 0.095 * 0.085**2 / 3}
         | {
-            "source": "arm's inertia m r^2/3 as in Quanser's qube3_rotpen_param.m (no licence stated): the rig's own "
-            "controller lets it fall"
+            "source": (
+                "arm's inertia m r^2/3 as in Quanser's qube3_rotpen_param.m (no licence stated): "
+                "the rig's own controller lets it fall"
+            )
         },
     },
     ensemble=tuple(dict(zip(NAMES, values, strict=True)) for values in ENSEMBLE),
     laws=(*rotary(TORQUE_PER_VOLT, SURFACE), state_feedback()),
     x0=(0.0, 0.1),
     about=(
-        "Records: decargroup/closed_loop_koopman (MIT, 2023). Identified on eight records; 11 was not used. "
-        "The angle of the brushes is read from each record. The laws of a ranking have the gains of scene furuta, in "
-        "volts, and were not tuned on the twin; the machine’s own controller was made for it."
+        "Records: decargroup/closed_loop_koopman (MIT, 2023). Identified on eight records; 11 was "
+        "not used. The angle of the brushes is read from each record. The laws of a ranking have "
+        "the gains of scene furuta, in volts, and were not tuned on the twin; the machine’s own "
+        "controller was made for it."
     ),
 )

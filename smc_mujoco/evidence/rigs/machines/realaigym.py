@@ -111,8 +111,10 @@ COMMON = {
         {key: value for key, value in SETS[f"model_{number}_0"].items() if key != "source"}
         for number in (1, 2, 3)
     ),
-    "about": "Records: sys-id motions and board runs of design C.1. Masses are kept, because torques determine only "
-    "moments.",
+    "about": (
+        "Records: sys-id motions and board runs of design C.1. Masses are kept, because torques "
+        "determine only moments."
+    ),
 }
 PENDUBOT = Rig(
     name="realaigym_pendubot",

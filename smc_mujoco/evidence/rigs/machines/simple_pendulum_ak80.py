@@ -67,7 +67,7 @@ SIMPLE_PENDULUM = Rig(
     laws=LAWS,
     x0=(0.3,),
     about=(
-        "Records of open loops at several rates. The parameter sets are the ends of the values published for it. "
-        "The laws of a ranking were tuned on the middle of these, by one rule."
+        "Records of open loops at several rates. The parameter sets are the ends of the values "
+        "published for it. The laws of a ranking were tuned on the middle of these, by one rule."
     ),
 )

@@ -28,7 +28,10 @@ MACHINE = "Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa (no licence stated)"
 FORMULA = f"{MACHINE}: from formulas, not identified"
 LIBRARY = "FastAccelStepper 0.33.9 (MIT) on an ATmega2560"
 MEMORY = "from memory of a data sheet, not verified"
-FOUND = "identified here: a draw whose runs under the linear law have the recorded figures, benchmarks/stepper_furuta.py"
+FOUND = (
+    "identified here: a draw whose runs under the linear law have the recorded figures, "
+    "benchmarks/stepper_furuta.py"
+)
 ABLATED = "its number here is the machine's; 0 leaves it out"
 STEP = 2.5e-4  # s
 ARM_INERTIA = 1.104e-3  # kg m^2, with the pendulum's mass on the arm's end; N m per rad/s^2 of u
@@ -155,14 +158,16 @@ STEPPER_FURUTA = Rig(
     published={
         "second_search": dict(zip(NAMES, SECOND, strict=True))
         | {
-            "source": f"{FOUND} second: the one set of 16 whose runs allow the recorded rms of the hold"
+            "source": (
+                f"{FOUND} second: the one set of 16 whose runs allow the recorded rms of the hold"
+            )
         },
     },
     ensemble=tuple(dict(zip(NAMES, values, strict=True)) for values in SETS[1:]),
     laws=(*LAWS, *rotary(ARM_INERTIA, SURFACE)),
     x0=(0.0, 0.75 / DEGREES),
     about=(
-        f"{MACHINE}. The firmware's laws, its pulse generator's logic and the masses are the machine's facts; the rest "
-        "was found from figures of its recordings under the linear law."
+        f"{MACHINE}. The firmware's laws, its pulse generator's logic and the masses are the "
+        "machine's facts; the rest was found from figures of its recordings under the linear law."
     ),
 )
