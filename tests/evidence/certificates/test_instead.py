@@ -41,7 +41,7 @@ def told(command):
         within = None
     made = smc.certify(smc.Scenario(plant=plant, law=law), within)
     margins = {number(one.margin) for one in made.conditions}
-    return margins | {number(value) for _, _, value, _ in made.ranges}
+    return margins | {number(value) for _, _, value, _ in made.ranges} | {str(d0)}
 
 
 def test_each_claim_that_does_not_hold_has_a_sentence_and_a_command():
