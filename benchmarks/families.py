@@ -36,7 +36,7 @@ import itertools
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -45,8 +45,9 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
+from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.paired_runs import EPS
-from smc_mujoco.analysis.ranking import LEVEL_SHARE, interval
+from smc_mujoco.analysis.ranking import LEVEL_SHARE, interval, linked
 from smc_mujoco.analysis.step_halving import halved
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import find
@@ -55,8 +56,6 @@ from smc_mujoco.control.gain_sets import COMPARED, OBJECTIVES
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.evidence.report.families import FAMILIES
-from smc_mujoco.evidence.report.families import told as told_by
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -67,6 +66,25 @@ from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import U_MAX, Scenario, default_u_max
 from smc_mujoco.simulation.signals import Noise, Sine
 from smc_mujoco.studies.fair_gains import Candidate, Trial
+from smc_mujoco.studies.table import Table
+
+FAMILIES = {
+    "switching": (
+        "classical",
+        "adaptive",
+        "super_twisting",
+        "conditioned_super_twisting",
+        "implicit_first_order",
+        "twisting",
+        "terminal",
+    ),
+    "smoothed": (
+        "observer_free",
+        "boundary_layer",
+    ),  # the same surface, and a steep slope in place of the sign
+    "rivals": ("pid", "extended_state", "adrc", "pd_observer", "lqi", "mpc", "loop_shaping"),
+}
+ERROR = 0.025  # beyond each end of an interval
 
 RUNS, DURATION, LOAD = 12, 8.0, 1.0  # runs a cell; s; N or N m, for |u| <= 6 N or N m
 FORCE_AT = 0.5  # of wc, the frequency of the loads whose force varies
@@ -102,6 +120,89 @@ KINDS = ("switching", "smoothed")
 COLOURS = "#0072B2", "#7CC0E8", "#D55E00", "#F0B080"
 FIGURE_WIDTH, ROW_HEIGHT, LIMIT = 7.0, 1.75, 1e3  # inches; largest lead that is drawn
 FAILED = 1e3  # score of a run that fails: chosen, beyond all others
+
+
+class Lead(NamedTuple):
+    """The lead of the first family over the second in a cell, a plant in a condition."""
+
+    plant: str
+    condition: str
+    first: str  # family
+    second: str
+    times: float  # the second's score over the first's
+    low: float
+    high: float
+    laws: tuple[str, ...]  # of the first family: of both halves of the runs
+
+    @property
+    def sure(self) -> bool:
+        """Whether the interval leaves no doubt of which of the two is better."""
+        return self.low > 1.0
+
+
+def chosen_by_halves(values: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Return a family's score in each run, of the law that the other half of the runs chose, and
+    both laws.
+
+    `values`: (laws, runs).
+    """
+    scores = np.empty(values.shape[1])
+    best = []
+    for half in (0, 1):
+        best.append(int(np.median(values[:, 1 - half :: 2], axis=1).argmin()))
+        scores[half::2] = values[best[-1], half::2]
+    return scores, best
+
+
+def lead(
+    scores: Mapping[str, np.ndarray],
+    sets: Mapping[str, np.ndarray],
+    floor: float,
+    families: Mapping[str, Sequence[str]] = FAMILIES,
+) -> Lead | None:
+    """Return the lead in a cell; None with fewer than two families, or two runs.
+
+    Scores: law -> (runs,).
+    """
+    members = {family: [law for law in laws if law in scores] for family, laws in families.items()}
+    members = {family: laws for family, laws in members.items() if laws}
+    if len(members) < 2 or len(next(iter(scores.values()))) < 2:
+        return None
+    by_family = {
+        family: chosen_by_halves(np.maximum([scores[law] for law in laws], floor))
+        for family, laws in members.items()
+    }
+    first, second = sorted(by_family, key=lambda family: float(np.median(by_family[family][0])))[:2]
+    with np.errstate(invalid="ignore"):
+        ratios = np.log(by_family[second][0]) - np.log(by_family[first][0])  # NaN where both fail
+    labels = linked(*sets.values()) or tuple(range(len(ratios)))
+    with np.errstate(invalid="ignore"):
+        samples = [ratios[np.equal(labels, label)].mean() for label in dict.fromkeys(labels)]
+    times, low, high = map(math.exp, interval(np.array(samples), ERROR))
+    laws = tuple(dict.fromkeys(members[first][i] for i in by_family[first][1]))
+    return Lead("", "", first, second, times, low, high, laws)
+
+
+def leads(
+    table: Table, metric: str, families: Mapping[str, Sequence[str]] = FAMILIES
+) -> tuple[Lead, ...]:
+    """Return the lead in every cell of a study's table that has one; families: name -> names of
+    laws.
+    """
+    found = []
+    by_row = paired_runs.by_row(table, metric)
+    for group in paired_runs.groups(table, by=("plant", "condition")):
+        ((plant, condition),) = group.blocks
+        (ran,) = paired_runs.scenarios(table, group)
+        if not (scored := group.scores(by_row)).values:
+            continue
+        there = ~np.isnan(np.array([row[0] for row in scored.values.values()])).any(axis=0)
+        values, sets = (
+            {law: row[0][there] for law, row in of.items()} for of in (scored.values, scored.sets)
+        )
+        if one := lead(values, sets, paired_runs.floor(ran, metric), families):
+            found.append(one._replace(plant=plant, condition=condition))
+    return tuple(found)
 
 
 class Subject(NamedTuple):
@@ -245,7 +346,9 @@ def cells(
         best = {}
         fine_scores = {}
         for family, laws in families.items():
-            family_scores[family], picked = told_by(np.array([values[law][k] for law in laws]))
+            family_scores[family], picked = chosen_by_halves(
+                np.array([values[law][k] for law in laws])
+            )
             best[family] = [laws[i] for i in picked]
             for law in set(best[family]) - set(fine):
                 fine[law] = scores([halved(one) for one in made[law]])
@@ -322,7 +425,7 @@ def borders(known: Sequence[dict]) -> Iterator[str]:
             if one["score"] != "error" or one["kind"] != KINDS[0] or law not in one["admitted"]:
                 continue
             runs = one["runs"]
-            rivals, _ = told_by(
+            rivals, _ = chosen_by_halves(
                 np.array([runs[rival] for rival in FAMILIES["rivals"] if rival in runs])
             )
             for within, rival, own in zip(one["admitted"][law], rivals, runs[law], strict=True):

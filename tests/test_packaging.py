@@ -294,7 +294,6 @@ MISSING = {
     ],
     "smc.report('r', quick=True)": ["a report", "jinja2", "pip install 'smc-mujoco[report]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
-    "films.film([t], 'a')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }
 
 
@@ -304,7 +303,6 @@ def refused(tmp_path_factory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("refused")
     asked = f"""
 import smc_mujoco as smc
-from smc_mujoco.evidence.report import films
 t = smc.run(smc.Scenario(plant='duffing', law='none', duration=0.01))
 for code in {list(MISSING)}:
     try:

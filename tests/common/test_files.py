@@ -35,7 +35,6 @@ from smc_mujoco.common.files import from_json, plain, reading, replacing, to_jso
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.paper import new
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.report import rigs
 from smc_mujoco.evidence.rigs import records
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import scene
@@ -185,7 +184,6 @@ def test_a_name_that_no_file_can_have_is_one_sentence(name):
         smc.audit,
         writable,
         scene.find,
-        lambda name: rigs.read(Path(name)),
     ]
     calls += [
         lambda name: smc.exchange.law_from_c(f"{name}.c"),

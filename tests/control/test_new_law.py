@@ -46,7 +46,6 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.properties import families
 from smc_mujoco.draw import style
-from smc_mujoco.evidence.report import words
 
 found = {}
 for name in ("brand_new", "plain_one"):
@@ -57,8 +56,8 @@ for name in ("brand_new", "plain_one"):
         "ranked": name in gain_sets.general_laws(["duffing"], "default"),
         "bounds": tuned.bounds,
         "label": style.labels([trace], None)[0],
-        "report": words.law(name),
-        "short": words.short(name),
+        "report": style.law_name(name),
+        "short": style.law_initials(name),
         "colour": style.law_colours([trace.scenario.law])[0],
         "colours": style.law_colours([*smc.laws()]),
         "linear": linear_theory.linear_gains(smc.law(name)),

@@ -288,11 +288,9 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         ["report('gaber', Path(report), True, 2, progress=True)", "wrote report.html (0.3 MB)"],
     ),
-    "report --quick --out there --seeds 2 --law pid,lqr --records r --relevant 0.1": (
+    "report --quick --out there --seeds 2 --law pid,lqr": (
         0,
-        [
-            "report(Path(there), True, 2, None, progress=True, records=Path(r), laws=['pid', 'lqr'], relevant=0.1)"
-        ],
+        ["report(Path(there), True, 2, None, progress=True, laws=['pid', 'lqr'])"],
     ),
     "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3": (
         0,

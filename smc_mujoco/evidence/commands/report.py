@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
@@ -19,18 +18,9 @@ def report(
     seeds: Annotated[
         int | None, typer.Option(min=1, help="Runs of a law in every cell of the grid; default 24.")
     ] = None,
-    records: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder with records of rigs, CSV or npz, shown beside their twins; see `smc-mujoco rig`."
-        ),
-    ] = None,
     law: Annotated[
         list[str] | None,
-        typer.Option(
-            autocompletion=options.LAWS,
-            help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants.",
-        ),
+        typer.Option(autocompletion=options.LAWS, help="Further laws, as a,b, beside the study's."),
     ] = None,
     paper: Annotated[
         str | None,
@@ -39,16 +29,15 @@ def report(
             help="Instead of the study, audit a paper of `smc-mujoco claims --papers`.",
         ),
     ] = None,
-    relevant: options.Relevant = RELEVANT,
     threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which
     controller, where, how sure.
 
-    The report has the grid of plants, laws, conditions and seeds; the paper's claims; margins;
-    regions of attraction; real machines; films. The file OUT/report.html needs no network and no
-    other file; the data are in the same folder. You can stop the command at any time, and continue
-    by starting it again.
+    The report has the tables of `smc-mujoco compare`; the paper's claims; margins; regions of
+    attraction; real machines; films. The file OUT/report.html needs no network and no other file;
+    the data are in the same folder. You can stop the command at any time, and continue by starting
+    it again.
 
     With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html,
     evidence.json, badge.svg and checks.svg.
@@ -62,23 +51,12 @@ def report(
         from smc_mujoco.evidence.report import paper as of_paper
         from smc_mujoco.evidence.report import report as make
 
-    if paper and (seeds or records or law or relevant != RELEVANT):
-        raise ScenarioError(
-            "--seeds, --law, --records and --relevant belong to the study: leave them out with --paper"
-        )
+    if paper and (seeds or law):
+        raise ScenarioError("--seeds and --law belong to the study: leave them out with --paper")
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)
     else:
-        path = make(
-            out,
-            quick,
-            seeds,
-            threads,
-            progress=True,
-            records=records,
-            laws=options.names(law),
-            relevant=relevant,
-        )
+        path = make(out, quick, seeds, threads, progress=True, laws=options.names(law))
     print(
         f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser"
     )

@@ -1,157 +1,100 @@
-"""The HTML page of a report, which needs no network and no other file.
+"""A report as one HTML file, which needs no network and no other file.
 
-    page(findings)                 # the HTML, a str
-
-Each section is a template of its name. Text is escaped by jinja2. Charts are SVG in the page, films
-data URIs. A content security policy in the file forbids everything that is not in it.
+Text is escaped by jinja2. Pictures and films are data URIs. A content security policy in the file
+forbids everything that is not in it.
 """
 
 import base64
-import inspect
-import math
-import re
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, TypeVar
+from typing import NamedTuple
 
-from smc_mujoco.analysis.step_halving import APART, NUDGED
-from smc_mujoco.analysis.tuning.objective import Objective
+from markupsafe import Markup
+
 from smc_mujoco.common import html
-from smc_mujoco.control.law import laws
-from smc_mujoco.draw import style
-from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import answer, charts, oscillation, rigs, words
-from smc_mujoco.evidence.report.plan import GAINS
-from smc_mujoco.evidence.report.stages import Findings
-from smc_mujoco.evidence.rigs import twin_figures
-from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.studies.board import relevance
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from smc_mujoco.common.files import replacing, scratch
+from smc_mujoco.common.tabular import Tabular
+from smc_mujoco.common.text import number
+from smc_mujoco.common.version import __version__
+from smc_mujoco.evidence.audit.verdict import MARKS, Claim, summary
 
 TEMPLATES = Path(__file__).parent / "templates"
-SECTIONS = {
-    "overview": "The answer",
-    "accuracy": "How accurate is it",
-    "claims": "The paper’s claims",
-    "tradeoffs": "Error against effort",
-    "margins": "Margins",
-    "chattering": "How much will it chatter",
-    "regions": "Regions of attraction",
-    "rigs": "On the rig",
-    "flight": "In flight",
-    "films": "Films and traces",
-    "method": "How it was computed",
-}
-
-Row = TypeVar("Row", bound=Hashable)
-Column = TypeVar("Column", bound=Hashable)
-Cell = TypeVar("Cell")
 
 
-def environment() -> "Environment":
-    """Return the jinja2 environment of the templates, with their filters and shared functions."""
-    from markupsafe import Markup
+class Section(NamedTuple):
+    """A part of a report with a heading."""
 
-    made = html.environment(TEMPLATES)
-    made.filters |= {
-        "embedded": lambda *of: Markup(charts.embedded(*of)),
-        "margin_kind": words.kind,
-        "law_name": words.law,
-    }
-    made.globals |= {"words": words, "checks": checks, "uri": uri, "white": style.WHITE_SHARE}
-    return made
+    id: str
+    title: str
+    parts: Sequence[Markup]
 
 
-def page(findings: Findings) -> str:
-    """Return the report as HTML."""
-    from markupsafe import Markup
-
-    made = environment()
-    share = findings.about.plan.relevant
-    made.globals |= {
-        "f": findings,
-        "about": findings.about,
-        "first_film": next((scene for scene in findings.scenes if scene.film), None),
-        "gains_set": GAINS,
-        "infinity": math.inf,
-        "answer": answer,
-        "charts": charts,
-        "rigs": rigs,
-        "oscillation": oscillation,
-        "link": link,
-    }
-    return made.get_template("page.jinja").render(
+def write(
+    path: Path, title: str, over: str, about: str, made_by: str, sections: Sequence[Section]
+) -> Path:
+    """Write a report as an HTML file; `over` and `about` stand above and below its title."""
+    made = html.environment(TEMPLATES).get_template("page.jinja")
+    page = made.render(
         css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
-        js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
-        sections=SECTIONS,
-        # tables: what identifies a row -> column -> cell
-        board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),
-        set_margins=pivot(
-            ((m.kind, m.plant, m.law), name, m)
-            for name, some in findings.by_set.items()
-            for m in some
-        ),
-        gains=pivot(((row.plant, row.law), row.set, row) for row in findings.about.gains),
-        twins=twin_figures.summaries(twin_figures.rows()),
-        # how it was computed
-        laws=laws(),
-        objective=Objective(),
-        u_max=scenarios.U_MAX,
-        control_period=scenarios.CONTROL_PERIOD,
-        relevant=100 * share,
-        step_change=APART,
-        nudged=NUDGED,
-        relevance=relevance(share, ((s.metric, s.floor) for s in findings.scores)),
-        metrics={
-            metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n")
-            for metric in metrics()
-        },
+        title=title,
+        over=over,
+        about=about,
+        made_by=made_by,
+        version=__version__,
+        sections=sections,
     )
+    with replacing(path) as part:
+        part.write_text(page, encoding="utf-8")
+    return path
 
 
-def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, Cell]]:
-    """Return row -> column -> cell, in the order of the cells."""
-    table: dict[Row, dict[Column, Cell]] = {}
-    for row, column, cell in cells:
-        table.setdefault(row, {})[column] = cell
-    return table
+def text(words: str, kind: str = "") -> Markup:
+    """Return a paragraph of a class of the style sheet."""
+    return Markup('<p class="{}">{}</p>').format(kind, words)
 
 
-def checks(sets: Sequence[str], claim: Claim) -> list[SimpleNamespace]:
-    """Return a row for each check of a claim, those that fail first.
+def heading(words: str) -> Markup:
+    """Return a heading within a section."""
+    return Markup("<h3>{}</h3>").format(words)
 
-    Each has what is measured, set of gains -> Check, and its limit in words, "" where the sets have
-    several limits.
-    """
-    rows = []
-    its_checks = pivot(
-        (c.what, name, c) for name in sets if name in claim.numbers for c in claim.checks(name)
-    )
-    for what, by_set in its_checks.items():
-        limits = set()
-        for check in by_set.values():
-            limits.add(f"{words.pretty(check.relation)} {words.number(check.limit)}")
-        rows.append(
-            SimpleNamespace(what=what, checks=by_set, must=limits.pop() if len(limits) == 1 else "")
+
+def tables(shown: Iterable[Tabular]) -> list[Markup]:
+    """Return tables, each as a notebook shows it."""
+    return [Markup(f'<div class="wide">{table._repr_html_()}</div>') for table in shown]
+
+
+def picture(draw: Callable[[Path], object], about: str) -> Markup:
+    """Return the SVG file that a function draws, with its meaning in words."""
+    with scratch() as folder:
+        path = folder / "picture.svg"
+        draw(path)
+        source = uri("image/svg+xml", path.read_bytes())
+    figure = '<figure><img src="{}" alt="{}"><figcaption>{}</figcaption></figure>'
+    return Markup(figure).format(source, about, about)
+
+
+def film(content: bytes, about: str) -> Markup:
+    """Return an MP4 film, with its meaning in words."""
+    video = '<video controls autoplay loop muted playsinline src="{}" aria-label="{}"></video>'
+    shown = Markup(video).format(uri("video/mp4", content), about)
+    return Markup("<figure>{}<figcaption>{}</figcaption></figure>").format(shown, about)
+
+
+def claims(judged: Sequence[Claim]) -> Markup:
+    """Return claims with their verdicts, each of which opens to its numbers."""
+    template = html.environment(TEMPLATES).get_template("claims.jinja")
+    sets = dict.fromkeys(name for claim in judged for name in claim.verdicts)
+    verdicts = dict.fromkeys(claim.verdict for claim in judged)
+    return Markup(
+        template.render(
+            claims=judged,
+            summary=summary(judged),
+            sets=list(sets),
+            verdicts=list(verdicts),
+            marks=MARKS,
+            number=number,
         )
-    return sorted(rows, key=lambda row: all(check.holds for check in row.checks.values()))
-
-
-def link(what: str) -> str:
-    """Return the anchor of the metric that a check names, else that of "verdict"."""
-    names = {}
-    for m in metrics():
-        for called in (m.name, words.metric(m.name)):
-            names[called] = m.name
-    known = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
-    match = re.search(rf"(?<!\w)({known})(?!\w)", what)
-    if match:
-        return f"metric-{names[match[1]]}"
-    return "verdict"
+    )
 
 
 def uri(kind: str, data: bytes) -> str:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from benchmarks import families as script
+from benchmarks import families
 from smc_mujoco.control import gain_sets
-from smc_mujoco.evidence.report import families
 from smc_mujoco.studies.fair_gains import Candidate
 
 pytestmark = pytest.mark.quick
@@ -46,7 +45,7 @@ def test_a_law_is_scored_in_the_half_of_the_runs_that_did_not_choose_it():
     even = np.arange(RUNS) % 2 == 0
     own = np.where(even, 1.0, 100.0)
     other = np.where(even, 100.0, 1.0)
-    scores, best = families.told(np.array([own, other]))
+    scores, best = families.chosen_by_halves(np.array([own, other]))
     assert best == [1, 0]  # the odd runs choose the second law, for the even ones
     assert (scores == 100.0).all()
 
@@ -77,42 +76,42 @@ def test_what_nobody_can_see_is_no_lead_and_one_family_has_none():
 
 def test_a_sentence_stands_is_open_or_is_contradicted_by_its_interval():
     axis, _, highest, score, kind, _ = next(
-        one for one in script.SENTENCES if one[-1] == "is level at best"
+        one for one in families.SENTENCES if one[-1] == "is level at best"
     )
     cell = {"plant": "duffing", "axis": axis, "level": highest, "score": score, "kind": kind}
     ends = [(0.9, 1.1), (0.9, 1.2), (1.01, 1.05), (1.2, 1.3)]
     cells = [cell | {"low": low, "high": high} for low, high in ends]
     cells += [cells[0] | {"level": 2 * highest}, cells[0] | {"kind": "another"}]
-    assert [*script.judged(cells)][-1] == "in all: 2 of 4 stand, 1 contradicted"
-    axis, _, level, score, kind, does = script.SENTENCES[0]
+    assert [*families.judged(cells)][-1] == "in all: 2 of 4 stand, 1 contradicted"
+    axis, _, level, score, kind, does = families.SENTENCES[0]
     assert does == "leads"
     cells = [
         cells[0] | {"axis": axis, "level": level, "score": score, "kind": kind, "low": low}
         for low in (0.9, 1.01)
     ]
-    assert [*script.judged(cells)][-1] == "in all: 1 of 2 stand, 0 contradicted"
+    assert [*families.judged(cells)][-1] == "in all: 1 of 2 stand, 0 contradicted"
 
 
 def test_levels_by_lot_are_within_the_sentences_and_of_their_seed():
-    levels = script.by_lot(7)
-    assert levels == script.by_lot(7) != script.by_lot(8)
-    for axis, lowest, highest, *_ in script.SENTENCES:
-        assert sum(lowest <= level <= highest for level in levels[axis]) >= script.DRAWN
+    levels = families.by_lot(7)
+    assert levels == families.by_lot(7) != families.by_lot(8)
+    for axis, lowest, highest, *_ in families.SENTENCES:
+        assert sum(lowest <= level <= highest for level in levels[axis]) >= families.DRAWN
 
 
 def test_a_lead_is_told_where_the_gains_admit_the_load_and_where_not():
-    runs = {law: np.ones(RUNS) for law in script.SURE} | dict.fromkeys(
+    runs = {law: np.ones(RUNS) for law in families.SURE} | dict.fromkeys(
         families.FAMILIES["rivals"], np.full(RUNS, 9.0)
     )
     cell = {
         "score": "error",
         "kind": "switching",
         "runs": runs,
-        "admitted": dict.fromkeys(script.SURE, [True] * RUNS),
+        "admitted": dict.fromkeys(families.SURE, [True] * RUNS),
     }
     weaker = runs | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 2.0))
     beyond = cell | {"runs": weaker, "admitted": {"implicit_first_order": [False] * RUNS}}
-    told = [*script.borders([cell, beyond, cell | {"kind": "smoothed"}, cell | {"admitted": {}}])]
+    told = [*families.borders([cell, beyond, cell | {"kind": "smoothed"}, cell | {"admitted": {}}])]
     assert [line.split(": ")[1] for line in told[:2]] == [
         "9 (9 to 9), 12 runs",
         "2 (2 to 2), 12 runs",
@@ -125,8 +124,8 @@ def test_gains_admit_a_load_below_k_and_a_rate_below_k2(tmp_path):
     """On the hanging chain implicit_first_order has k of 0.65 to 0.8 N m, super_twisting k2 of 1 to
     8 N m / s.
     """
-    found = script.subject("pendulum_network", tmp_path)
-    within, beyond = (found.admitted(script.FORCE, level) for level in (0.6, 1.0))
+    found = families.subject("pendulum_network", tmp_path)
+    within, beyond = (found.admitted(families.FORCE, level) for level in (0.6, 1.0))
     assert within == {
         "implicit_first_order": [True] * RUNS,
         "super_twisting": [False] * RUNS,
@@ -143,8 +142,8 @@ def test_a_load_and_friction_are_in_proportion_to_the_bound():
     """
     plant = smc.plant_from(MODEL, channels={"slide": smc.Channel(x0=0.3)})
     laws = [smc.law("adrc", wc=float(i + 1)) for i in range(RUNS)]
-    found = script.Subject(plant, {"adrc": Candidate(laws[1], tuple(laws))}, "heavy")
-    assert found.load(script.FORCE, 0.5) == (5.0, 1.0)
+    found = families.Subject(plant, {"adrc": Candidate(laws[1], tuple(laws))}, "heavy")
+    assert found.load(families.FORCE, 0.5) == (5.0, 1.0)
     assert found.load("load, omega / wc", 0.25) == (10.0, 0.5)
     runs = found.scenarios("friction / u_max", 0.1, "adrc")
     assert [run.law.gains["wc"] for run in runs] == [law.gains["wc"] for law in laws]
@@ -156,10 +155,10 @@ def test_a_load_and_friction_are_in_proportion_to_the_bound():
 def test_a_plant_may_be_what_a_python_file_defines(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text("import smc_mujoco as smc\nMINE, N = smc.plant('duffing', beta=2.0), 3\n")
-    assert script.of_file(path).parameters["beta"] == 2.0
+    assert families.of_file(path).parameters["beta"] == 2.0
     path.write_text("import smc_mujoco as smc\nA, B = map(smc.plant, ('duffing', 'van_der_pol'))\n")
-    assert script.of_file(path, "van_der_pol").name == "van_der_pol"
+    assert families.of_file(path, "van_der_pol").name == "van_der_pol"
     with pytest.raises(
         smc.ScenarioError, match=r"plant of .*mine.py '': choose from duffing, van_der_pol"
     ):
-        script.of_file(path)
+        families.of_file(path)

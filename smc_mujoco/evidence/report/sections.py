@@ -1,0 +1,431 @@
+"""The sections of a report: tables of `compare`, pictures of `draw`, films, and a paper's claims.
+
+If the work is killed and started again, the comparison continues where it stopped, and all else
+with the first margin, map, film or list of claims that is missing.
+"""
+
+import dataclasses
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from markupsafe import Markup
+
+from smc_mujoco.analysis import margins as margin_search
+from smc_mujoco.analysis import region_of_attraction as maps
+from smc_mujoco.analysis.margins import MARGIN_KINDS, Margin
+from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.common.tabular import Cell, Tabular
+from smc_mujoco.common.text import capital, number
+from smc_mujoco.control.law import laws as known_laws
+from smc_mujoco.draw import dot_plot, figure, region
+from smc_mujoco.draw.film import film as video
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, accuracy
+from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.verdict import Claim, Claims, summary
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.evidence.report import flight, page
+from smc_mujoco.evidence.report.page import Section, heading, picture, tables, text
+from smc_mujoco.evidence.report.plan import GAINS, Work
+from smc_mujoco.evidence.rigs import ensemble, twin_figures
+from smc_mujoco.evidence.rigs.figure import twins_figure
+from smc_mujoco.evidence.rigs.rig import rig as find_rig
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
+from smc_mujoco.simulation.conditions import condition, find_condition
+from smc_mujoco.simulation.grid import grid as make_grid
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.board import Board
+from smc_mujoco.studies.compare import Compared, compare
+from smc_mujoco.studies.leaderboard import leaderboard
+from smc_mujoco.studies.study import study
+from smc_mujoco.studies.table import Table
+
+METRICS = ("settling_time", "itae", "ultimate_bound", "tv_rate")  # one a wish: fast, calm, ...
+DRONE, FLIGHT_DURATION = "quadrotor", 6.0  # s
+FLIGHT_METRICS = ("ultimate_bound", "tv_rate")
+FILM_SIZE, FILM_RATE = (960, 540), 20  # px; 1/s
+ACCURACY_CONDITIONS = ("constant", "coulomb")  # a steady force, and dry friction
+UNBEATEN = (
+    "A law is unbeaten in a condition if no other is shown to be better there, if none of its runs "
+    "fails, and if no other is shown to settle in more runs. It wins if it is shown to be better "
+    "than every other. A table names the laws that are unbeaten in the most conditions."
+)
+LIMITS = (
+    "Nothing was tried on hardware: all is simulated, from equations of the plants and models of "
+    "friction, drives and sensors.",
+    "Seeds change the start, the noise, and the search from which gains come. Everything else "
+    "changes by condition only.",
+    "All laws have one bound on u and one control period. With others the order may change.",
+    "A margin or a map is what runs showed. It is no proof.",
+)
+
+
+def write(work: Work) -> Path:
+    """Compute a study and write it as OUT/report.html."""
+    grid = work.plan.grid
+    compared = compare(
+        grid.laws,
+        grid.plants,
+        grid.conditions,
+        grid.seeds,
+        worst=work.plan.worst,
+        out=work.folder / "compared",
+        metrics=(SETTLES, *METRICS),
+        duration=grid.duration,
+        threads=work.threads,
+        progress=work.progress,
+    )
+    judged = claims_of(work)
+    shown = scenes(work)
+    quick = " --quick" if work.plan.quick else ""
+    return page.write(
+        work.folder / "report.html",
+        title="Which controller, where, and how sure?",
+        over="Sliding-mode control on MuJoCo mechanisms" + (", a quick look" if quick else ""),
+        about=f"{len(compared.table)} runs of {grid.duration:g} s: {len(grid.plants)} plants, "
+        f"{len(grid.laws)} laws, {len(grid.conditions)} conditions, {grid.seeds} seeds of each",
+        made_by=f"smc-mujoco report{quick}",
+        sections=[
+            overview(compared, judged, shown),
+            comparison(compared),
+            Section("claims", "The paper's claims", [page.claims(judged)]),
+            margins(work),
+            regions(work),
+            accuracies(work),
+            machines(work),
+            flights(work),
+            Section("films", "Films and traces", shown),
+            method(work, compared),
+        ],
+    )
+
+
+def overview(compared: Compared, judged: Sequence[Claim], shown: Sequence[Markup]) -> Section:
+    """Return the first screen: the unbeaten laws, the verdicts on the paper, and a film."""
+    parts = [
+        text(UNBEATEN),
+        *tables([leaders(compared.leaderboard)]),
+        text(f"The paper, in claims: {summary(judged)}.", "strong"),
+        *shown[:1],
+    ]
+    return Section("overview", "The answer", parts)
+
+
+def leaders(boards: Iterable[Board]) -> Tabular:
+    """Return the laws that are unbeaten in the most conditions, for each plant and metric."""
+    cells: dict[str, dict[str, Cell]] = {}
+    for (plant, metric), outcomes in _outcomes(boards).items():
+        cells.setdefault(plant, {})[metric] = _leading(list(outcomes.values()))
+    rows = []
+    for plant, by_metric in cells.items():
+        rows.append([plant, *(by_metric.get(metric, "") for metric in METRICS)])
+    heads = [f"{CATALOGUE[metric].need}: {CATALOGUE[metric].label}" for metric in METRICS]
+    return Tabular(headings=["plant", *heads], rows=rows, title="What to use", left=5)
+
+
+Outcome = tuple[str | None, tuple[str, ...]]  # the winner of a cell, and its unbeaten laws
+
+
+def _outcomes(boards: Iterable[Board]) -> dict[tuple[str, str], dict[str, Outcome]]:
+    """Return plant and metric -> condition -> outcome."""
+    blocks = {}
+    for board in boards:
+        for block in board.blocks:
+            blocks[board.metric, block.plant, block.condition] = block
+    found: dict[tuple[str, str], dict[str, Outcome]] = {}
+    for (metric, plant, name), block in blocks.items():
+        if metric in METRICS:
+            settling = blocks[SETTLES, plant, name].best
+            unbeaten = tuple(law for law in block.best if law in settling)
+            found.setdefault((plant, metric), {})[name] = block.winner, unbeaten
+    return found
+
+
+def _leading(outcomes: Sequence[Outcome]) -> Cell:
+    """Return the laws that are unbeaten in the most of several conditions."""
+    unbeaten = Counter(law for _, laws in outcomes for law in laws)
+    if not unbeaten:
+        return Cell("none")
+    most = max(unbeaten.values())
+    laws = [law for law, count in unbeaten.items() if count == most]
+    wins = sum(winner in laws for winner, _ in outcomes)
+    return Cell(
+        _few(laws),
+        f"unbeaten in {most} of {len(outcomes)}" + (f", {wins} won" if wins else ""),
+        strong=wins == len(outcomes),
+    )
+
+
+def _few(laws: Sequence[str]) -> str:
+    """Return the names of three laws at most, and how many more there are."""
+    names = ", ".join(laws[:3])
+    if len(laws) > 3:
+        return f"{names}, {len(laws) - 3} more"
+    return names
+
+
+def comparison(compared: Compared) -> Section:
+    """Return the winners by condition, the tables of the comparison, and its medians."""
+    outcomes = _outcomes(compared.leaderboard)
+    plants = list(dict.fromkeys(plant for plant, _ in outcomes))
+    conditions = list(dict.fromkeys(name for by_name in outcomes.values() for name in by_name))
+    matrices = []
+    for metric in METRICS:
+        rows = []
+        for name in conditions:
+            row = [Cell(name)]
+            for plant in plants:
+                winner, unbeaten = outcomes[plant, metric].get(name, (None, ()))
+                row.append(Cell(winner or _few(unbeaten) or "none", strong=winner is not None))
+            rows.append(row)
+        matrices.append(
+            Tabular(
+                headings=["condition", *plants],
+                rows=rows,
+                title=f"By {CATALOGUE[metric].label}: the winner in bold, or the unbeaten laws",
+                left=1 + len(plants),
+            )
+        )
+    first = conditions[0]
+    medians = picture(
+        lambda path: dot_plot.plot(
+            compared.table.select(condition=first), path, METRICS, f"Medians, {first}"
+        ),
+        f"The median of each law in condition {first}, with its 95 % interval.",
+    )
+    parts = [*tables(matrices), medians, *tables(compared.tables)]
+    return Section("laws", "Laws compared", parts)
+
+
+def claims_of(work: Work) -> Claims:
+    """Return the claims of the paper with their verdicts."""
+    plan = work.plan
+    return work.kept(
+        "claims.json",
+        [plan.claims, plan.quick],
+        lambda report: (
+            audit(only=plan.claims, quick=plan.quick, threads=work.threads, report=report).claims
+        ),
+        lambda claims, path: write_json(path, [dataclasses.asdict(claim) for claim in claims]),
+        lambda path: Claims(Claim(**entry) for entry in read_json(path)),
+    )
+
+
+def margins(work: Work) -> Section:
+    """Return the largest levels of delay, disturbance and so on that the laws tolerate."""
+    plan = work.plan
+    parts = [
+        text(
+            "The largest level that a law tolerates, by bisection in simulation. Below it: what "
+            "linear theory says. ≥: the search ended there, the law may tolerate more. None: the "
+            "law does not stay within 5 % of its start even without it."
+        )
+    ]
+    for plant in plan.grid.plants:
+        laws = plan.grid.laws
+        found = work.kept(
+            f"margins-{plant}.json",
+            [laws, plan.kinds, plan.quick, GAINS],
+            lambda report, plant=plant, laws=laws: margin_search.margins(
+                plant, laws, plan.kinds, GAINS, plan.quick, work.threads, report
+            ),
+            margin_search.save,
+            margin_search.load,
+        )
+        parts += tables([margin_table(plant, found)])
+    return Section("margins", "Margins", parts)
+
+
+def margin_table(plant: str, found: Sequence[Margin]) -> Tabular:
+    """Return the margins of laws on a plant."""
+    units = {margin.kind: margin.unit for margin in found}
+    heads = []
+    for kind, unit in units.items():
+        label = MARGIN_KINDS[kind].label
+        heads.append(label if unit == "1" else f"{label} ({unit})")
+    rows: dict[str, list[Cell | str]] = {}
+    for margin in found:
+        value = f"{'≥ ' if margin.open else ''}{number(margin.value)}"
+        theory = margin.theory
+        below = "" if theory is None else f"theory {number(theory)}"
+        rows.setdefault(margin.law, [margin.law]).append(Cell(value, below))
+    return Tabular(headings=["law", *heads], rows=list(rows.values()), title=plant)
+
+
+def regions(work: Work) -> Section:
+    """Return maps of regions of attraction."""
+    plan = work.plan
+    parts = []
+    for plant in plan.regions:
+        found = []
+        for law in scenarios.LAWS:
+            found.append(
+                work.kept(
+                    f"region-{plant}-{law}.json",
+                    [plan.points, GAINS],
+                    lambda report, plant=plant, law=law: maps.basin(
+                        plant, law, plan.points, gains=GAINS, threads=work.threads, report=report
+                    ),
+                    maps.Basin.save,
+                    maps.load,
+                )
+            )
+        parts.append(
+            picture(
+                lambda path, found=found: region.draw(found, path),
+                f"{plant}: the states from which a law brings it to rest.",
+            )
+        )
+    return Section("regions", "Regions of attraction", parts)
+
+
+def accuracies(work: Work) -> Section:
+    """Return how the errors of laws fall with the control period."""
+    plan = work.plan
+    found = work.kept(
+        "accuracy.json",
+        [plan.accurate, plan.grid.laws, plan.periods, plan.accuracy_starts, GAINS],
+        lambda report: accuracy(
+            plan.grid.laws,
+            plan.accurate,
+            plan.periods,
+            ACCURACY_CONDITIONS,
+            plan.accuracy_starts,
+            GAINS,
+            threads=work.threads,
+            report=report,
+        ),
+        AccuracyTable.save,
+        load_accuracy,
+    )
+    drawn = picture(
+        lambda path: found.plot(path, format="svg"),
+        "Largest error without noise over the control period. Dashed: the slope of theory.",
+    )
+    return Section("accuracy", "Accuracy without noise", [drawn, *tables(found.tables)])
+
+
+def machines(work: Work) -> Section:
+    """Return laws compared on every parameter set of real machines, and how good the twins are."""
+    grid = work.plan.grid
+    parts = [
+        text(
+            "A rig is a real machine as data. Its records do not fix its parameters, so each law "
+            "runs on every set that fits them."
+        )
+    ]
+    for name in work.plan.rigs:
+        rig = find_rig(name)
+        table = ran(work, name, ensemble.runs(rig, seeds=grid.seeds, duration=grid.duration))
+        parts += [heading(rig.label), *tables(leaderboard(table, METRICS, defaults=True).tables)]
+    drawn = picture(
+        lambda path: twins_figure(twin_figures.rows(), path),
+        "Figures of public records: of the twin over those of the machine. 1 is equal.",
+    )
+    return Section("rigs", "Real machines", [*parts, drawn])
+
+
+def flights(work: Work) -> Section:
+    """Return laws of flight compared on a quadrotor."""
+    plan = work.plan
+    drone = find_plant(DRONE)
+    names = [name for name in known_laws(drone) if name != "none"]
+    conditions = []
+    for name in plan.flights:
+        if name in flight.CONDITIONS:
+            conditions.append(condition(name, **flight.CONDITIONS[name]))
+        else:
+            conditions.append(find_condition(name))
+    runs = make_grid(drone, names, conditions, plan.flight_seeds, "default", FLIGHT_DURATION)
+    table = ran(work, DRONE, runs)
+    drawn = picture(
+        lambda path: dot_plot.plot(table, path, FLIGHT_METRICS, "Flight: medians"),
+        "How far laws of flight are off, and how much they move the rotors.",
+    )
+    boards = leaderboard(table, FLIGHT_METRICS, by=("plant", "condition"), defaults=True)
+    gains = text("All laws have their default gains.")
+    return Section("flight", "Flight", [gains, drawn, *tables(boards.tables)])
+
+
+def ran(work: Work, name: str, runs: Sequence[Scenario]) -> Table:
+    """Return the table of runs that a folder keeps."""
+    folder = work.folder / name
+    return study(runs, folder, threads=work.threads, progress=work.progress)
+
+
+def scenes(work: Work) -> list[Markup]:
+    """Return films of the paper's laws side by side, and their traces."""
+    plan = work.plan
+    parts = []
+    missing = video.missing() if plan.filmed else None
+    if missing:
+        parts.append(text(f"There are no films here: {missing}."))
+    for k, plant in enumerate(plan.scenes):
+        names = ", ".join(scenarios.LAWS)
+        runs = scenarios.comparison(plant, duration=plan.scene, gains=GAINS)
+        traces = run(list(runs.values()), work.threads)
+        if k < plan.filmed and not missing:
+            content = filmed(work, plant, traces)
+            parts.append(page.film(content, f"{plant}, nominal, from the left: {names}."))
+        parts.append(
+            picture(
+                lambda path, traces=traces: figure.figure(traces, path, panels=("x", "u")),
+                f"{plant}, nominal: x and u of {names}.",
+            )
+        )
+    return parts
+
+
+def filmed(work: Work, plant: str, traces: Sequence[Trace]) -> bytes:
+    """Return a film of traces, as MP4."""
+    return work.kept(
+        f"film-{plant}.mp4",
+        [scenarios.LAWS, work.plan.scene, GAINS, FILM_SIZE, FILM_RATE],
+        lambda report: traces,
+        lambda shown, path: video.film(shown, path, size=FILM_SIZE, fps=FILM_RATE),
+        Path.read_bytes,
+    )
+
+
+def method(work: Work, compared: Compared) -> Section:
+    """Return how the report was computed, what it does not tell, and what its words mean."""
+    plan = work.plan
+    first = compared.table.scenario(0)
+    versions = json.loads(compared.table.column("versions")[0]) | {"scipy": version("scipy")}
+    failed = sum(failure is not None for failure in compared.table.column("failure"))
+    facts = {
+        "runs": f"{len(compared.table)}, of which {failed} failed",
+        "starts": "seed 0 the plant's own x0, every other seed within 20 % of it",
+        "bound on u": f"|u| ≤ {first.resolved.u_max:g}, the same for every law",
+        "control period": f"{1e3 * first.control_period:g} ms",
+        "margins and claims": "quick: coarser, one set of gains" if plan.quick else "in full",
+        "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
+    }
+    plant = find_plant(plan.grid.plants[0])
+    conditions = []
+    for name in plan.grid.conditions:
+        fields = find_condition(name).brief(plant, plan.grid.duration)
+        conditions.append((name, fields or "nothing"))
+    meanings = []
+    for metric in metrics():
+        meanings.append((metric.label, metric.unit_for("rad"), metric.summary))
+    shown = [
+        Tabular(headings=["fact", ""], rows=list(facts.items()), title="What was run", left=2),
+        Tabular(
+            headings=["condition", "adds to the nominal run"],
+            rows=conditions,
+            title=f"Conditions, on {plant.name}",
+            left=2,
+        ),
+        Tabular(headings=["metric", "unit", "is"], rows=meanings, title="Metrics", left=3),
+    ]
+    limits = [text(capital(limit)) for limit in LIMITS]
+    parts = [heading("What it does not tell"), *limits, *tables(shown)]
+    return Section("method", "How it was computed", parts)
