@@ -12,7 +12,6 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
-from smc_mujoco.cli import tables
 from smc_mujoco.evidence.papers.gaber import scenarios
 
 margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
@@ -259,7 +258,9 @@ def test_only_laws_with_a_linear_part_have_theory(found):
 POLES = """
 <mujoco><option integrator="RK4"/><worldbody>
   <body><joint name="a" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
-  <body pos="0 2 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
+  <body pos="0 2 0">
+    <joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/>
+  </body>
 </worldbody><actuator>{motors}</actuator>{rest}</mujoco>"""
 MOTORS = (
     '<motor joint="a" gear="40" ctrlrange="-1 1"/><motor joint="b" gear="15" ctrlrange="-1 1"/>'
@@ -305,6 +306,16 @@ def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
     assert found[1].value > 0.1
 
 
+@pytest.mark.parametrize("kind", margins.MARGIN_KINDS)
+def test_a_level_of_each_kind_changes_the_run(kind):
+    """A margin of what is never put into the run would be the largest level."""
+    base = dataclasses.replace(BASE, duration=1.0)
+    level = margins.MARGIN_KINDS[kind].levels[-1]
+    plain, *changed = smc.run([base, *margins.MARGIN_KINDS[kind].scenarios(base, level)])
+    for trace in changed:
+        assert np.abs(trace.x - plain.x).max() > 1e-5  # half a step changes 1e-10
+
+
 def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
     heavier = margins.MARGIN_KINDS["mass"].put
     for name in ("mass", "M"):
@@ -347,30 +358,3 @@ def test_what_holds_no_margins_is_refused(tmp_path, refused):
         path.write_text(text)
         refused(lambda: margins.load(path))
     refused(lambda: margins.save([], tmp_path / "margins.csv"))
-
-
-def test_an_unknown_name_is_refused_with_the_cure(refused):
-    for arguments in [
-        (["duffin"], ["classical"], ["delay"], "study"),
-        (["duffing"], ["classic"], ["delay"], "study"),
-        (["duffing"], ["classical"], ["delays"], "study"),
-        (["duffing"], ["classical"], {"delay": 1.0}, "study"),
-        (["duffing"], ["classical"], ["delay"], "best"),
-    ]:
-        refused(lambda arguments=arguments: margins.margins(*arguments))
-
-
-def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_tolerated():
-    from rich.console import Console
-
-    console = Console(width=100)
-    with console.capture() as captured:
-        console.print(
-            tables.margins(
-                "delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]
-            )
-        )
-    first, second = captured.get().splitlines()[-3:-1]
-    assert "none" in first
-    assert "any" in first
-    assert ">= 1.00" in second
