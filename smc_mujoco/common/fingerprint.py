@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 from numba import types
+from numba.extending import is_jitted
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
@@ -185,7 +186,10 @@ class _CodePickler(pickle._Pickler):
         """Return how an object is written: its kind, and its contents, which may contain the object
         itself.
         """
-        obj, kind = _as_written(obj), ""
+        if is_jitted(obj):
+            return (str, ("compiled",), [obj.py_func, sorted(obj.targetoptions.items())])
+        obj = _as_written(obj)
+        kind = ""
         contents: Any = NotImplemented
         if isinstance(obj, FunctionType):
             contents = _function_contents(obj)
@@ -244,13 +248,18 @@ def _overloads(function: FunctionType) -> list[Any]:
     """Return the functions that numba compiles in place of this one, as declared by
     `numba.extending.overload`.
     """
-    kinds = (kind for known, kind in builtin_registry.globals if known is function)
-    return [
-        vars(each)["_overload_func"]
-        for kind in kinds
-        for each in kind.templates
-        if "_overload_func" in vars(each)
-    ]
+    return _overloads_of(len(builtin_registry.globals)).get(id(function), [])
+
+
+@functools.lru_cache(maxsize=1)
+def _overloads_of(count: int) -> dict[int, list[Any]]:
+    """Return the id of a function -> its overloads; numba has registered `count` globals so far."""
+    found: dict[int, list[Any]] = {}
+    for known, kind in builtin_registry.globals:
+        for template in getattr(kind, "templates", ()):
+            if "_overload_func" in vars(template):
+                found.setdefault(id(known), []).append(vars(template)["_overload_func"])
+    return found
 
 
 def _reached(

@@ -8,34 +8,36 @@ import contextlib
 import functools
 import hashlib
 import importlib
-import io
 import itertools
 import math
 import os
+import pickle
 import re
 import secrets
 import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from types import ModuleType
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from llvmlite import ir
-from numba import from_dtype, njit, typeof, types
+from numba import TypingError, from_dtype, njit, typeof, types
 from numba.extending import intrinsic
 
 from smc_mujoco.common import numba_internals as internals
-from smc_mujoco.common.errors import printable
+from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.files import replacing
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
-DIGEST_SIZE = hashlib.sha256().digest_size
-MAX_FILES_OF_A_NAME = (
-    64  # in the cache: functions of one name, such as laws that are written from numbers
-)
+SEAL_SIZE = hashlib.sha256().digest_size
+# in the cache: functions of one name, such as laws that are written from numbers
+MAX_FILES_OF_A_NAME = 64
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
@@ -43,10 +45,9 @@ WHEREABOUTS = re.compile(
 )
 COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEME is set
 
-# When numba loads a function from its cache, it imports the function's module. If that module
-# cannot be imported, such as a scene file, numba stores the name of a placeholder instead.
-# Registering the placeholder lets numba import it.
-sys.modules.setdefault(internals.dynamic_modname, internals.dynamic_module)
+# When numba loads a function from the disk, it imports the function's module. If that module cannot
+# be imported, such as a scene file, numba has stored the name of a placeholder instead.
+sys.modules.setdefault(internals.DYNAMIC_MODULE, ModuleType(internals.DYNAMIC_MODULE))
 
 free_after_fork(internals.global_compiler_lock)
 
@@ -76,10 +77,8 @@ class Numbers:
     def given(self) -> Iterator[None]:
         """Let numba give these numbers to the functions that it compiles in the block."""
         with internals.global_compiler_lock:
-            theirs, internals.FunctionIdentity._unique_ids = (
-                internals.FunctionIdentity._unique_ids,
-                self.count,
-            )
+            theirs = internals.FunctionIdentity._unique_ids
+            internals.FunctionIdentity._unique_ids = self.count
             try:
                 yield
             finally:
@@ -158,9 +157,8 @@ def _calling(bits: int) -> Callable:
 
 
 call = _calling(64)  # (address, inputs, parameters, memory, outputs) -> status
-call_int = _calling(
-    32
-)  # the same for a C function that returns an int: the register's upper half is undefined
+# the same for a C function that returns an int: the register's upper half is undefined
+call_int = _calling(32)
 
 
 @intrinsic
@@ -191,9 +189,9 @@ def attempting(count: int, estimates: bool = False) -> Callable:
         returned = resolved.return_type
         items = list(returned.types if isinstance(returned, types.BaseTuple) else [returned])  # pyright: ignore[reportAttributeAccessIssue] tuples of numba have it
         if not all(isinstance(item, types.Integer | types.Float | types.Boolean) for item in items):
-            raise internals.TypingError(f"it returns {returned} instead of numbers")
+            raise TypingError(f"it returns {returned} instead of numbers")
         if len(items) != count and not (estimates and len(items) == 1):
-            raise internals.TypingError(f"it returns {len(items)} numbers instead of {count}")
+            raise TypingError(f"it returns {len(items)} numbers instead of {count}")
 
         def codegen(context, builder, signature, args):
             compiled = body.dispatcher.overloads[resolved.args]
@@ -244,35 +242,33 @@ def loader(kind: type) -> Callable:
     return load
 
 
-def compiled(
-    signature: Any, body: Callable, cache: bool | tuple[str, str] = False
-) -> internals.CFunc:
-    """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
+class Key(NamedTuple):
+    """By what a compiled function is found on disk."""
 
-    `cache`: whether to use numba's cache on disk; for a body whose closure holds functions, its
-    name and a hash of all.
+    name: str
+    used: str  # a hash of all that it uses, see common/fingerprint.py
+
+
+def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
+    """Return numba's CFunc of a function. Ctrl-C is delayed to the end, as numba may lose it.
+
+    With a key it is loaded from the disk, or written there.
     """
-    made = internals.CFunc(
-        body, internals.normalize_signature(signature), {}, {"error_model": "numpy"}
-    )
-    _compile(made, body, cache)
+    options = {"error_model": "numpy"}
+    made = internals.CFunc(body, (signature.args, signature.return_type), {}, options)
+    if key is not None:
+        made._cache = Cache(key)
+    with _compiling():
+        made.compile()
     return made
 
 
-def compile_for(
-    made: internals.Dispatcher, arguments: tuple[Any, ...], cache: bool | tuple[str, str]
-) -> None:
+def compile_for(made: Any, arguments: tuple[Any, ...], key: Key | None) -> None:
     """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
-    _compile(made, made.py_func, cache, tuple(map(typeof, arguments)))
-
-
-def _compile(made: Any, body: Callable, cache: bool | tuple[str, str], *types: Any) -> None:
-    """Load a function from the disk, or compile it and write it there."""
-    if cache:
-        with contextlib.suppress(RuntimeError):  # nowhere to write
-            made._cache = Cache(body, *(() if cache is True else cache))
+    if key is not None:
+        made._cache = Cache(key)
     with _compiling():
-        made.compile(*types)
+        made.compile(tuple(map(typeof, arguments)))
 
 
 @contextlib.contextmanager
@@ -301,18 +297,16 @@ def _within_bounds(kernel, prepare, context, builder, sig, args, ufunc, kind):
 
     Numba's own code for a += b reads beyond the end of b if a is longer.
     """
-    pairs = [*zip(args, sig.args, strict=True)]
-    targets, arrays = (
-        [
-            prepare(context, builder, value, of)
-            for value, of in some
-            if isinstance(of, types.ArrayCompatible)
-        ]
-        for some in (pairs[ufunc.nin :], pairs)
-    )
+    arrays = []
+    targets = []  # those of them that it writes into
+    for i, (value, numba_type) in enumerate(zip(args, sig.args, strict=True)):
+        if isinstance(numba_type, types.ArrayCompatible):
+            arrays.append(prepare(context, builder, value, numba_type))
+            if i >= ufunc.nin:
+                targets.append(arrays[-1])
     for target, array in itertools.product(targets, arrays):
         if array.ndim > target.ndim:
-            raise internals.TypingError("it writes into an array of fewer dimensions than it reads")
+            raise TypingError("it writes into an array of fewer dimensions than it reads")
         for its, size in zip(reversed(array.shape), reversed(target.shape), strict=False):
             fits = builder.or_(
                 builder.icmp_signed("==", its, size), builder.icmp_signed("==", its, its.type(1))
@@ -339,55 +333,74 @@ def _load_numba() -> None:
                 linalg.ensure_blas = ensure_blas
 
 
-class Cache(internals.FunctionCache):
-    """Cache of a compiled function on disk.
+class Cache:
+    """A compiled function on disk, in place of numba's own cache.
 
-    A damaged file counts as missing; a full disk is not an error.
+    Numba's own would take it for outdated if a line of its file changed, and for current if a
+    function that it calls changed. A damaged file counts as missing; a full disk is not an error.
     """
 
-    def __init__(self, body: Callable, name: str = "", content: str = ""):
-        super().__init__(body)
-        locator = self._impl.locator
-        base = self._impl.filename_base
-        self.content = content
-        digest = hashlib.sha256(content.encode()).hexdigest()[:16]
-        of_name = f"{name[:80]}-{{}}-{base}"  # a file's name has 255 bytes at most
-        self.files_of_name = of_name.format("?" * len(digest))
-        stamp = content or locator.get_source_stamp()
-        self._cache_file = Sealed(
-            locator.get_cache_path(), of_name.format(digest) if name else base, stamp
-        )
+    def __init__(self, key: Key):
+        self.key = key
+        package = Path(__file__).parents[1]
+        if numba.config.CACHE_DIR:
+            self.folder = Path(numba.config.CACHE_DIR)
+        elif os.access(package, os.W_OK):
+            self.folder = package / "__pycache__"
+        else:
+            self.folder = Path(os.path.expanduser("~/.cache/smc_mujoco"))
 
-    def _index_key(self, sig: Any, codegen: Any) -> tuple:
-        """Return the key of an overload.
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Return numba's result for a signature, or None."""
+        target.refresh()
+        path = self._path(signature, target.codegen())
+        try:
+            content = path.read_bytes()
+        except OSError:
+            return None
+        result = content[SEAL_SIZE:]
+        if _seal(path, result) != content[:SEAL_SIZE]:
+            return None
+        return internals.CompileResult._rebuild(target, *pickle.loads(result))
 
-        Numba's own key hashes a closure without the functions in it.
-        """
-        if self.content:
-            return (sig, codegen.magic_tuple())
-        return super()._index_key(sig, codegen)
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Write numba's result for a signature, unless no other process could load it."""
+        library = result.library
+        if library.has_dynamic_globals or not _complete(library):
+            return
+        path = self._path(signature, library.codegen)
+        content = internals.dumps(result._reduce())
+        with contextlib.suppress(OSError, ScenarioError):  # nowhere to write
+            with replacing(path) as file:
+                file.write_bytes(_seal(path, content) + content)
+            self._remove_oldest()
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Write an overload, unless no other process could load it. Ignore a full disk."""
-        with contextlib.suppress(OSError):
-            if not data.library.has_dynamic_globals and _complete(data.library):
-                super().save_overload(sig, data)
-                self._remove_oldest()
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        """Return the path of a signature's file for this machine."""
+        made_by = (self.key.used, str(signature), codegen.magic_tuple(), numba.__version__)
+        digest = hashlib.sha256(repr(made_by).encode()).hexdigest()
+        return self.folder / f"{self._stem}-{digest[:32]}.code"
+
+    @property
+    def _stem(self) -> str:
+        return self.key.name[:80]  # a file's name has 255 bytes at most
 
     def _remove_oldest(self) -> None:
         """Remove files of other functions of this name, those written first, beyond
         MAX_FILES_OF_A_NAME.
         """
-        written = sorted(
-            Path(self.cache_path).glob(f"{self.files_of_name}.nbi"),
-            key=lambda path: path.stat().st_mtime,
-        )
-        for index in written[:-MAX_FILES_OF_A_NAME]:
-            for path in (index, *index.parent.glob(f"{index.stem}.*.nbc")):
-                path.unlink()
+        files = self.folder.glob(f"{self._stem}-{'?' * 32}.code")
+        written = sorted(files, key=lambda path: path.stat().st_mtime)
+        for path in written[:-MAX_FILES_OF_A_NAME]:
+            path.unlink()
 
 
-def _complete(library: internals.CPUCodeLibrary) -> bool:
+def _seal(path: Path, content: bytes) -> bytes:
+    """Return a hash of a file's name and content."""
+    return hashlib.sha256(path.name.encode() + content).digest()
+
+
+def _complete(library: Any) -> bool:
     """Return whether code is complete before it is linked, so that another process can load it,
     beside any other.
 
@@ -396,58 +409,20 @@ def _complete(library: internals.CPUCodeLibrary) -> bool:
     function that numba compiled outside of this package has one of numba's own numbers.
     """
     module = library._final_module
-    linked = any(
-        variable.name.startswith(internals.RuntimeLinker.PREFIX)
-        for variable in module.global_variables
-    )
-    return not linked and not any(
-        NUMBERS.foreign(f.name) for f in module.functions if not f.is_declaration
-    )
-
-
-class Sealed(internals.IndexDataCacheFile):
-    """Files of numba's cache, sealed with a hash of content and source; one that does not fit
-    counts as missing.
-    """
-
-    def _load_index(self) -> dict:
-        if self._intact(self._index_path):
-            return super()._load_index()
-        return {}
-
-    def _load_data(self, name: str) -> Any:
-        if self._intact(self._data_path(name)):
-            return super()._load_data(name)
-        return None
-
-    @contextlib.contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        written = io.BytesIO()
-        yield written
-        with super()._open_for_write(filepath) as file:
-            file.write(written.getvalue() + self._seal(written.getvalue()))
-
-    def _intact(self, path: str) -> bool:
-        """Return whether a file of the cache exists, is undamaged, and belongs to the same source."""
-        try:
-            content = Path(path).read_bytes()
-        except OSError:
+    for variable in module.global_variables:
+        if variable.name.startswith(internals.UNRESOLVED):
             return False
-        return self._seal(content[:-DIGEST_SIZE]) == content[-DIGEST_SIZE:]
-
-    def _seal(self, content: bytes) -> bytes:
-        return hashlib.sha256(repr(self._source_stamp).encode() + content).digest()
+    defined = [function.name for function in module.functions if not function.is_declaration]
+    return not any(map(NUMBERS.foreign, defined))
 
 
 class Function:
-    """A compiled C function, kept alive, and its `address`. For `cache` see `compiled`."""
+    """A compiled C function, kept alive, and its `address`. For `key` see `compiled`."""
 
-    def __init__(self, body: Callable, cache: bool | tuple[str, str] = False):
+    def __init__(self, body: Callable, key: Key | None = None):
         try:
-            self._cfunc = compiled(SIGNATURE, body, cache)
-        except (
-            Exception
-        ) as error:  # numba raises many types; each means that it cannot compile the function
+            self._cfunc = compiled(SIGNATURE, body, key)
+        except Exception as error:  # numba raises many types
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address  # pyright: ignore[reportAttributeAccessIssue] numba's own
 
@@ -495,7 +470,6 @@ def reason(error: Exception) -> str:
 OPTIONS: dict[str, Any] = {"error_model": "python", "boundscheck": True}
 OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 checked = njit(**OPTIONS)
-CHECKED_OPTIONS = checked(lambda: None).targetoptions  # as numba keeps them
 _shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once for all laws
 
 
@@ -511,13 +485,9 @@ def jit(function: Callable) -> Callable:
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
         # shared only now: after an exception the copies may lack functions that they call
-        _shared.update(
-            {
-                f: copy
-                for f, copy in copies.items()
-                if (f.__module__ or "").startswith("smc_mujoco.")
-            }
-        )
+        for original, copy in copies.items():
+            if (original.__module__ or "").startswith("smc_mujoco."):
+                _shared[original] = copy
         return made
 
 
@@ -529,8 +499,6 @@ def compiled_for(function: Callable, types: tuple[Any, ...]) -> Any:
     try:
         with _compiling():
             made.compile(types)
-    except (
-        Exception
-    ) as error:  # numba raises many types; each means that it cannot compile the function
+    except Exception as error:  # numba raises many types
         raise NotCompilable(reason(error)) from None
     return made.overloads[types]

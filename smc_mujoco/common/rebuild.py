@@ -7,11 +7,12 @@ in Python runs with the helpers' plain Python.
 """
 
 import dis
+import functools
 from collections.abc import Callable
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
-from smc_mujoco.common.numba_internals import Dispatcher
+from numba.extending import is_jitted
 
 # Instructions with the name of a global variable; those of all others have the name of an
 # attribute.
@@ -35,7 +36,9 @@ def rebuild(
     function: Any, finish: Callable[[Any], Any], copies: dict[Callable, Any] | None = None
 ) -> Any:
     """Return a copy of a function that calls copies of its compiled helpers."""
-    function, copies = getattr(function, "py_func", function), {} if copies is None else copies
+    function = getattr(function, "py_func", function)
+    if copies is None:
+        copies = {}
     if not isinstance(function, FunctionType):
         return finish(function)
     if function not in copies and not _calls_compiled(function):
@@ -62,16 +65,14 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
     """Return the copy of a compiled function, or of a module with such attributes among `names`;
     else the value.
     """
-    if isinstance(value, Dispatcher):
+    if is_jitted(value):
         return rebuild(value, finish, copies)
     if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():
-            used = name in names.attributes
-            if used:
-                vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, copies)
-            else:
-                vars(copy)[name] = thing
+            if name in names.attributes:
+                thing = _swapped(thing, Names(set(), set()), finish, copies)
+            vars(copy)[name] = thing
         return copy
     return value
 
@@ -79,33 +80,33 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
 def _calls_compiled(function: FunctionType) -> bool:
     """Return whether a function refers to a compiled function, by name or in a module."""
     names = names_in(function.__code__)
-    values = []
-    for name in names.variables:
-        if name in function.__globals__:
-            values.append(function.__globals__[name])
+    values = [function.__globals__.get(name) for name in names.variables]
     values += [cell.cell_contents for cell in function.__closure__ or ()]
-    return any(
-        isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names.attributes))
-        for v in values
-    )
+    for value in values:
+        if is_jitted(value):
+            return True
+        if isinstance(value, ModuleType) and _holds(value, names.attributes):
+            return True
+    return False
 
 
 def _holds(module: ModuleType, names: set[str]) -> bool:
     """Return whether a module has a compiled function with one of these names."""
-    return any(isinstance(vars(module).get(name), Dispatcher) for name in names)
+    return any(is_jitted(vars(module).get(name)) for name in names)
 
 
+@functools.cache
 def names_in(code: CodeType) -> Names:
     """Return the names that code uses, and those that functions defined in it use."""
     names = Names(set(), set())
     for instruction in dis.get_instructions(code):
-        if instruction.opcode in dis.hasname:
-            (names.variables if instruction.opname in OF_VARIABLES else names.attributes).add(
-                instruction.argval
-            )
-    for inner in (
-        names_in(constant) for constant in code.co_consts if isinstance(constant, CodeType)
-    ):
-        names.variables.update(inner.variables)
-        names.attributes.update(inner.attributes)
+        if instruction.opname in OF_VARIABLES:
+            names.variables.add(instruction.argval)
+        elif instruction.opcode in dis.hasname:
+            names.attributes.add(instruction.argval)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            inner = names_in(constant)
+            names.variables.update(inner.variables)
+            names.attributes.update(inner.attributes)
     return names

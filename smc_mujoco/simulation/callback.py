@@ -18,10 +18,8 @@ wrongly.
 import contextlib
 import ctypes
 import functools
-import hashlib
 from collections import namedtuple
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -29,9 +27,9 @@ import numpy as np
 from mujoco.introspect import ast_nodes, structs
 from numba import types
 
-from smc_mujoco.common import mjcb
+from smc_mujoco.common import fingerprint, mjcb
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.jit import compiled, integers, pointer
+from smc_mujoco.common.jit import Key, compiled, integers, pointer
 from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.model import USERDATA
@@ -53,6 +51,7 @@ C_TYPES = {
     "uintptr_t": ctypes.c_size_t,
     "uint64_t": ctypes.c_uint64,
 }
+MAGIC = 7263.0  # the first number of this package's userdata: chosen
 PROBE_MODEL = """<mujoco><size nuserdata="12345" nuser_actuator="1" nuser_body="1"/>
   <worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
@@ -128,36 +127,17 @@ def offsets() -> Offsets:
 
 
 @functools.cache
-def magic() -> float:
-    """Return the magic number that marks this package's userdata.
-
-    It is a hash of the sources, so that an outdated compiled callback ignores a record written by
-    newer code.
-    """
-    package = Path(__file__).parents[1]
-    folders = (
-        package / name
-        for name in ("simulation", "common", "control", "mechanisms", "mechanisms/hardware")
-    )
-    sources = b"".join(
-        path.read_bytes() for folder in folders for path in sorted(folder.glob("*.py"))
-    )
-    return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
-
-
-@functools.cache
 def callback():
     """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it
     is there.
     """
     at = offsets()
-    ours = magic()
 
     def control(model, data):
         if integers(model + at.nuserdata)[0] < USERDATA:
             return
         userdata = pointer(integers(data + at.userdata)[0])
-        if userdata[0] != ours:
+        if userdata[0] != MAGIC:
             return
         address = int(userdata[1])
         arrays = Arrays(
@@ -183,7 +163,8 @@ def callback():
         )
         run_simulation(address, simulation_at(address, 0), arrays)
 
-    return compiled(types.void(types.intp, types.intp), control, cache=True)
+    key = Key("control", fingerprint.now(control))
+    return compiled(types.void(types.intp, types.intp), control, key)
 
 
 @functools.cache
@@ -195,7 +176,7 @@ def silence():
     def silent(message):
         return
 
-    return compiled(types.void(types.intp), silent, cache=True)
+    return compiled(types.void(types.intp), silent, Key("silent", ""))
 
 
 @contextlib.contextmanager

@@ -25,6 +25,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import (
     AtAddress,
     Function,
+    Key,
     NotCompilable,
     Uncompiled,
     attempting,
@@ -43,7 +44,6 @@ from smc_mujoco.control.joint_law import measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import SEEN, Plant
-from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.state import FRICTION_INPUT, INSTANT
 
@@ -64,7 +64,7 @@ def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory:
     def native(y, g, m, out):
         return attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))), out)
 
-    return _stored(native, function, kind, gains, memory)
+    return _stored(native, function)
 
 
 @functools.cache
@@ -96,7 +96,7 @@ def _compile_joint_law(
         output = carray(pointer(out), (2 * n,))
         return attempt(law, (seen, values(g, n), memories, output), out)
 
-    return _stored(native, function, gains, shared, memory)
+    return _stored(native, function)
 
 
 @functools.cache
@@ -143,7 +143,7 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             return attempt(body, (now.t, values(p), table), out)
         return attempt(body, (now.t, values(p)), out)
 
-    compiled = _stored(native, kind.value, names, random, series, memory, rows, sees)
+    compiled = _stored(native, kind.value)
     fingerprint.keep(kind)
     return compiled
 
@@ -161,7 +161,7 @@ def _compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
         v = carray(pointer(seen.v), (seen.n,))
         return attempt(body, (x, v, seen.i, values(p)), out)
 
-    return _stored(native, function, names)
+    return _stored(native, function)
 
 
 @functools.cache
@@ -177,15 +177,12 @@ def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
         friction = friction_input_at(y, 0)
         return attempt(body, (friction.v, friction.motor, friction.load, values(p)), out)
 
-    return _stored(native, function, names)
+    return _stored(native, function)
 
 
-def _stored(native: Callable, function: Callable, *arguments: object) -> Function:
-    """Return the C function of a user's function.
-
-    It is kept on disk under its hash and these arguments.
-    """
-    compiled = Function(native, _disk_key(function, *arguments))
+def _stored(native: Callable, function: Callable) -> Function:
+    """Return the C function that calls a user's function. It is kept on disk."""
+    compiled = Function(native, _key(function, native))
     fingerprint.keep(function)
     return compiled
 
@@ -200,25 +197,27 @@ def cached(function: Callable) -> Callable:
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
         if not made.overloads:
-            compile_for(made, arguments, _disk_key(function))
+            compile_for(made, arguments, _key(function, function))
         return made(*arguments)
 
     return call
 
 
-def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:
-    """Return the name and the hash of a compiled function on disk.
+def _key(function: Callable, body: Callable) -> Key | None:
+    """Return the key on disk of a body that calls a user's function.
 
-    Return False, for none, if there is no hash, or if a global has changed since the first
-    compilation.
+    Return None if there is no hash of all that it uses, or if a global has changed since the
+    function was first hashed.
     """
     function_name = getattr(function, "__qualname__", function.__name__)
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function_name}")
     try:
-        digest = fingerprint.of(function)
-        return digest == fingerprint.now(function) and (name, f"{magic()} {digest} {arguments}")
+        if not fingerprint.ours(function):
+            if fingerprint.of(function) != fingerprint.now(function):
+                return None
+        return Key(name, fingerprint.now(body))
     except ScenarioError:
-        return False
+        return None
 
 
 def compile_component(c: Component) -> Function | AtAddress:

@@ -39,7 +39,7 @@ from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.state import CHANNEL
 
 USERDATA = (
-    2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
+    2  # numbers in mjData.userdata: callback.MAGIC and the address of the simulation's record
 )
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
 SENSORS = {

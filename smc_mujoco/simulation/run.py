@@ -307,7 +307,7 @@ class ScenarioBatch:
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
         self.batch.bind("userdata")[:] = np.column_stack(
-            [np.full(count, callback.magic()), addresses]
+            [np.full(count, callback.MAGIC), addresses]
         )
 
     def run(self, report: Report) -> list[Trace]:

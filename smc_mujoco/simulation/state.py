@@ -1,6 +1,6 @@
 """The record of one simulation: all that the callback needs besides MuJoCo's state.
 
-`mjData.userdata` holds two numbers: `callback.magic()` and the address of the record. Compiled code
+`mjData.userdata` holds two numbers: `callback.MAGIC` and the address of the record. Compiled code
 reads the record by names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of
 the same dtype. Inputs and outputs of users' functions are in the record, too. Arrays, such as gains
 and memories, are in one buffer outside of the record, which has their addresses.

@@ -82,7 +82,7 @@ def test_a_function_of_arrays_is_compiled_once_for_all_processes(cache):
         return cfunctions.cached(FunctionType(ratio_to.__code__, {"FACTOR": factor}))(np.array([x]))
 
     assert ratio(2.0, 1.0) == 2.0
-    (kept,) = cache.rglob("*.nbc")
+    (kept,) = cache.rglob("*.code")
     code = kept.read_bytes()  # has numbers that no compilation gives again
     assert (ratio(2.0, 0.0), kept.read_bytes()) == (np.inf, code)
     assert ratio(3.0, 1.0) == 3.0
@@ -157,10 +157,10 @@ def test_a_law_with_a_very_long_name_is_kept():
 
 def test_code_of_another_law_under_the_name_of_this_one_is_not_run(cache):
     force(mine("gains.k"))
-    (ours,) = cache.rglob("*.nbc")
+    (ours,) = cache.rglob("*.code")
     assert force(mine("2.0 * gains.k")) == 6.0
-    (theirs,) = {*cache.rglob("*.nbc")} - {ours}
-    ours.write_bytes(theirs.read_bytes())
+    (theirs,) = {*cache.rglob("*.code")} - {ours}
+    ours.write_bytes(theirs.read_bytes())  # its seal is of its name, too
     assert hits(mine("gains.k")) == 0
     assert force(mine("gains.k")) == 3.0
 
@@ -233,7 +233,7 @@ def test_forked_processes_number_functions_apart():
 def test_numba_numbers_the_functions_of_others_as_ever(cache):
     before = next(FunctionIdentity._unique_ids)
     assert force(mine()) == 3.0
-    assert list(cache.rglob("*.nbc"))
+    assert list(cache.rglob("*.code"))
     assert next(FunctionIdentity._unique_ids) == before + 1
 
 
@@ -262,7 +262,7 @@ def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cach
     if thing is doubled_by_sorting:
         doubled_by_sorting(1.0)
     assert force(mine(body, thing=thing)) == 6.0
-    assert list(cache.rglob("*.nb?")) == []
+    assert list(cache.rglob("*.code")) == []
 
 
 def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():

@@ -235,7 +235,7 @@ def userdata(kind, size):
         "ones": np.ones(size),
         "numbers": rng.normal(size=size) * 1e6,
         "nan": np.full(size, np.nan),
-        "nearly our magic number": np.full(size, callback.magic() + 1),
+        "nearly our magic number": np.full(size, callback.MAGIC + 1),
     }[kind]
 
 
@@ -277,7 +277,7 @@ def test_userdata_without_an_address_is_never_read_as_ours():
     """Even if it begins with our magic number."""
     model = smc.plant("duffing").load(nuserdata=callback.USERDATA - 1)
     data = mujoco.MjData(model)
-    data.userdata[0] = callback.magic()
+    data.userdata[0] = callback.MAGIC
     before = data.userdata.copy()
     with callback.installed():
         mujoco.mj_step(model, data)

@@ -13,9 +13,7 @@ import math
 import os
 import pickle
 import re
-import shutil
 import signal
-import sys
 import threading
 import time
 import types
@@ -30,14 +28,13 @@ import pytest
 from helpers import reference
 from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
-from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint, numba_internals
-from smc_mujoco.common.jit import compiled
+from smc_mujoco.common.jit import Key, compiled
 from smc_mujoco.control.law import Measurement, catalogue
-from smc_mujoco.simulation import callback, controller, state
+from smc_mujoco.simulation import callback, controller, philox, state
 from smc_mujoco.simulation.controller import lever
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare
@@ -54,38 +51,27 @@ THREE = smc.plant("pendulum_network", n=3)
 # (a) the cache
 
 
-ROOMS = ("common", "control", "simulation")
-SOURCES = {path.relative_to(PACKAGE) for room in ROOMS for path in (PACKAGE / room).glob("*.py")}
-IMPORTS = re.findall(
-    r"^from smc_mujoco\.([\w.]+) import",
-    Path(controller.__file__).read_text(encoding="utf-8"),
-    re.M,
-)
-SOURCES |= {
-    path for name in IMPORTS if (PACKAGE / (path := Path(f"{name.replace('.', '/')}.py"))).exists()
-}
+USED = [
+    (philox, "uniform", numba.njit(lambda seed, channel, stream, k: 0.5)),
+    (controller, "MAX_STATE", 2e6),
+    (controller, "lever", numba.njit(fastmath=True)(controller.lever.py_func)),
+    (controller, "_drag", numba.njit(lambda sim, data, x, y, z: (x, y, z))),
+]
 
 
-@pytest.fixture(scope="module")
-def copied(tmp_path_factory):
-    """A copy of the package's sources."""
-    folder = tmp_path_factory.mktemp("copied") / "smc_mujoco"
-    return Path(shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__")))
-
-
-def test_the_magic_number_changes_with_every_module_of_the_path(copied, monkeypatch):
-    before = callback.magic()
-    monkeypatch.setattr(callback, "__file__", str(copied / "simulation" / "callback.py"))
-    assert callback.magic.__wrapped__() == before
-    found = {before}
-    for name in sorted(SOURCES):
-        source = (copied / name).read_bytes()
-        (copied / name).write_bytes(source + b"#\n")
-        after = callback.magic.__wrapped__()
-        (copied / name).write_bytes(source)
-        assert after not in found, name
-        assert after == int(after) < 2**53  # a float64 holds it
-        found.add(after)
+def test_the_hash_of_compiled_code_is_of_all_that_it_uses_and_of_nothing_else(monkeypatch):
+    """Else a process loads code that is outdated, or compiles the callback after each edit."""
+    law = smc.law("classical").function
+    of_law = fingerprint.now(law)
+    seen = {fingerprint.now(controller.control)}
+    for i, (module, name, thing) in enumerate(USED):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, thing)
+            seen.add(fingerprint.now(controller.control))
+            assert fingerprint.now(law) == of_law
+        assert len(seen) == i + 2, name
+    monkeypatch.setattr(controller, "Unused", 3.0, raising=False)
+    assert fingerprint.now(controller.control) in seen
 
 
 # (b) memory
@@ -936,56 +922,38 @@ def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integr
 # (p) the cache on disk, memory, forks and Ctrl-C
 
 
-@pytest.fixture
-def added(tmp_path, monkeypatch):
-    """A function of a module in an empty folder, whose compiled code is kept beside it."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "added.py").write_text("def added(x):\n    return x + 2.0\n")
-    yield importlib.import_module("added").added
-    del sys.modules["added"]
+def twice(x):
+    """What is compiled."""
+    return x + x
 
 
-def hits(function) -> int:
+def hits() -> int:
     """How often a compiled function is taken from the cache, as a new process would: 0 or 1."""
-    made = compiled(numba.types.float64(numba.types.float64), function, cache=True)
-    assert made.ctypes(1.0) == 3.0
+    made = compiled(numba.types.float64(numba.types.float64), twice, Key("twice", "its hash"))
+    assert made.ctypes(1.5) == 3.0
     return made.cache_hits
 
 
 def flipped(data: bytes) -> bytes:
-    """With one bit changed, in what is compiled or in the index' names."""
+    """With one bit changed, in the middle."""
     middle = len(data) // 2
     return data[:middle] + bytes([data[middle] ^ 16]) + data[middle + 1 :]
 
 
-def test_a_damaged_cache_is_written_again(added, tmp_path):
-    assert [hits(added), hits(added)] == [0, 1]
-    damages = [
-        lambda data: b"",
-        lambda data: data[: len(data) // 2],
-        flipped,
-        lambda data: b"garbage" * 99,
-    ]
-    for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):
-        for path in (tmp_path / "__pycache__").glob(name):
-            path.write_bytes(damage(path.read_bytes()))
-        assert [hits(added), hits(added)] == [0, 1]
+def test_a_damaged_cache_is_written_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    assert [hits(), hits()] == [0, 1]
+    (path,) = tmp_path.iterdir()
+    data = path.read_bytes()
+    for damaged in (b"", data[: len(data) // 2], flipped(data), b"garbage" * 99):
+        path.write_bytes(damaged)
+        assert [hits(), hits()] == [0, 1]
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
-    def full(*arguments):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-
-    def doubled(x):
-        return 2.0 * x
-
-    assert (
-        compiled(numba.types.float64(numba.types.float64), doubled, cache=True).ctypes(1.5) == 3.0
-    )
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "file"))
+    assert [hits(), hits()] == [0, 0]
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")

@@ -20,7 +20,8 @@ import mujoco
 import numpy as np
 from numba import njit, types
 
-from smc_mujoco.common.jit import call, call_callback, compiled, pointer, record_at
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.jit import Key, call, call_callback, compiled, pointer, record_at
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import SEEN, Plant
 from smc_mujoco.simulation import callback, cfunctions, state
@@ -82,7 +83,7 @@ class EquationRun:
         functions = callback.callback().address, self.nominal.address
         owners = self.model._address, self.data._address, state.address(self.record)
         fields = {name: getattr(self.data, name) for name in FIELDS}
-        fields["userdata"][:] = callback.magic(), state.address(self.record)
+        fields["userdata"][:] = callback.MAGIC, state.address(self.record)
         channels = prepared.mechanism.channels
         fields["qpos"][channels["qpos"]], fields["qvel"][channels["qvel"]] = s.x0, s.v0
         changes = (
@@ -116,14 +117,13 @@ def _loop() -> Any:
     """Return the compiled loop of a run, void(address of its RUN), from numba's cache on disk if it
     is there.
     """
-    ours = callback.magic()  # so that the code in the cache is that of these sources
 
     def simulate(address):
         run = run_at(address, 0)
-        if pointer(run.userdata)[0] == ours:
-            _simulate(run, simulation_at(run.record, 0))
+        _simulate(run, simulation_at(run.record, 0))
 
-    return compiled(types.void(types.intp), simulate, cache=True)
+    key = Key("equation", fingerprint.now(simulate))
+    return compiled(types.void(types.intp), simulate, key)
 
 
 @njit(error_model="numpy")
