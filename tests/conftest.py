@@ -9,6 +9,7 @@ package that tests install elsewhere compile a function once. Bytecode is kept t
 worker would compile all tests again.
 """
 
+import ast
 import gc
 import importlib
 import os
@@ -67,12 +68,35 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out files that are not marked quick before their import, where quick tests are asked
-    for.
+    """Leave out files before their import: those that are not marked quick, where quick tests are
+    asked for, and those that cannot hold what `-k` names.
     """
-    if not config.getoption("quick") or collection_path.suffix != ".py":
+    if collection_path.suffix != ".py":
         return None
-    return "pytest.mark.quick" not in collection_path.read_text(encoding="utf-8") or None
+    source = collection_path.read_text(encoding="utf-8")
+    if config.getoption("quick") and "pytest.mark.quick" not in source:
+        return True
+    return not may_hold(config.getoption("keyword"), f"{collection_path} {source}") or None
+
+
+def may_hold(expression: str, text: str) -> bool:
+    """Return whether a file whose path and source are this text may hold a test that `-k` selects.
+
+    Only what is made of plain words, `and` and `or` is looked for.
+    """
+    try:
+        return _possible(ast.parse(expression.strip(), mode="eval").body, text.lower())
+    except SyntaxError:
+        return True
+
+
+def _possible(node: ast.expr, text: str) -> bool:
+    if isinstance(node, ast.Name):
+        return node.id.lower() in text
+    if isinstance(node, ast.BoolOp):
+        parts = [_possible(value, text) for value in node.values]
+        return all(parts) if isinstance(node.op, ast.And) else any(parts)
+    return True
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
