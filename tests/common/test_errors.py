@@ -140,29 +140,6 @@ def test_an_unknown_name_is_answered_with_the_nearest_or_with_all(typed):
     assert str(unknown("law", typed, LAWS)) == f"unknown law {typed!r}: {NAMES[typed]}"
 
 
-def test_claims_are_listed_by_their_numbers_and_nothing_as_nothing():
-    assert (
-        str(unknown("claim", "x", ["10", "9", "all"]))
-        == "unknown claim 'x': choose from all, 9, 10"
-    )
-    assert str(unknown("claim", "x", [])) == "unknown claim 'x': there are none"
-    assert (
-        len(str(unknown("claim", "x", map(str, range(9999)))))
-        == len("unknown claim 'x': choose from ") + 1100
-    )
-
-
-def test_two_laws_may_have_one_abbreviation():
-    said = str(unknown("law", "TA", ["terminal", "terminal_adaptive", "twisting_adaptive"]))
-    assert said == "unknown law 'TA': did you mean 'terminal_adaptive' or 'twisting_adaptive'?"
-
-
-@pytest.mark.parametrize("value", ["text", [1.0], 0.5])
-def test_what_is_no_mapping_is_refused_in_a_sentence(value):
-    with pytest.raises(ScenarioError, match="is no mapping: give a dict"):
-        frozen(value)
-
-
 def test_a_frozen_mapping_does_not_change():
     values = frozen({"a": 1})
     changes = (lambda: values.update(b=2), values.clear, values.popitem, lambda: values.pop("a"))
@@ -232,32 +209,6 @@ def test_mujoco_without_its_library_is_named(tmp_path, monkeypatch):
 
 
 # what foreign code does in its trial
-
-
-@pytest.mark.parametrize(
-    ("code", "words"),
-    [
-        (None, "did not end within 2.5 s: fix what it waits for, or give timeout="),
-        (0, "ended the process with exit code 0: let it return"),
-        (3, "ended the process with exit code 3: let it return"),
-        (-6, "died of SIGABRT (Aborted): fix where it aborts"),
-        (
-            -8,
-            "died of SIGFPE (Floating point exception): fix where it divides, or traps floating-point exceptions",
-        ),
-        (-11, "died of SIGSEGV (Segmentation fault): fix where it reads, writes or divides"),
-    ],
-)
-@pytest.mark.skipif(sys.platform != "linux", reason="the system's names of signals")
-def test_how_a_trial_ended_is_told_in_words(code, words):
-    failed = guard.Failed("the trial", "", code, 2.5)
-    assert (str(failed), failed.stage, failed.fault, failed.code) == (
-        f"the trial {words}",
-        "the trial",
-        "",
-        code,
-    )
-    assert str(guard.Failed("the trial", "is NaN", code, 2.5)) == "is NaN"
 
 
 def test_a_trial_reports_what_its_module_returns_or_raises(tmp_path, monkeypatch):

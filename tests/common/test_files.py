@@ -6,10 +6,7 @@ import contextlib
 import dataclasses
 import json
 import math
-import os
 import tempfile
-import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +30,8 @@ from smc_mujoco.common import files
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
 from smc_mujoco.evidence.audit.audit import document
-from smc_mujoco.evidence.audit.paper import new
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.rigs import records
 from smc_mujoco.simulation import serialise
-from smc_mujoco.studies import scene
 
 WORDS = st.sampled_from(
     ["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"]
@@ -126,7 +120,14 @@ def test_tunings(tmp_path):
 def test_claims():
     words = dict.fromkeys(("id", "text", "where", "measured", "holds_if", "note"), "NaN")
     beside = {"tuned": {"x": math.inf}}
-    claim = Claim(**words, verdict="refuted", numbers={}, beside=beside, verdicts={}, flips=False)
+    claim = Claim(
+        **words,
+        verdict="refuted",
+        numbers={},
+        beside=beside,
+        verdicts={},
+        flips=False,
+    )
     (told,) = strict(document([claim]))["claims"]
     assert told["beside"] == {"tuned": {"x": "Infinity"}}
 
@@ -156,53 +157,6 @@ def test_whatever_reading_raises_is_one_sentence(error, tmp_path):
         raise error
 
 
-LOADERS = {
-    ".json": (load_margins, load_map, result.load),
-    ".npz": (records.load, smc.load),
-    ".csv": (records.load, smc.signals.TimeSeries.from_csv),
-    ".onnx": (smc.policy,),
-}
-
-
-@pytest.mark.parametrize("ending", LOADERS)
-def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
-    os.mkfifo(tmp_path / f"a{ending}")
-    (tmp_path / "folder").mkdir()
-    (folder := tmp_path / f"b{ending}").symlink_to(tmp_path / "folder")
-    (zero := tmp_path / f"c{ending}").symlink_to("/dev/zero")
-    for load in LOADERS[ending]:
-        for path in (tmp_path / f"a{ending}", folder, zero):
-            with pytest.raises(smc.ScenarioError, match="it is not a regular file"):
-                load(path)
-        with pytest.raises(smc.ScenarioError, match=r"File name too long|no .* at"):
-            load(tmp_path / f"{'a' * 300}{ending}")
-
-
-@pytest.mark.parametrize("name", ["é" * 300, "a\0b", "x/" * 3000], ids=["long", "nul", "deep"])
-def test_a_name_that_no_file_can_have_is_one_sentence(name):
-    calls: list[Callable[[str], object]] = [
-        smc.audit,
-        writable,
-        scene.find,
-    ]
-    calls += [
-        lambda name: smc.exchange.law_from_c(f"{name}.c"),
-    ]
-    short: dict[str, Any] = {"seeds": 1, "duration": 0.02, "progress": False}
-    runs = [smc.Scenario(plant="duffing", law="classical", duration=0.02)]
-    calls += [
-        lambda name: smc.tune(
-            "duffing", "classical", budget=1, searches=1, folder=name, progress=False
-        )
-    ]
-    calls += [lambda name: smc.which("duffing", "nominal", laws=["classical"], out=name, **short)]
-    calls += [lambda name: smc.compare("classical", "duffing", "nominal", out=name, **short)]
-    calls += [lambda name: smc.study(runs, name, progress=False)]
-    for call in (*calls, lambda name: new(Path(name))):
-        with pytest.raises(smc.ScenarioError):
-            call(name)
-
-
 def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
     many = pa.table({"x": pa.array(np.zeros(70_000_000))})
     pq.write_table(many, tmp_path / "results.parquet", use_dictionary=False, compression="zstd")
@@ -225,32 +179,6 @@ def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, 
         match=r"no temporary file can be written \(.*\): make room, or set TMPDIR",
     ):
         make()
-
-
-@pytest.mark.skipif(os.name != "posix", reason="a compiler that is a shell script")
-@pytest.mark.parametrize(
-    "compile_",
-    [
-        lambda: smc.exchange.law_to_fmu("pid", "a.fmu"),
-        lambda: smc.exchange.law_to_c("pid"),
-        lambda: smc.exchange.law_from_c("law.c"),
-    ],
-)
-def test_a_compiler_without_room_for_its_files_is_not_blamed(compile_, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("law.c").write_text("")
-    full = Path("full")
-    full.write_text(
-        "#!/bin/sh\necho 'a.c:9:1: fatal error: error writing: No space left on device' >&2\nexit 1\n"
-    )
-    full.chmod(0o755)
-    monkeypatch.setenv("CC", str(full.resolve()))
-    with pytest.raises(smc.ScenarioError) as refused:
-        compile_()
-    assert (
-        str(refused.value)
-        == "no temporary file can be written (No space left on device): make room, or set TMPDIR"
-    )
 
 
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
@@ -314,50 +242,6 @@ def test_cells_of_a_csv_file_are_between_commas_or_semicolons(tmp_path):
         match=r"a.csv is not a CSV file \(it is not text|\(Error, line contains NUL",
     ):
         files.csv_rows(file)
-
-
-def test_a_file_of_more_than_2_gb_is_refused(tmp_path):
-    with (tmp_path / "a").open("wb") as sparse:
-        sparse.truncate(2 * 10**9)
-        files._bounded(tmp_path / "a")
-        sparse.truncate(2 * 10**9 + 1)
-        with pytest.raises(smc.ScenarioError, match=r"^it has 2,000 MB, more than 2,000 MB$"):
-            files._bounded(tmp_path / "a")
-
-
-def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
-    for name, bound in (
-        ("MAX_SIZE", 4_000_000),
-        ("MAX_UNPACKED", 3_000_000),
-        ("MAX_RATIO", 20),
-        ("MAX_MEMBERS", 2),
-    ):
-        assert isinstance(getattr(files, name), int)
-        monkeypatch.setattr(files, name, bound)
-    file = tmp_path / "a"
-    file.write_bytes(bytes(4_000_000))
-    files._bounded(file)
-    file.write_bytes(bytes(4_100_000))
-    with pytest.raises(smc.ScenarioError, match=r"^it has 4 MB, more than 4 MB$"):
-        files._bounded(file)
-    for sizes, refused in (
-        ((1_000_000, 2_000_000), False),
-        ((1_000_000, 2_000_001), True),
-        ((1, 1, 1), True),
-    ):
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            for i, size in enumerate(sizes):
-                archive.writestr(f"{i}", bytes(size))
-        said = f"it unpacks from 0 MB to {len(sizes)} files of {sum(sizes) / 1e6:.0f} MB in all, and 2 files and 3 MB "
-        with (
-            pytest.raises(smc.ScenarioError, match=f"^{said}are allowed$")
-            if refused
-            else contextlib.nullcontext()
-        ):
-            files._bounded(file)
-    with zipfile.ZipFile(file, "w") as archive:  # large, but packed as large: its ratio is 1
-        archive.writestr("a", bytes(3_500_000))
-    files._bounded(file)
 
 
 def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):

@@ -169,30 +169,6 @@ def test_the_backend_is_the_wish_or_the_first_that_loads_and_the_rest_is_said(ca
     assert [chosen[1], gl.note(), gl.missing.__wrapped__()] == expected
 
 
-def test_systems_without_a_choice_take_the_wish(monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "x")
-    monkeypatch.setattr(gl.sys, "platform", "darwin")
-    monkeypatch.setattr(gl, "probe", lambda backend: "no display")
-    chosen = gl.choice.__wrapped__()
-    monkeypatch.setattr(gl, "choice", lambda: chosen)
-    assert (chosen, gl.choose_gl(), gl.note()) == (("x", "x"), "x", None)
-    assert gl.missing.__wrapped__() == (
-        "no film: MuJoCo cannot open a window to render in (no display): unset MUJOCO_GL"
-    )
-
-
-@pytest.mark.parametrize(
-    ("code", "error"),
-    [
-        ("import os; assert os.environ['MUJOCO_GL'] == 'egl'", None),
-        ("import sys; sys.exit(3)", "exit status 3"),
-        ("raise ValueError('one\\ntwo')", "two"),
-    ],
-)
-def test_a_trial_says_how_it_failed(code, error, monkeypatch):
-    assert gl.probe("egl", code) == error
-
-
 def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "glfw")
     assert gl.probe("", "import os; assert os.environ['MUJOCO_GL'] == 'glfw'") is None

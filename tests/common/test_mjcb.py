@@ -7,7 +7,6 @@ import itertools
 import os
 import signal
 import threading
-import time
 import warnings
 
 import mujoco
@@ -23,7 +22,6 @@ from smc_mujoco.envs.gymnasium_env import PlantEnv
 from smc_mujoco.envs.tasks import tasks, toppling
 from smc_mujoco.envs.vector_env import BatchEnv
 from smc_mujoco.mechanisms import fidelity
-from smc_mujoco.mechanisms.custom import mjcf, nominal_model
 from smc_mujoco.mechanisms.custom.nominal_model import prepared
 from smc_mujoco.simulation import callback, scenario
 from smc_mujoco.simulation import run as runs
@@ -57,7 +55,14 @@ def own(tmp_path):
 
 
 def run_of(law, plant="duffing", **fields):
-    return smc.run(smc.Scenario(plant=plant, law=law, duration=0.003, **fields))
+    return smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            duration=0.003,
+            **fields,
+        )
+    )
 
 
 def still_of(trace, folder):
@@ -180,20 +185,6 @@ def test_a_model_that_does_not_compile_leaves_the_callback():
     assert in_thread(lambda: mjcb.compiled(mujoco.MjSpec())).wait(60)
 
 
-def test_a_wrong_model_is_an_error_also_within_a_policy(tmp_path):
-    (tmp_path / "bad.xml").write_text(MODEL.replace('size=".03"', 'size="-1"'))
-    found = []
-
-    def act(observation):
-        with pytest.raises(smc.ScenarioError, match="size") as told:
-            smc.plant_from(tmp_path / "bad.xml", ["j"])
-        found.append(str(told.value))
-        return [0.0]
-
-    assert run_of(smc.policy(act)).failure is None
-    assert "Python exception" not in found[0]
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_forked_child_waits_for_no_thread_of_its_parent():
     slow = Slow()
@@ -223,27 +214,6 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
     leave.set()
     slow.let.set()
     assert all(end.wait(60) for end in ends)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
-@pytest.mark.parametrize("module", [nominal_model, mjcf])
-def test_locks_of_other_threads_are_free_in_a_forked_child(module):
-    held = threading.Event()
-
-    def hold():
-        with module._lock:
-            held.set()
-            time.sleep(0.05)
-
-    end = in_thread(hold)
-    assert held.wait(60)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
-        child = os.fork()
-    if child == 0:
-        os._exit(7 if module._lock.acquire(timeout=5.0) else 8)
-    assert end.wait(60)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
@@ -320,7 +290,12 @@ def test_timers_are_off_while_a_callback_is_installed_and_on_afterwards():
 def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monkeypatch):
     monkeypatch.setattr(runs, "SLICE_STEPS", 10)  # 5 of each of two runs
     two = [
-        smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed)
+        smc.Scenario(
+            plant="duffing",
+            law="classical",
+            duration=0.02,
+            seed=seed,
+        )
         for seed in range(2)
     ]
     whole = smc.run(two)
@@ -375,25 +350,6 @@ def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkey
     assert smc.run(scenario).failure is None
 
 
-def test_a_callback_that_is_cleared_during_the_run_of_a_policy_is_one_sentence():
-    law = smc.policy(lambda observation: [-0.5 * observation[0]])
-    stop = threading.Event()
-
-    def clear():
-        while not stop.is_set():
-            mujoco.set_mjcb_control(None)
-            time.sleep(1e-4)
-
-    thread = threading.Thread(target=clear)
-    thread.start()
-    try:
-        traces = [smc.run(smc.Scenario(plant="duffing", law=law, duration=0.5)) for _ in range(3)]
-    finally:
-        stop.set()
-        thread.join()
-    assert all("replaced MuJoCo's control callback" in (trace.failure or "") for trace in traces)
-
-
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
 def test_a_law_that_clears_the_callback_fails_its_run(integrator):
     asked = itertools.count()
@@ -405,7 +361,12 @@ def test_a_law_that_clears_the_callback_fails_its_run(integrator):
         return [-0.5 * observation[0]]
 
     trace = smc.run(
-        smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.02, integrator=integrator)
+        smc.Scenario(
+            plant="duffing",
+            law=smc.policy(act),
+            duration=0.02,
+            integrator=integrator,
+        )
     )
     assert "replaced MuJoCo's control callback" in (trace.failure or "")
     assert trace.diverged_at == 0.0  # of its slice

@@ -15,7 +15,6 @@ from numpy.testing import assert_array_equal
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import catalogue
-from smc_mujoco.common.errors import find
 from smc_mujoco.control import estimator, gain_sets, law, surface
 from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
@@ -81,14 +80,6 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
     forget()
 
 
-@pytest.fixture
-def quiet() -> Iterator[None]:
-    """Warnings of packages are not errors."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.errors.PackageWarning)
-        yield
-
-
 def said(call: Callable[[], object]) -> list[str]:
     """What a call warns of."""
     with warnings.catch_warnings(record=True) as caught:
@@ -114,11 +105,22 @@ def test_an_entry_runs_like_one_of_the_library(install, tmp_path):
     assert "their_law" in smc.laws("their_plant")
     assert smc.law("their_law", k=3.0).gains["k"] == 3.0
     (run,) = smc.grid(
-        ["their_plant"], ["their_law"], ["nominal"], seeds=1, duration=0.02, gains="default"
+        ["their_plant"],
+        ["their_law"],
+        ["nominal"],
+        seeds=1,
+        duration=0.02,
+        gains="default",
     )
     trace = smc.run(run)
     same = smc.run(
-        smc.Scenario(plant="duffing", law="their_law", x0=run.x0, duration=0.02, u_max=run.u_max)
+        smc.Scenario(
+            plant="duffing",
+            law="their_law",
+            x0=run.x0,
+            duration=0.02,
+            u_max=run.u_max,
+        )
     )
     assert_array_equal(trace.x, same.x)
     assert smc.load(trace.save(tmp_path / "a.npz")).scenario == run
@@ -135,19 +137,6 @@ def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
     assert "lazy_laws" not in sys.modules
     smc.law("lazy_law")
     assert "lazy_laws" in sys.modules
-
-
-def test_a_package_may_use_the_catalogue_while_it_is_imported(install):
-    """Also where it is imported first, and not by the catalogue."""
-    install(
-        "early",
-        {"plants": {"early_plant": "early_plants:early_plant"}},
-        early_plants=PLANT.replace("NAME", "early_plant"),
-    )
-    import early_plants  # pyright: ignore[reportMissingImports]
-
-    assert smc.plant("early_plant") is not None
-    assert plant.catalogue()["early_plant"] is early_plants.early_plant
 
 
 def test_an_entry_made_after_its_package_listed_the_catalogue_is_found(install):
@@ -318,29 +307,6 @@ def test_a_broken_entry_is_a_warning_where_all_are_listed_and_said_once(broken):
     assert smc.run(smc.Scenario(plant="duffing", law="good", duration=0.01)).failure is None
 
 
-def test_an_entry_that_fails_is_loaded_once(install, monkeypatch):
-    """Else each list, and each look at a name, would take as long as the import of that package."""
-    install(
-        "slow",
-        {"laws": {"slow_law": "slow_laws:slow_law"}},
-        slow_laws="raise ImportError('no torch')",
-    )
-    kind = type(
-        catalogue.points("smc_mujoco.laws")[0]
-    )  # of importlib.metadata, or of its backport, if imported
-    loads = []
-    real = kind.load
-    monkeypatch.setattr(kind, "load", lambda point: loads.append(point.name) or real(point))
-    sentences = set()
-    for _ in range(3):
-        with pytest.raises(smc.ScenarioError) as raised:
-            smc.law("slow_law")
-        sentences.add(str(raised.value))
-        assert isinstance(raised.value.__cause__, ImportError)
-    said(smc.laws)
-    assert (loads, len(sentences)) == (["slow_law"], 1)
-
-
 def test_a_name_of_the_library_is_not_taken_over(install):
     install(
         "grab",
@@ -368,15 +334,6 @@ def test_one_name_in_two_packages_is_one_sentence(install):
     assert str(raised.value) == cure
     assert said(smc.laws) == [cure]
     assert "twin" not in smc.laws()
-
-
-def test_a_group_that_does_not_exist_is_said_with_the_nearest(install):
-    install("typo", {"law": {"lost": "typo_laws:lost"}}, typo_laws=LAW.replace("NAME", "lost"))
-    (sentence,) = said(smc.laws)
-    assert (
-        "package 'typo': unknown group of entry points 'smc_mujoco.law': did you mean 'smc_mujoco.laws'?"
-        in sentence
-    )
 
 
 def test_a_user_s_law_may_not_have_the_name_of_another_package_s(install):
@@ -420,17 +377,6 @@ def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path)
     assert "their_paper" not in paper.papers()
 
 
-def test_a_union_of_catalogues_keeps_what_is_its_own(install, quiet):
-    install("theirs", {"laws": {"u_law": "u_laws:u_law"}}, u_laws=LAW.replace("NAME", "u_law"))
-    mine = law.catalogue() | {"u_law": 3}
-    assert mine["u_law"] == 3
-    assert find("law", "u_law", mine) == 3
-    assert (law.catalogue() | {}).package("u_law") == "theirs"
-    with pytest.raises(KeyError):
-        law.catalogue()["no such law"]
-    assert law.catalogue().get("no such law", 5) == 5
-
-
 # the template
 
 
@@ -471,10 +417,26 @@ def test_the_template_installs_offline_and_passes_its_tests(tmp_path):
         return done.stdout
 
     offline = ("--no-index", "--no-deps", "--no-build-isolation", "--disable-pip-version-check")
-    run("-m", "pip", "install", "-q", *offline, "--target", target, EXAMPLE)
+    run(
+        "-m",
+        "pip",
+        "install",
+        "-q",
+        *offline,
+        "--target",
+        target,
+        EXAMPLE,
+    )
     assert (target / "my_smc_package" / "models" / "sprung_cart.xml").is_file()
     (tmp_path / "use.py").write_text(USE)
     assert run("-W", "error", "use.py").splitlines() == ["4 4", "['supported', 'supported']"]
-    assert "4 passed" in run("-m", "pytest", "-q", "-p", "no:cacheprovider", EXAMPLE / "tests")
+    assert "4 passed" in run(
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        EXAMPLE / "tests",
+    )
     listed = run("-m", "smc_mujoco", "list")
     assert listed.count("[my-smc-package]") == 3

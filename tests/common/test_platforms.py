@@ -13,7 +13,6 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common import gl, guard, process
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.simulation import run
 
 PACKAGE = Path(smc.__file__).parent
 POSITION = {"read_text": 0, "write_text": 1}  # of the encoding among the arguments
@@ -92,12 +91,6 @@ def test_other_systems_than_linux_keep_mujoco_s_own_choice_of_opengl(platform, m
     finally:
         gl.choice.cache_clear()
     assert "MUJOCO_GL" not in os.environ
-
-
-def test_without_an_affinity_all_processors_count(monkeypatch):
-    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
-    monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    assert run.cores() == 7
 
 
 def test_without_limits_of_memory_a_model_is_tried_all_the_same(monkeypatch):

@@ -56,13 +56,6 @@ def test_the_bar_vanishes_when_the_work_fails(cell):
     assert cell[-1] == ""
 
 
-def test_nothing_is_drawn_more_than_five_times_a_second(cell):
-    with progress.bar("runs", 1e4) as bar:
-        for _ in range(1000):
-            bar.advance(1.0)
-    assert len(cell) < 10
-
-
 def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monkeypatch):
     """rich is given; what it is asked is told."""
     monkeypatch.setattr("rich.progress.Progress", rich := MagicMock())
@@ -104,22 +97,6 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
     assert len(err.splitlines()) == 4
 
 
-def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    shared = progress.Bar("runs", 8.0)
-    counted = progress.Bar("claims", 8.0, counted=True)
-    assert [str(shared), str(counted)] == ["runs 0 %", "claims 0/8"]
-    now[0] = 106.0
-    for bar in (shared, counted):
-        bar.advance(2.5)
-        bar.says("more", 0.5)
-    assert [str(shared), str(counted)] == ["more 38 %, 10 s left", "more 3/8, 10 s left"]
-    shared.reached(9.0, 4.0)
-    assert str(shared) == "more 100 %, 0 s left"
-    assert str(progress.Bar("looking")) == "looking"
-
-
 def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
@@ -143,26 +120,3 @@ def test_pieces_of_work_are_reported_as_their_sum():
     add(2.0)
     add(0.25)
     assert reports == [(3.5, 9.0), (3.75, 9.0)]
-
-
-def test_what_is_not_shown_draws_nothing(cell, capsys):
-    with progress.bar("runs", 2.0, shown=False) as bar:
-        bar.says("more", 1.0)
-    with progress.counter(0, 0, shown=True) as stepped:
-        stepped(1)
-    assert (cell, capsys.readouterr()) == ([], ("", ""))
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        (0.1, "1 s"),
-        (7.4, "7 s"),
-        (34.0, "30 s"),
-        (94.0, "90 s"),
-        (100.0, "2 minutes"),
-        (3600.0, "60 minutes"),
-    ],
-)
-def test_a_duration_is_told_in_words(seconds, words):
-    assert progress.about(seconds) == f"about {words}"

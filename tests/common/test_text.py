@@ -6,8 +6,8 @@ import re
 import pytest
 
 from smc_mujoco.common import tabular
-from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import capital, joined, number
+from smc_mujoco.common.tabular import Cell, Tabular
+from smc_mujoco.common.text import number
 
 pytestmark = pytest.mark.quick
 
@@ -56,19 +56,6 @@ def test_a_number_has_as_many_digits_as_are_asked_for(value):
     assert (number(value), number(value, 1)) == NUMBERS[value]
 
 
-def test_a_list_reads_as_a_sentence():
-    assert [joined(""), joined("a"), joined("ab"), joined("abc")] == [
-        "",
-        "a",
-        "a and b",
-        "a, b and c",
-    ]
-
-
-def test_the_first_letter_becomes_a_capital_and_the_others_stay():
-    assert [capital(""), capital("all of LQR"), capital("|e|")] == ["", "All of LQR", "|e|"]
-
-
 @pytest.mark.parametrize("width", [80, 44])
 def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
     text = tabular.plain(TABLE, width)
@@ -105,27 +92,8 @@ def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
     assert "and 1 more" in long._repr_html_()
 
 
-def test_tables_are_shown_one_after_the_other_and_empty_ones_not_in_latex():
-    class Two(Tables):
-        @property
-        def tables(self):
-            return Tabular(headings=["a"], rows=[["b"]]), Tabular(headings=["c"], rows=[])
-
-    both = Two()
-    assert str(both) == repr(both) == "a\n─\nb\n\nc\n─"
-    assert tabular.plain(both) == "a\n─\nb\n\nc\n─\n"
-    assert both._repr_html_().count("<br>") == 1
-    assert both.to_latex().count("tabular}{l}") == 1
-
-
 def test_every_character_that_latex_reads_is_written_out():
     assert tabular.tex("a^-12 ⁰₉ \\~^&%$#_{}<|>Ωε–·×±−′″") == (
         r"a$^{-12}$ $^0$$_9$ \textbackslash{}\textasciitilde{}\textasciicircum{}\&\%\$\#\_\{\}$<$$|$$>$$\Omega$"
         r"$\varepsilon$--$\cdot$$\times$$\pm$$-$$'$$''$"
     )
-
-
-def test_names_are_broken_at_spaces_and_after_underscores():
-    assert tabular.folded("a_bb cc_d", 9) == "a_bb cc_d"
-    assert tabular.folded("a_bb cc_d", 5) == "a_bb\ncc_d"
-    assert tabular.folded("aaaa_bbbb", 6) == "aaaa_\nbbbb"

@@ -214,6 +214,13 @@ def _run(kind, gains, samples, h, late, Phi, Gamma, start):
     us = np.zeros(samples)
     s = np.empty(samples)
     for k in range(samples):
-        us[k], s[k] = _law(kind, gains, memory, h, z[0], z[1])
+        us[k], s[k] = _law(
+            kind,
+            gains,
+            memory,
+            h,
+            z[0],
+            z[1],
+        )
         z = Phi @ z + Gamma * (us[k - late] if k >= late else 0.0)
     return s

@@ -37,9 +37,18 @@ def scenarios(law) -> list[smc.Scenario]:
     starts turned.
     """
     drone = smc.plant_from("examples/quadrotor.xml", channels=["body"], keyframe="hover")
-    common = {"law": law, "noise": smc.Noise(1e-3, 1e-2), "duration": 0.4}
+    common = {
+        "law": law,
+        "noise": smc.Noise(1e-3, 1e-2),
+        "duration": 0.4,
+    }
     return [
-        smc.Scenario(plant="quadrotor", disturbance=WIND, reference=smc.Sine(0.2, 3.0), **common),
+        smc.Scenario(
+            plant="quadrotor",
+            disturbance=WIND,
+            reference=smc.Sine(0.2, 3.0),
+            **common,
+        ),
         smc.Scenario(
             plant=drone,
             x0=(0.3, 0.2, 1.0, 0.1, 0.2, 2.5),

@@ -66,7 +66,20 @@ def measured(e=0.0, de=0.0, dt=1e-3, **more):
     `more`.
     """
     zero = dict.fromkeys(("t", "r", "dr", "ddr", "f"), 0.0)
-    return Measurement(**(zero | {"dt": dt, "x": e, "v": de, "e": e, "de": de, "g": 1.0} | more))
+    return Measurement(
+        **(
+            zero
+            | {
+                "dt": dt,
+                "x": e,
+                "v": de,
+                "e": e,
+                "de": de,
+                "g": 1.0,
+            }
+            | more
+        )
+    )
 
 
 def on_surface(s, dt=1e-3, eq=0.0, **y):
@@ -151,7 +164,15 @@ def chain(
     count = round(duration / h)
     n = len(x)
     function = cfunctions.compile_component(law)  # as the callback calls it
-    y = np.array(measured(dt=h, f=f, g=g, limit=limit if told is None else told, model=model))
+    y = np.array(
+        measured(
+            dt=h,
+            f=f,
+            g=g,
+            limit=limit if told is None else told,
+            model=model,
+        )
+    )
     y[HAS_SURFACE] = float(n == 1)
     gains = np.array([*law.gains.values(), 0.0])
     out = np.zeros(2)
@@ -173,7 +194,12 @@ def chain(
     arrays = [y, gains, cells, out, x, step, kicks, errors, states, log, memories]
     numbers = h, f, sign * g, limit
     raised = _chain(
-        function.address, *(a.ctypes.data for a in arrays), count, n, law.memory, *numbers
+        function.address,
+        *(a.ctypes.data for a in arrays),
+        count,
+        n,
+        law.memory,
+        *numbers,
     )
     assert not raised, f"{law.name} raised"
     return Sampled(np.arange(count) * h, states, *log.T.copy(), memories)
@@ -257,17 +283,38 @@ def kicked(d, n, h, count):
 
 def plant_a(law, d=rest, s=1.0, h=1e-3, duration=10.0, **options):
     """s' = f + g u + d from s; options as of `chain`."""
-    return chain(law, d, (s,), h, duration, **options)
+    return chain(
+        law,
+        d,
+        (s,),
+        h,
+        duration,
+        **options,
+    )
 
 
 def plant_b(law, d=rest, x=(1.0, 0.0), h=1e-3, duration=10.0, **options):
     """x1' = x2, x2' = f + g u + d from x; options as of `chain`."""
-    return chain(law, d, x, h, duration, **options)
+    return chain(
+        law,
+        d,
+        x,
+        h,
+        duration,
+        **options,
+    )
 
 
 def plant_c(law, d=rest, x=(1.0, 0.0, 0.0), h=1e-3, duration=10.0, **options):
     """x1' = x2, x2' = x3, x3' = f + g u + d from x; the law sees x3 as a. Options as of `chain`."""
-    return chain(law, d, x, h, duration, **options)
+    return chain(
+        law,
+        d,
+        x,
+        h,
+        duration,
+        **options,
+    )
 
 
 def orders(law, d=wave, steps=(1e-2, 1e-3, 1e-4), plant=plant_a, duration=10.0, **options):

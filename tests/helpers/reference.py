@@ -312,7 +312,16 @@ class Loop:
                 seed = self.scenario.seed
                 d = []
                 for i, state in enumerate(memory):
-                    d.append(evaluate(signal, t, state, seed, i, stream)[0])
+                    d.append(
+                        evaluate(
+                            signal,
+                            t,
+                            state,
+                            seed,
+                            i,
+                            stream,
+                        )[0]
+                    )
             elif signal.sees:
                 d = self.feedback_force(signal, data, t, memory[0])
             else:
@@ -358,7 +367,14 @@ class Loop:
                 dr = 0.0
             x = data.qpos[self.channels["qpos"][0]]
             v = data.qvel[self.channels["qvel"][0]]
-            evaluate(signal, t, memory, float(x - r), float(v - dr), s)
+            evaluate(
+                signal,
+                t,
+                memory,
+                float(x - r),
+                float(v - dr),
+                s,
+            )
         return memory[0]
 
     def apply_pushes(self, data: mujoco.MjData, t: float) -> None:

@@ -16,7 +16,14 @@ ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 
 def scenario(law="classical", **fields):
     """A Duffing oscillator for 20 ms, unless fields say otherwise."""
-    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
+    return smc.Scenario(
+        **{
+            "plant": "duffing",
+            "law": law,
+            "duration": 0.02,
+        }
+        | fields
+    )
 
 
 def made(function, gains=None, memory=8):

@@ -54,8 +54,16 @@ HITS = {
         "wall": {"x0": 0.5, "v0": 6.0},
         "peg": {"x0": 0.5},
     },
-    "duffing": {"floor": {}, "stops": {"v0": 4.0}, "peg": {}},
-    "van_der_pol": {"floor": {}, "stops": {"v0": 3.0}, "peg": {}},
+    "duffing": {
+        "floor": {},
+        "stops": {"v0": 4.0},
+        "peg": {},
+    },
+    "van_der_pol": {
+        "floor": {},
+        "stops": {"v0": 3.0},
+        "peg": {},
+    },
     "pendulum_network": {"bobs": APART},
     "inverted_pendulum_network": {"bobs": APART},
 }

@@ -63,7 +63,11 @@ def test_what_has_mass_or_touches_or_is_referred_to_or_pushed_is_no_scenery():
 @pytest.mark.parametrize(("contact", "geoms"), [("none", 0), ("stops", 8)])
 def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, monkeypatch):
     scenario = smc.Scenario(
-        plant="cart_pole", law="classical", contact=contact, x0=(1.2, 0.0), duration=0.5
+        plant="cart_pole",
+        law="classical",
+        contact=contact,
+        x0=(1.2, 0.0),
+        duration=0.5,
     )
     whole = compile_model(scenario)
     bare = compile_model(scenario, scenery=False)
@@ -78,7 +82,10 @@ def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, mon
 
 def test_a_body_that_is_pushed_stays_in_a_run():
     pushed = smc.Scenario(
-        plant="duffing", law="classical", disturbance=Push("scale", x=1.0), duration=0.01
+        plant="duffing",
+        law="classical",
+        disturbance=Push("scale", x=1.0),
+        duration=0.01,
     )
     without = dataclasses.replace(pushed, disturbance=())
     assert [trace.failure for trace in smc.run([without, pushed])] == [None, None]

@@ -29,7 +29,10 @@ SCENARIOS = {
         sensor=smc.Encoder(counts=4096, dropout=0.3),
     ),
     "a network with an estimator": smc.Scenario(
-        plant=smc.plant("pendulum_network", n=3), law="observer_free", velocity="levant", u_max=2.0
+        plant=smc.plant("pendulum_network", n=3),
+        law="observer_free",
+        velocity="levant",
+        u_max=2.0,
     ),
     "a law of many joints": smc.Scenario(
         plant=arms.arm(),

@@ -120,7 +120,15 @@ class Grows(Sliding):
 def network(**fields):
     """Three pendulums, unless fields say otherwise."""
     plant = smc.plant("pendulum_network", n=3)
-    return smc.Scenario(**{"plant": plant, "duration": 0.05, "seed": 3, "noise": NOISE} | fields)
+    return smc.Scenario(
+        **{
+            "plant": plant,
+            "duration": 0.05,
+            "seed": 3,
+            "noise": NOISE,
+        }
+        | fields
+    )
 
 
 def own_equation():
@@ -140,16 +148,26 @@ RUNS = {
     "a law that raises in one channel": network(law=raises(late=(9.0, 0.03, 9.0))),
     "a law that returns NaN": network(law=returns_nan()),
     "a law of many joints": smc.Scenario(
-        plant="double_pendulum", law=of_joints(), model="nominal", duration=0.05, u_max=60.0
+        plant="double_pendulum",
+        law=of_joints(),
+        model="nominal",
+        duration=0.05,
+        u_max=60.0,
     ),
     "a surface": network(law="boundary_layer", surface=sliding()),
     "an estimator": network(law="classical", velocity=difference()),
     "a disturbance that sees the loop": smc.Scenario(
-        plant="duffing", law="classical", disturbance=Kicks(0.1), duration=0.05
+        plant="duffing",
+        law="classical",
+        disturbance=Kicks(0.1),
+        duration=0.05,
     ),
     "a disturbance of random numbers": network(law="classical", disturbance=Wanders(0.1)),
     "a nominal model": smc.Scenario(
-        plant=own_equation(), law="observer_free", model="nominal", duration=0.05
+        plant=own_equation(),
+        law="observer_free",
+        model="nominal",
+        duration=0.05,
     ),
     "a friction by a formula": network(law="pid", friction=Grows(0.3)),
     "late samples": network(law=integrates(), clock=smc.Clock(jitter=5e-4, missed=0.2)),
@@ -161,7 +179,11 @@ RUNS = {
         control_period=5e-3,
     ),
     "an arm of a file": smc.Scenario(
-        plant=arms.arm(), law=of_joints(), model="nominal", duration=0.03, u_max=60.0
+        plant=arms.arm(),
+        law=of_joints(),
+        model="nominal",
+        duration=0.03,
+        u_max=60.0,
     ),
 }
 
@@ -187,7 +209,11 @@ def test_a_drone_flies_under_a_law_in_python():
     """As under its compiled twin: the oracle has no free bodies."""
     law = smc.law("geometric")
     scenario = smc.Scenario(
-        plant="quadrotor", law=law, duration=0.05, reference=smc.Sine(0.2, 3.0), noise=NOISE
+        plant="quadrotor",
+        law=law,
+        duration=0.05,
+        reference=smc.Sine(0.2, 3.0),
+        noise=NOISE,
     )
     twin = smc.run(scenario)
     trace = plainly(

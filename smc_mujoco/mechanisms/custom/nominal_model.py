@@ -32,12 +32,9 @@ import contextlib
 import ctypes
 import dataclasses
 import functools
-import hashlib
 import math
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -45,11 +42,11 @@ import numpy as np
 from llvmlite import binding
 from numba import carray, types
 
-from smc_mujoco.common import jit, libmujoco
+from smc_mujoco.common import fingerprint, libmujoco
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.jit import Function, floats, pointer, record_at
+from smc_mujoco.common.jit import Function, Key, floats, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
-from smc_mujoco.mechanisms import plant, rotation
+from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids
 from smc_mujoco.mechanisms.plant import (
     SEEN,
@@ -301,15 +298,6 @@ def _mujoco(name: str, more: int = 0) -> Callable:
     return types.ExternalFunction(name, types.void(*[types.int64] * (2 + more)))
 
 
-def _on_disk(native: Callable) -> Function:
-    """Return a C function of this file, kept on disk under a hash of the sources that it is made
-    of.
-    """
-    modules = sys.modules[__name__], jit, plant, rotation
-    sources = b"".join(Path(str(module.__file__)).read_bytes() for module in modules)
-    return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
-
-
 def passive_alone(model: mujoco.MjModel) -> bool:
     """Return whether h is of inertia and passive forces alone: without tendons, and actuators that
     act at ctrl = 0.
@@ -394,7 +382,7 @@ def native_dynamics() -> Function:
                 forces[j] = bias[k] - passive[k] - actuator[k]
         return 0
 
-    return _on_disk(native)
+    return Function(native, Key("nominal-model", fingerprint.now(native)))
 
 
 @functools.cache
@@ -433,7 +421,7 @@ def native_coriolis() -> Function:
                 output[j] += sign * 0.25 * bias[place_at(places, j).qvel]
         return 0
 
-    return _on_disk(native)
+    return Function(native, Key("nominal-model", fingerprint.now(native)))
 
 
 @functools.cache
@@ -458,7 +446,7 @@ def native_jacobian() -> Function:
                 output[i, j] = moves[i, place_at(int(at.places), j).qvel]
         return 0
 
-    return _on_disk(native)
+    return Function(native, Key("nominal-model", fingerprint.now(native)))
 
 
 @functools.cache
@@ -519,4 +507,4 @@ def native() -> Function:
         output[0], output[1] = qacc[dof], moved[dof]
         return 0
 
-    return _on_disk(native)
+    return Function(native, Key("nominal-model", fingerprint.now(native)))
