@@ -12,7 +12,6 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.control.joint_law import (
-    catalogue,
     coriolis,
     jacobian,
     norm,
@@ -20,7 +19,7 @@ from smc_mujoco.control.joint_law import (
     saturate,
     torque,
 )
-from smc_mujoco.control.law import FREE_BODY
+from smc_mujoco.control.law import FREE_BODY, joint_catalogue
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Values
 
@@ -75,7 +74,7 @@ def cases(arm):
         "mismatch": {"m": 1.4},
         "feedforward": smc.Constant(0.3),
     }
-    for name in (name for name, law in catalogue().items() if FREE_BODY not in law.plants):
+    for name in (name for name, law in joint_catalogue().items() if FREE_BODY not in law.plants):
         yield smc.Scenario(
             plant=arm,
             law=name,
