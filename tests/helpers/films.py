@@ -5,6 +5,8 @@ from unittest import mock
 import numpy as np
 
 from smc_mujoco.draw.film import film
+from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.draw.film.track import MachineTrack
 
 
 class Blank:
@@ -18,3 +20,17 @@ class Blank:
 
 
 without_charts = mock.patch.object(film, "Charts", Blank)
+
+
+def tracks(traces, colours):
+    """Return what runs do in a film without arrows, at 0 and .1 s."""
+    times = np.array([0.0, 0.1])
+    found = []
+    for trace, colour in zip(traces, colours, strict=False):
+        found.append(MachineTrack(trace, colour, times, times, {}, arms=True))
+    return found
+
+
+def staged(traces, colours, *placed):
+    """Return a stage for the machines of traces; `placed` are size, room and camera."""
+    return Stage(tracks(traces, colours), *placed)

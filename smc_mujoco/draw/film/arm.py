@@ -17,22 +17,21 @@ from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
 
-PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
-WANTED_OPACITY = 0.5  # of the wanted path
+# Sizes are px of a film of full size, and chosen.
+PATH_WIDTH = 3.0
+WANTED_PATH_WIDTH = 1.6
+WANTED_OPACITY = 0.5
 OUTSIDE = 100  # px beyond the picture up to which a path is followed
-BAR_WIDTH, BAR_GAP, BAR_HEIGHT = (
-    15,
-    6,
-    26,
-)  # px, of a bar, between bars, and from one limit to the other
-BAR_LETTERS, NUMBER_SIZE = 18, 18  # px
-LABEL_GAP = 3  # px, from a label to its bars
-BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.25 * BAR_LETTERS  # px, of bars with their numbers
-# m: only a tip farther off its path has a ghost at its reference; a nearer one hides it; chosen
-MAX_TIP_ERROR = 0.015
+BAR_WIDTH = 15
+BAR_GAP = 6
+BAR_HEIGHT = 26  # from one limit to the other
+LETTERS = 18
+LABEL_GAP = 3  # from a label to its bars
+BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.25 * LETTERS  # of bars with their numbers
+MAX_TIP_ERROR = 0.015  # m: only a tip farther off has a ghost; a nearer one would hide it
 FORCE_ARROW = 0.6  # m, length of the arrow for the largest force
 BLOW_ARROW = 0.4  # m, length of the arrow of a blow
-SHAFT_WIDTH = 4.0  # px
+SHAFT_WIDTH = 4.0
 BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
 BLOW_TIME = 0.12  # s for which a blow is shown after its end
 
@@ -47,9 +46,8 @@ def key(traces: Sequence[Trace]) -> list[str]:
     """Return what the film of arms shows, in words."""
     words = ["line: path of the tip; dark: the wanted path"]
     if all(map(has_bars, traces)):
-        words.append(
-            f"bars: torque of joints 1 to {traces[0].scenario.plant.n}, share of their limits"
-        )
+        joints = traces[0].scenario.plant.n
+        words.append(f"bars: torque of joints 1 to {joints}, share of their limits")
     if any(tip.knows_contacts(trace.scenario) for trace in traces):
         words.append("violet arrow: force on what the tip touches")
     if style.pushes(traces):
@@ -65,15 +63,15 @@ class Trail:
     def __init__(
         self, points: np.ndarray, times: np.ndarray, colour: str, width: float, opacity: float = 1.0
     ):
+        fine = arrows.SUPERSAMPLING
         self.corner = np.floor(points.min(axis=0) - width).astype(int)
         size = np.ceil(points.max(axis=0) + width).astype(int) - self.corner
-        self.fine = Image.new("L", tuple((arrows.SUPERSAMPLING * size).tolist()))  # opacities
-        self.mask = self.fine.reduce(arrows.SUPERSAMPLING)
-        self.points = arrows.SUPERSAMPLING * (points - self.corner)
+        self.fine = Image.new("L", tuple((fine * size).tolist()))  # opacities
+        self.points = fine * (points - self.corner)
         self.times = times
         self.reached = 0
         self.colour = style.rgb(colour)
-        self.width = arrows.SUPERSAMPLING * width
+        self.width = round(fine * width)
         self.opacity = round(255 * opacity)
 
     def draw(self, image: Image.Image, time: float) -> None:
@@ -81,14 +79,10 @@ class Trail:
         stop = int(np.searchsorted(self.times, time, side="right"))
         if stop > self.reached:
             new = self.points[max(self.reached - 2, 0) : stop]  # it joins what is there
-            pen = ImageDraw.Draw(self.fine)
-            pen.line(
-                [tuple(point) for point in new.tolist()],
-                self.opacity,
-                round(self.width),
-                joint="curve",
-            )
-            self.mask, self.reached = self.fine.reduce(arrows.SUPERSAMPLING), stop
+            line = list(map(tuple, new.tolist()))
+            ImageDraw.Draw(self.fine).line(line, self.opacity, self.width, joint="curve")
+            self.reached = stop
+            self.mask = self.fine.reduce(arrows.SUPERSAMPLING)
         image.paste(self.colour, tuple(self.corner.tolist()), self.mask)
 
 
@@ -100,29 +94,25 @@ class Paths:
 
     def __init__(self, traces: Sequence[Trace], colours: Sequence[str], stage: Stage):
         self.trails = []
-        self.wanted = []
         s = stage.scale
         for trace, colour, place in zip(traces, colours, stage.where, strict=True):
-            free = trace.scenario.plant.pose
-            if free:
-                lines = (trace.x[:, :3], trace.r[:, :3])
-            else:
+            lines = (trace.x[:, :3], trace.r[:, :3])
+            if not trace.scenario.plant.pose:
                 lines = tip.tip_paths(trace)
-            above = [np.maximum(points + place, (-np.inf, -np.inf, 0.0)) for points in lines]
-            path, wanted = (
-                stage.project(points).clip(-OUTSIDE, np.add(stage.size, OUTSIDE))
-                for points in above
-            )
-            self.trails.append(Trail(path, trace.t, colour, PATH_WIDTH * s))
-            self.wanted.append(
-                Trail(wanted, trace.t, style.INK, WANTED_PATH_WIDTH * s, WANTED_OPACITY)
-            )
+            found = []
+            for points in lines:
+                above = np.maximum(points + place, (-np.inf, -np.inf, 0.0))
+                found.append(stage.project(above).clip(-OUTSIDE, np.add(stage.size, OUTSIDE)))
+            path, wanted = found
+            look = (style.INK, WANTED_PATH_WIDTH * s, WANTED_OPACITY)
+            own = Trail(path, trace.t, colour, PATH_WIDTH * s)
+            self.trails.append((Trail(wanted, trace.t, *look), own))
 
     def draw(self, image: Image.Image, time: float) -> None:
         """Draw the wanted paths, and the actual ones until a time, s."""
-        for trail, wanted in zip(self.trails, self.wanted, strict=True):
+        for wanted, own in self.trails:
             wanted.draw(image, np.inf)
-            trail.draw(image, time)
+            own.draw(image, time)
 
     def over(self, picture: np.ndarray, time: float) -> np.ndarray:
         """Return a picture with the paths until a time, s."""
@@ -152,131 +142,95 @@ class Overlay:
         self.room = room
         self.paths = Paths(traces, colours, stage)
         self.scale = stage.scale
-        self.shares = (
-            None  # torques as shares of their limits, (frames, joints), -1 .. 1: means over a frame
-        )
-        if all(map(has_bars, traces)):
-            torques = [windows(trace.t, trace.applied, edges).mean for trace in traces]
-            limits = [np.array(trace.scenario.limits) for trace in traces]
-            self.shares = [
-                np.clip(u / most, -1.0, 1.0) for u, most in zip(torques, limits, strict=True)
-            ]
-        self.errors = [
-            windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces
-        ]
-        self.forces = [
-            windows(trace.t, tip.contacts(trace).push, edges).mean
-            if tip.knows_contacts(trace.scenario)
-            else None
-            for trace in traces
-        ]
-        sizes = [np.linalg.norm(force, axis=1).max() for force in self.forces if force is not None]
-        # m
-        if max(sizes, default=0.0):
-            self.newton = FORCE_ARROW / max(sizes, default=1.0)
-        else:
-            self.newton = 0.0
-        self.blows = [(k, push) for k, trace in enumerate(traces) for push in style.pushes([trace])]
+        self.shares = []  # torques as shares of their limits, (frames, joints), -1 .. 1: means
+        self.errors = []  # (frames,) m
+        self.forces = {}  # of a contact, (frames, 3) N
+        self.newton = 0.0  # m of an arrow
+        barred = all(map(has_bars, traces))
+        for k, trace in enumerate(traces):
+            if barred:
+                share = windows(trace.t, trace.applied, edges).mean / trace.scenario.limits
+                self.shares.append(np.clip(share, -1.0, 1.0))
+            self.errors.append(windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0])
+            if tip.knows_contacts(trace.scenario):
+                self.forces[k] = windows(trace.t, tip.contacts(trace).push, edges).mean
+        sizes = [np.linalg.norm(force, axis=1).max() for force in self.forces.values()]
+        largest = max(sizes, default=0.0)
+        if largest:
+            self.newton = FORCE_ARROW / largest
 
     def over(self, picture: np.ndarray, frame: int) -> np.ndarray:
         """Return the picture of a frame with all this, as the machines stand on the stage."""
         time = float(self.edges[frame + 1])
         image = Image.fromarray(picture)
         self.paths.draw(image, time)
-        draw = ImageDraw.Draw(image)
-        for k, force in enumerate(self.forces):
-            if force is not None and (size := float(np.linalg.norm(force[frame]))) > 0.5:
+        for k, forces in self.forces.items():
+            size = float(np.linalg.norm(forces[frame]))
+            if size > 0.5:
                 at = self.stage.find(k, self.traces[k].scenario.plant.tip)
-                self.arrow(image, np.array([at, at - self.newton * force[frame]]), size, after=True)
-        for k, blow in self.blows:
-            if self.edges[frame] <= blow.time + blow.width + BLOW_TIME and time >= blow.time:
-                peak = np.array([blow.x, blow.y, blow.z])
-                way = peak / np.linalg.norm(peak)
-                end = self.stage.find(k, blow.body) - BLOW_DISTANCE * way
-                self.arrow(
-                    image,
-                    np.array([end - BLOW_ARROW * way, end]),
-                    float(np.linalg.norm(peak)),
-                    after=False,
-                )
-        for k in range(len(self.traces)):
-            self.gauges(draw, k, frame)
+                self.arrow(image, at, at - self.newton * forces[frame], size, after=True)
+        for k, trace in enumerate(self.traces):
+            for blow in style.pushes([trace]):
+                end = blow.time + blow.width + BLOW_TIME
+                if self.edges[frame] <= end and time >= blow.time:
+                    peak = np.array([blow.x, blow.y, blow.z])
+                    size = float(np.linalg.norm(peak))
+                    place = self.stage.find(k, blow.body) - BLOW_DISTANCE * peak / size
+                    start = place - BLOW_ARROW * peak / size
+                    self.arrow(image, start, place, size, after=False)
+            self.gauges(ImageDraw.Draw(image), k, frame)
         return np.asarray(image)
 
-    def arrow(self, image: Image.Image, ends: np.ndarray, force: float, after: bool) -> None:
-        """Draw an arrow with smooth edges between two points, (2, 3) m, and its force, N, beyond it
+    def arrow(
+        self, image: Image.Image, tail: np.ndarray, tip: np.ndarray, force: float, after: bool
+    ) -> None:
+        """Draw an arrow with smooth edges between two points, (3,) m, and its force, N, beyond it
         or before it.
         """
-        s, (start, end) = self.scale, self.stage.project(ends)
+        s = self.scale
+        start, end = self.stage.project(np.array([tail, tip]))
         if np.linalg.norm(end - start) > 1.0:
-            line = np.linspace(start, end, 40)
-            rgb = np.array(style.rgb(style.REACTION)) / 255
-            arrows.paint(image, arrows.outline(line, SHAFT_WIDTH * s), (*rgb, 1.0))
-        draw = ImageDraw.Draw(image)
-        font = style.font(NUMBER_SIZE * s, bold=True)
-        place = end if after else start
-        gap = 6 * s * np.sign((end - start)[0] or 1.0) * (1 if after else -1)
-        anchor = "lm" if gap > 0 else "rm"
-        at = (float(place[0] + gap), float(place[1]))
-        look = {"anchor": anchor, "stroke_width": round(2 * s), "stroke_fill": style.PAPER}
-        draw.text(at, f"{force:.0f} N", style.REACTION, font, **look)
+            outline = arrows.outline(np.linspace(start, end, 40), SHAFT_WIDTH * s)
+            arrows.paint(image, outline, arrows.rgba(style.REACTION))
+        x, y = (end if after else start).tolist()
+        rightwards = end[0] >= start[0]
+        look = {"anchor": "rm", "stroke_width": round(2 * s), "stroke_fill": style.PAPER}
+        gap = -6 * s
+        if rightwards == after:
+            look["anchor"] = "lm"
+            gap = 6 * s
+        letters = style.font(LETTERS * s, bold=True)
+        words = f"{force:.0f} N"
+        ImageDraw.Draw(image).text((x + gap, y), words, style.REACTION, letters, **look)
 
     def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
         """Draw the bars of a machine, and how far its tip is off its path."""
-        s, (left, top, right, bottom), font = (
-            self.scale,
-            self.room[k].tolist(),
-            style.font(BAR_LETTERS * self.scale),
-        )
-        off, letters = 1e3 * self.errors[k][frame], style.font(NUMBER_SIZE * s, bold=True)  # mm
-        words = f"tip {off:.{1 if off < 9.95 else 0}f} mm"
-        if self.shares is None:
-            draw.text(
-                ((left + right) / 2, (top + bottom) / 2), words, style.INK, letters, anchor="mm"
-            )
+        s = self.scale
+        left, top, right, bottom = self.room[k].tolist()
+        off = 1e3 * self.errors[k][frame]  # mm
+        words = f"{off:.{1 if off < 9.95 else 0}f} mm"
+        bold = style.font(LETTERS * s, bold=True)
+        letters = style.font(LETTERS * s)
+        if not self.shares:
+            middle = ((left + right) / 2, (top + bottom) / 2)
+            draw.text(middle, f"tip {words}", style.INK, bold, anchor="mm")
             return
-        zero = top + (LABEL_GAP + BAR_HEIGHT / 2) * s
         half = BAR_HEIGHT * s / 2
-        share = self.shares[k][frame]
-        for i, value in enumerate(share):
-            x = left + (BAR_GAP + i * (BAR_WIDTH + BAR_GAP)) * s
-            draw.rectangle(
-                (x, zero - half, x + BAR_WIDTH * s, zero + half), style.PAPER, style.RULE
-            )
+        zero = top + LABEL_GAP * s + half
+        x = left + BAR_GAP * s
+        for i, value in enumerate(self.shares[k][frame], 1):
+            end = x + BAR_WIDTH * s
+            draw.rectangle((x, zero - half, end, zero + half), style.PAPER, style.RULE)
             low, high = sorted((zero, zero - value * half))
-            full = abs(value) > 0.999
-            draw.rectangle(
-                (x + 1, low, x + BAR_WIDTH * s - 1, high), style.FAILED if full else self.colours[k]
-            )
-            draw.text(
-                (x + BAR_WIDTH * s / 2, zero + half + 2 * s),
-                str(i + 1),
-                style.MUTED,
-                font,
-                anchor="ma",
-            )
-        wide = bars_width(len(share)) * s
-        draw.line((left, zero, left + wide, zero), style.INK, max(1, round(s)))
-        if right - left > wide + 1:
-            draw.text(
-                (left + wide + 6 * s, zero),
-                "tip",
-                style.MUTED,
-                style.font(NUMBER_SIZE * s),
-                anchor="lb",
-            )
-            draw.text(
-                (left + wide + 6 * s, zero + 2 * s),
-                words.removeprefix("tip "),
-                style.INK,
-                letters,
-                anchor="lt",
-            )
-
-
-def bars_width(joints: int) -> float:
-    """Return the width of the bars of a machine, px of a full-size film."""
-    return joints * (BAR_WIDTH + BAR_GAP) + BAR_GAP
+            colour = style.FAILED if abs(value) > 0.999 else self.colours[k]
+            draw.rectangle((x + 1, low, end - 1, high), colour)
+            place = ((x + end) / 2, zero + half + 2 * s)
+            draw.text(place, str(i), style.MUTED, letters, anchor="ma")
+            x = end + BAR_GAP * s
+        draw.line((left, zero, x, zero), style.INK, max(1, round(s)))
+        if right - x > 1:
+            draw.text((x + 6 * s, zero), "tip", style.MUTED, letters, anchor="lb")
+            draw.text((x + 6 * s, zero + 2 * s), words, style.INK, bold, anchor="lt")
 
 
 def room(traces: Sequence[Trace], slot: float) -> tuple[float, float]:
@@ -285,8 +239,10 @@ def room(traces: Sequence[Trace], slot: float) -> tuple[float, float]:
 
     The tip's distance stands beside the bars where the slot has room for it.
     """
-    number = style.width("000 mm", NUMBER_SIZE, bold=True) + 8
+    number = style.width("000 mm", LETTERS, bold=True) + 8
     if not all(map(has_bars, traces)):
-        return number + style.width("tip ", NUMBER_SIZE, bold=True), 1.6 * NUMBER_SIZE
-    bars = bars_width(traces[0].scenario.plant.n)
-    return bars + number * (bars + number < slot), BARS_HEIGHT
+        return number + style.width("tip ", LETTERS, bold=True), 1.6 * LETTERS
+    bars = traces[0].scenario.plant.n * (BAR_WIDTH + BAR_GAP) + BAR_GAP
+    if bars + number < slot:
+        return bars + number, BARS_HEIGHT
+    return bars, BARS_HEIGHT

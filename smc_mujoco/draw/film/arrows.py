@@ -25,47 +25,39 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HINGE_LENGTH, SLIDE_LENGTH = (
-    0.425,
-    0.08,
-)  # longest arrow, as a share of the pendulum's length, and of the rail's
-RADIUS_SHARE, LENGTH_SHARE = (
-    0.16,
-    0.024,
-)  # of the bob's radius and the pendulum's length, which add up to the thickness
+# Numbers of presentation here are chosen. An arrow's length is stated for the longest one.
+HINGE_LENGTH = 0.425  # of the pendulum's length
+SLIDE_LENGTH = 0.08  # of the rail's
+RADIUS_SHARE = 0.16  # of the bob's radius, in the thickness of an arrow
+LENGTH_SHARE = 0.024  # of the pendulum's length, which is added
 LONG_PENDULUM = 0.5  # m: longer pendulums have arrows as thick as one of this length
-ARC_DISTANCE, RAIL_DISTANCE = 1.6, 2.2  # thicknesses between a body and its nearest arrow
+ARC_DISTANCE = 1.6  # thicknesses between a bob and its nearest arrow
+RAIL_DISTANCE = 2.2  # the same above a cart
 LAYER_DISTANCE = 2.6  # thicknesses between two arrows
-SLIDE_THICKNESS, MAX_RAIL_SHARE = (
-    0.035,
-    0.008,
-)  # m, and largest share of the rail, of an arrow's thickness
-USER_LENGTH, USER_THICKNESS = 0.25, 0.012  # at slides of a user's model, of its extent
+SLIDE_THICKNESS = 0.035  # m
+MAX_RAIL_SHARE = 0.008  # of the rail, of an arrow's thickness
+USER_LENGTH = 0.25  # at slides of a user's model, of its extent
+USER_THICKNESS = 0.012
 USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its extent
 BENT_SIZE = 0.1  # largest radius of a bent arrow, of the size of what moves
 MAX_BENT_SHARE = 0.08  # the same, of the picture's height
 RIM = 2.0  # px, of paper around an arrow that lies over a link, of a film of full size
 MIN_SHAFT = 8.0  # px, of a film of full size; of an arrow that is long enough
 MAX_SWEEP = 2.0  # rad, of the longest bent arrow
-BENT_WIDTH, BENT_DISTANCE = 0.2, 0.35  # of a bent arrow, and to the next one, in radii
+BENT_WIDTH = 0.2  # of a bent arrow, in radii
+BENT_DISTANCE = 0.35  # to the next one
 BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direction to the camera
-HEAD_WIDTH, HEAD_LENGTH = (
-    2.25,
-    2.2,
-)  # of a flat arrow: half the head's width in shafts, its length in such halves
+HEAD_WIDTH = 2.25  # half the width of a head, in shafts
+HEAD_LENGTH = 2.2  # in half widths
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
 NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-FLIGHT_LENGTH, FLIGHT_THICKNESS = (
-    2.2,
-    0.07,
-)  # of the longest arrow on a free body, in distances of its actuators
-FLIGHT_DISTANCE = (
-    0.6  # of the disturbance's arrow from the middle of a free body, in longest arrows
-)
-COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
+FLIGHT_LENGTH = 2.2  # on a free body, in distances of its actuators
+FLIGHT_THICKNESS = 0.07
+FLIGHT_DISTANCE = 0.6  # of the disturbance's arrow from the middle of a free body
+COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
@@ -78,29 +70,20 @@ class Arrow(NamedTuple):
     layer: int = 0  # distance from the body, in arrows
     size: float = 1.0
     head: bool = True
-    way: np.ndarray | None = (
-        None  # direction of a force on a free body, (3,), in the axes of the world
-    )
+    way: np.ndarray | None = None  # of a force on a free body, (3,), in the axes of the world
 
 
 class Mount(NamedTuple):
     """Place and size of the arrows at a joint of the film's scene."""
 
     joint: int
-    # at a slide, length of the longest arrow, m; at a hinge, a factor on HINGE_LENGTH of the
-    # pendulum's
-    unit: float
-    thick: float  # thickness at a slide, m
-    front: (
-        np.ndarray | None
-    )  # direction to the camera, (3,), for arrows at a slide that carries something
-    # whether on the other side of a hinge than the body: a network's pendulums pass each other
-    beyond: bool = False
+    unit: float  # longest arrow at a slide, m; at a hinge, a factor on HINGE_LENGTH
+    thick: float  # at a slide, m
+    front: np.ndarray | None  # to the camera, (3,), for a slide that carries something
+    beyond: bool = False  # on the other side of a hinge than the body, in a network
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
-    # Of an actuator of a free body: its place, m, and the direction of its force, in the axes of
-    # the body
-    place: np.ndarray | None = None
-    way: np.ndarray | None = None
+    place: np.ndarray | None = None  # of an actuator of a free body, m, in the axes of the body
+    way: np.ndarray | None = None  # of its force
 
 
 def mounts(
@@ -114,38 +97,28 @@ def mounts(
     to the camera.
     """
     plant = scenario.plant
-    is_users = not scenario.plant.on_stage
     if plant.pose:
         return flying_mounts(scenario, joints)
-    if is_users:
+    if not plant.on_stage:
         extent = float(models.compile_model(scenario).stat.extent)
+        slide = Mount(0, USER_LENGTH * extent, USER_THICKNESS * extent, front)
+        hinge = slide._replace(unit=1.0, radius=USER_RADIUS * extent)
     else:
-        extent = 0.0
-    length = SLIDE_LENGTH * rail
-    thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
-    if is_users:
-        length = USER_LENGTH * extent
-        thick = USER_THICKNESS * extent
-    beyond = plant.network and not is_users
-    if plant.n > 1 and not is_users:
-        turning = NETWORK_FACTOR
-    else:
-        turning = 1.0
-    if (
-        plant.n == 1
-        and not is_users
-        and "l" in plant.parameters
-        and (usual := catalogue().get(plant.name))
-    ):
-        turning = max(
-            1.0, usual.parameters["l"] / plant.parameters["l"]
-        )  # no smaller on a short rod
-    before = front if is_users or plant.free else None
-    radius = USER_RADIUS * extent
-    return [
-        Mount(j, length if slide else turning, thick, before, beyond, 0.0 if slide else radius)
-        for j, slide in zip(joints, slides, strict=True)
-    ]
+        before = front if plant.free else None
+        slide = Mount(
+            0,
+            SLIDE_LENGTH * rail,
+            min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail),
+            before,
+            plant.network,
+        )
+        turning = NETWORK_FACTOR if plant.n > 1 else 1.0
+        usual = catalogue().get(plant.name)
+        if plant.n == 1 and "l" in plant.parameters and usual:  # no smaller on a short rod
+            turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])
+        hinge = slide._replace(unit=turning)
+    kinds = zip(joints, slides, strict=True)
+    return [(slide if slides_here else hinge)._replace(joint=j) for j, slides_here in kinds]
 
 
 def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
@@ -162,11 +135,11 @@ def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
     places[: len(drives)] = (sites - data.xpos[body]) @ data.xmat[body].reshape(3, 3)
     ways[: len(drives)] = exerted(model, joint, drives.tolist())[:, :3]
     arm = float(np.linalg.norm(places, axis=1).max()) or USER_LENGTH * float(model.stat.extent)
-    sized = {"unit": FLIGHT_LENGTH * arm, "thick": FLIGHT_THICKNESS * arm, "front": None}
-    return [
-        Mount(j, **sized, place=place, way=way)
-        for j, place, way in zip(joints, places, ways, strict=True)
-    ]
+    mount = Mount(0, FLIGHT_LENGTH * arm, FLIGHT_THICKNESS * arm, None)
+    found = []
+    for j, place, way in zip(joints, places, ways, strict=True):
+        found.append(mount._replace(joint=j, place=place, way=way))
+    return found
 
 
 def loads(trace: Trace, edges: np.ndarray) -> dict[str, Envelope]:
@@ -194,9 +167,7 @@ class Scale(NamedTuple):
     disturbance: float
     reaction: float = 0.0
     exceeded: tuple[str, ...] = ()  # names of those above whose values exceed their longest arrow
-    drive: bool = (
-        False  # whether the control passes a drive, such as a motor, whose force is then shown
-    )
+    drive: bool = False  # whether a drive's force is shown, such as a motor's
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
@@ -209,17 +180,15 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        control, force, push, reaction = (
-            _sizes(parts, name) for name in ("applied", "force", "d", "reaction")
-        )
+        control = _sizes(parts, "applied")
+        push = _sizes(parts, "d")
+        peak = longest = _sizes(parts, "reaction")[0]
         if control[1] and same:
-            longest = min(reaction[0], control[1])
-        else:
-            longest = reaction[0]
+            longest = min(peak, control[1])
         if drive:
-            control = max(control[0], force[0]), max(control[1], force[1])
-        sizes = {"control": control, "disturbance": push, "reaction": (reaction[0], longest)}
-        exceeded = tuple(name for name, (peak, lasting) in sizes.items() if peak > 1.01 * lasting)
+            control = tuple(np.maximum(control, _sizes(parts, "force")).tolist())
+        sizes = {"control": control, "disturbance": push, "reaction": (peak, longest)}
+        exceeded = tuple(name for name, (most, lasting) in sizes.items() if most > 1.01 * lasting)
         by_group[group] = Scale(control[1], push[1], longest, exceeded, drive)
     return by_group
 
@@ -228,16 +197,17 @@ def flying_scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     """Return the scale of the arrows of free bodies, all with the position: its actuators are not
     its channels.
     """
-    lasting = [np.isfinite(trace.x).all(axis=1) for trace in traces]
-    control = max(
-        float(np.abs(trace.applied[k]).max(initial=0.0))
-        for trace, k in zip(traces, lasting, strict=True)
-    )
-    pushes = (
-        np.linalg.norm(trace.d[k, :3], axis=1) for trace, k in zip(traces, lasting, strict=True)
-    )
-    scale = Scale(control, max(float(push.max(initial=0.0)) for push in pushes))
-    return {group: scale if group.unit == "m" else Scale(0.0, 0.0) for group in style.split(traces)}
+    control = 0.0
+    push = 0.0
+    for trace in traces:
+        lasting = np.isfinite(trace.x).all(axis=1)
+        control = max(control, float(np.abs(trace.applied[lasting]).max(initial=0.0)))
+        pushes = np.linalg.norm(trace.d[lasting, :3], axis=1)
+        push = max(push, float(pushes.max(initial=0.0)))
+    by_group = {}
+    for group in style.split(traces):
+        by_group[group] = Scale(control, push) if group.unit == "m" else Scale(0.0, 0.0)
+    return by_group
 
 
 def flying(
@@ -246,18 +216,20 @@ def flying(
     """Return the arrows of a free body in one frame, each with its channel: of actuators and of the
     disturbance.
     """
-    law, grey = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE))
-    forces = loads["control"].mean[frame]
     push = loads["disturbance"].mean[frame, :3]
     size = float(np.linalg.norm(push))
-    if scale.control:
-        parts = forces / scale.control
-    else:
-        parts = 0.0 * forces
-    drawn = [(i, Arrow(0.0, float(part), (*law, 1.0))) for i, part in enumerate(parts)]
+    drawn = []
+    for i, force in enumerate(loads["control"].mean[frame]):
+        drawn.append((i, Arrow(0.0, float(force / (scale.control or np.inf)), rgba(colour))))
     if size and scale.disturbance:
-        drawn.append((0, Arrow(0.0, size / scale.disturbance, (*grey, 1.0), way=push / size)))
+        grey = rgba(style.DISTURBANCE)
+        drawn.append((0, Arrow(0.0, size / scale.disturbance, grey, way=push / size)))
     return [(i, arrow) for i, arrow in drawn if abs(arrow.high) > MIN_LENGTH]
+
+
+def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
+    """Return red, green, blue and opacity, 0 .. 1."""
+    return (*(np.array(style.rgb(colour)) / 255).tolist(), opacity)
 
 
 def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
@@ -267,11 +239,9 @@ def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     A brief value takes at most 1 - LASTING_QUANTILE of the time.
     """
     peak = max(map(abs, panels.span(traces, name)))
-    runs = panels.lasting(traces, name)
-    usual = max(
-        (float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs),
-        default=0.0,
-    )
+    usual = 0.0
+    for y in panels.lasting(traces, name):
+        usual = max(usual, float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()))
     return peak, usual if peak > 2.0 * usual > 0.0 else peak
 
 
@@ -280,8 +250,7 @@ def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale
     driven = [group for group in groups(trace.scenario) if group.driven]
     of_channel = {}
     for group, scale in zip(driven, scales.values(), strict=True):
-        for i in group.channels:
-            of_channel[i] = scale
+        of_channel |= dict.fromkeys(group.channels, scale)
     return [of_channel[i] for i in sorted(of_channel)]
 
 
@@ -291,24 +260,21 @@ def arrows(
     """Return the arrows of one channel in one frame, the control's nearest to the body, with its
     range behind it.
     """
-    law, grey, violet = (
-        tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE, style.REACTION)
-    )
-    others = [
-        ("control", scale.control * scale.drive, (*law, COMMAND_OPACITY), 0.65),
-        ("disturbance", scale.disturbance, (*grey, 1.0), 0.65),
-        ("reaction", scale.reaction, (*violet, 1.0), 0.8),
-    ]
-    first = ("force" if scale.drive else "control", scale.control, (*law, 1.0), 1.0)
+    layers = [("control", scale.control, rgba(colour), 1.0)]
+    if scale.drive:
+        command = ("control", scale.control, rgba(colour, COMMAND_OPACITY), 0.65)
+        layers = [("force", scale.control, rgba(colour), 1.0), command]
+    layers.append(("disturbance", scale.disturbance, rgba(style.DISTURBANCE), 0.65))
+    layers.append(("reaction", scale.reaction, rgba(style.REACTION), 0.8))
+    layers[1:] = [layer for layer in layers[1:] if layer[1]]
     drawn = []
-    for layer, (name, longest, rgba, size) in enumerate(
-        [first, *(other for other in others if other[1])]
-    ):
-        if longest:
-            low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
-            drawn.append(Arrow(0.0, mean, rgba, layer, size))
-            if layer == 0 and high - low > MIN_BAR:
-                drawn.append(Arrow(low, high, (*law, 0.4), head=False))
+    for layer, (name, longest, shade, size) in enumerate(layers):
+        if not longest:
+            continue
+        low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
+        drawn.append(Arrow(0.0, mean, shade, layer, size))
+        if layer == 0 and high - low > MIN_BAR:
+            drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 
 
@@ -320,32 +286,32 @@ def path(
     """
     axis = data.xaxis[mount.joint]
     anchor = data.xanchor[mount.joint]
+    owner = model.jnt_bodyid[mount.joint]
     low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.place is not None and mount.way is not None:
-        body = model.jnt_bodyid[mount.joint]
-        way = arrow.way
-        turn = data.xmat[body].reshape(3, 3)
-        start = mount.unit * FLIGHT_DISTANCE * (way if way is not None else 0.0)
-        if way is None:
+        turn = data.xmat[owner].reshape(3, 3)
+        if arrow.way is None:
             way = turn @ mount.way
             start = turn @ mount.place
-        return data.xpos[body] + start + mount.unit * along * way, mount.thick
+        else:
+            way = arrow.way
+            start = mount.unit * FLIGHT_DISTANCE * way
+        return data.xpos[owner] + start + mount.unit * along * way, mount.thick
     if mount.radius:
         right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
-        if not np.linalg.norm(right):
+        if not right.any():
             return None
         right /= np.linalg.norm(right)
         out = np.cos(MAX_SWEEP * along) * np.cross(right, axis) + np.sin(MAX_SWEEP * along) * right
-        return anchor + mount.radius * (
-            1.0 + BENT_DISTANCE * arrow.layer
-        ) * out, arrow.size * BENT_WIDTH * mount.radius
-    body = arrow_geom(model, model.jnt_bodyid[mount.joint])
+        radius = mount.radius * (1.0 + BENT_DISTANCE * arrow.layer)
+        return anchor + radius * out, arrow.size * BENT_WIDTH * mount.radius
+    body = arrow_geom(model, owner)
     if body < 0:
         return None
     place = data.geom_xpos[body]
-    radius = model.geom_rbound[body]
     if model.jnt_type[mount.joint] == mujoco.mjtJoint.mjJNT_HINGE:
+        radius = model.geom_rbound[body]
         arm = place - anchor
         length = np.linalg.norm(arm)
         if length < MIN_LEVER:
@@ -353,12 +319,12 @@ def path(
         reach = mount.unit * HINGE_LENGTH * length
         out = arm / length
         width = RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM)
-        way = np.cross(axis, out)
         start = radius + ARC_DISTANCE * width
         if mount.beyond:
             out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])
             place = anchor
-            way = np.cross(out, axis)
+            axis = -axis
+        way = np.cross(axis, out)
     else:
         reach = mount.unit
         width = mount.thick
@@ -369,13 +335,10 @@ def path(
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
         turned = out @ data.geom_xmat[body].reshape(3, 3)
-        aabb = model.geom_aabb[body]
-        start = (
-            aabb[:3] @ turned + aabb[3:] @ np.abs(turned) + RAIL_DISTANCE * width
-        )  # beyond the geom's box
-    return place + (
-        start + LAYER_DISTANCE * width * arrow.layer
-    ) * out + reach * along * way, arrow.size * width
+        box = model.geom_aabb[body]
+        start = box[:3] @ turned + box[3:] @ np.abs(turned) + RAIL_DISTANCE * width
+    start += LAYER_DISTANCE * width * arrow.layer
+    return place + start * out + reach * along * way, arrow.size * width
 
 
 def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
@@ -385,40 +348,37 @@ def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
     way = np.append(0.0, np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum())
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
-    shaft = np.column_stack(
-        [np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T]
-    )
-    ahead = np.concatenate([shaft[1:], shaft[-1:]])
-    behind = np.concatenate([shaft[:1], shaft[:-1]])
-    along = ahead - behind
+    at = np.linspace(0.0, way[-1] - long, len(line))
+    shaft = np.column_stack([np.interp(at, way, part) for part in line.T])
+    along = np.gradient(shaft, axis=0)
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
-    return np.concatenate(
-        [shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]]
-    )
+    tip = [shaft[-1] + wing, line[-1], shaft[-1] - wing]
+    return np.concatenate([shaft + across, tip, (shaft - across)[::-1]])
 
 
 def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int = 0) -> None:
     """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
     corner = np.floor(edge.min(axis=0)).astype(int) - rim
     far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
-    size = tuple((far - corner).tolist())
-    mask = Image.new("L", tuple(SUPERSAMPLING * side for side in size))
-    ImageDraw.Draw(mask).polygon(
-        [tuple(SUPERSAMPLING * point) for point in edge - corner], round(255 * rgba[3])
-    )
+    place = tuple(corner.tolist())
+    mask = Image.new("L", tuple((SUPERSAMPLING * (far - corner)).tolist()))
+    points = list(map(tuple, (SUPERSAMPLING * (edge - corner)).tolist()))
+    ImageDraw.Draw(mask).polygon(points, round(255 * rgba[3]))
+    mask = mask.reduce(SUPERSAMPLING)
     if rim:
-        wide = mask.resize(size, Image.Resampling.BOX).filter(ImageFilter.MaxFilter(2 * rim + 1))
-        image.paste(style.rgb(style.PAPER), tuple(corner.tolist()), wide)
-    colour = tuple(round(255 * part) for part in rgba[:3])
-    image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
+        wide = mask.filter(ImageFilter.MaxFilter(2 * rim + 1))
+        image.paste(style.rgb(style.PAPER), place, wide)
+    image.paste(tuple(round(255 * part) for part in rgba[:3]), place, mask)
 
 
 def arrow_geom(model: mujoco.MjModel, body: int) -> int:
     """Return the geom of a body that carries its arrows: the first in the accent's material, else
     the first, or -1.
     """
-    geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    named = (g for g in geoms if model.geom_matid[g] >= 0)
-    first = geoms[0] if geoms else -1
-    return next((g for g in named if model.mat(model.geom_matid[g]).name.endswith("accent")), first)
+    first = model.body_geomadr[body]
+    for geom in range(first, first + model.body_geomnum[body]):
+        material = model.geom_matid[geom]
+        if material >= 0 and model.mat(material).name.endswith("accent"):
+            return geom
+    return int(first)

@@ -31,10 +31,13 @@ def checked(chosen: Camera | None) -> Camera | None:
     parts = items_of("camera", chosen)
     if len(parts) != 2:
         raise ScenarioError(
-            f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees"
+            f"camera is {shown(chosen)}: "
+            "give the name of a camera of the model, or (azimuth, elevation) in degrees"
         )
-    return number("camera's azimuth", parts[0]), number(
-        "camera's elevation", parts[1], low=-90.0, high=90.0
+    azimuth, elevation = parts
+    return (
+        number("camera's azimuth", azimuth),
+        number("camera's elevation", elevation, low=-90.0, high=90.0),
     )
 
 

@@ -11,7 +11,6 @@ own shadows up in a picture from the light: they have saw-tooth edges, and take 
 all the rest.
 """
 
-import itertools
 from collections.abc import Callable
 
 import mujoco
@@ -30,7 +29,7 @@ MIN_ARM_CAST = 3.0  # px, the same of rings around an arm's links, which the lin
 MIN_MOTION = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
 EDGE_MARGIN = 3  # px around what has changed, for smoothed edges
 GEOM = mujoco.mjtObj.mjOBJ_GEOM
-CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))  # of a box
+
 Add = Callable[[mujoco.MjvScene], None]
 
 
@@ -72,7 +71,7 @@ class Canvas:
         add_shadows(shown, self.sun, self.casts, self.model.stat.extent)
         boxes = self.seen(shown)
         area = (0, 0, *self.size)
-        if whole or len(boxes) != len(self.boxes) or self.model.nskin:
+        if whole or len(boxes) != len(self.boxes):
             self.boxes = boxes
         else:
             moved = np.abs(boxes - self.boxes).max(axis=(1, 2)) > MIN_MOTION
@@ -96,15 +95,21 @@ class Canvas:
         They are (geoms, 8, 2) px; 0 for planes, which do not move.
         """
         boxes = np.zeros((shown.ngeom, 8, 3))
+        vertices = np.asarray(shown.skinvert, float).reshape(-1, 3)
         for box, geom in zip(boxes, shown.geoms, strict=False):
             if geom.type == scene.PLANE:
+                continue
+            if geom.objtype == mujoco.mjtObj.mjOBJ_SKIN:
+                start = shown.skinvertadr[geom.objid]
+                skin = vertices[start : start + shown.skinvertnum[geom.objid]]
+                box[:] = np.where(scene.CORNERS > 0, skin.max(axis=0), skin.min(axis=0))
                 continue
             centre = np.zeros(3)
             half = 2.0 * (geom.size + geom.size[0])  # sizes of some kinds are not in all directions
             if geom.objtype == GEOM and geom.type != scene.CAPSULE:  # a run may change capsules
                 centre = self.model.geom_aabb[geom.objid, :3]
                 half = self.model.geom_aabb[geom.objid, 3:]
-            box[:] = (centre + CORNERS * half) @ geom.mat.T + geom.pos
+            box[:] = (centre + scene.CORNERS * half) @ geom.mat.T + geom.pos
         points = camera.project(boxes.reshape(-1, 3), self.turn, self.place, self.size)
         return points.reshape(-1, 8, 2)
 
@@ -140,9 +145,7 @@ def casting(model: mujoco.MjModel, pixel: float, arms: bool) -> np.ndarray:
     return (half[:, 1] > thinnest) & (half[:, 0] > flattest) & (model.geom_type != scene.PLANE)
 
 
-def add_shadows(
-    shown: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float
-) -> None:
+def add_shadows(shown: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> None:
     """Add the shadows of a scene's opaque geoms, (geoms,) as `casting` returns, and tendons.
 
     `way` is the direction of the light, (3,).

@@ -1,10 +1,8 @@
-"""Encoding of a film in a separate thread, so that pictures are drawn meanwhile."""
+"""Encoding of a film by ffmpeg, which is a process of its own."""
 
-import collections
 import contextlib
 import signal
 from collections.abc import Callable, Iterator
-from concurrent import futures
 from pathlib import Path
 from types import ModuleType
 
@@ -25,12 +23,12 @@ CODECS = {
         "ffmpeg_args": "-b:v 0 -deadline good -cpu-used 4 -row-mt 1 -g 60",
     },
 }
-MAX_WAITING = 8  # pictures before the encoder; chosen, 22 MB at 1280 x 720
-Write = Callable[[np.ndarray], None]
 
 
 @contextlib.contextmanager
-def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
+def encoder(
+    path: Path, shape: tuple[int, int], fps: float
+) -> Iterator[Callable[[np.ndarray], None]]:
     """Yield a function that adds a picture (height, width, 3) to a film, .mp4 or .webm.
 
     The film is whole afterwards.
@@ -38,20 +36,18 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
     Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end
     first.
     """
-    writer = mediapy().VideoWriter(
-        path, shape, encoded_format="yuv420p", fps=fps, **CODECS[path.suffix]
-    )
+    codec = CODECS[path.suffix]
+    writer = mediapy().VideoWriter(path, shape, encoded_format="yuv420p", fps=fps, **codec)
     try:
         with sigint_blocked():
             writer.__enter__()
-        with contextlib.closing(writer), in_thread(writer.add_image) as write:
-            yield write
+        with contextlib.closing(writer):
+            yield writer.add_image
     except (OSError, RuntimeError) as error:
         if isinstance(error.__context__, KeyboardInterrupt):  # ffmpeg complains of half a picture
             raise KeyboardInterrupt from None
-        raise ScenarioError(
-            f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}"
-        ) from error
+        words = " ".join(str(error).split())
+        raise ScenarioError(f"cannot write {path.suffix[1:]}: {words}") from error
 
 
 def mediapy() -> ModuleType:
@@ -62,29 +58,6 @@ def mediapy() -> ModuleType:
 
     module.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     return module
-
-
-@contextlib.contextmanager
-def in_thread(write: Write) -> Iterator[Write]:
-    """Yield a function that passes its pictures, in order, to `write` in another thread.
-
-    It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by a
-    later call, or at the end. After an error, here or there, pictures that still wait are dropped.
-    """
-    thread = futures.ThreadPoolExecutor(1, "encoder")
-    waiting = collections.deque[futures.Future]()
-
-    def put(picture: np.ndarray) -> None:
-        while waiting and (waiting[0].done() or len(waiting) > MAX_WAITING):
-            waiting.popleft().result()
-        waiting.append(thread.submit(write, picture))
-
-    try:
-        yield put
-        for written in waiting:
-            written.result()
-    finally:
-        thread.shutdown(cancel_futures=True)
 
 
 @contextlib.contextmanager

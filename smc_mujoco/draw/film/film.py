@@ -1,6 +1,6 @@
 """Films: the machines of all traces side by side in MuJoCo, above charts that grow with the clock.
 
-In order: pace.py sets the speed; act.py says what each run does at each frame; caption.py has the
+In order: pace.py sets the speed; track.py says what each run does at each frame; caption.py has the
 text, charts.py the charts; scene.py composes the model, puppet.py poses a machine, stage.py all of
 them with the arrows of arrows.py, and canvas.py renders; arm.py draws over arms; encoder.py writes.
 Frames are made and written one by one, so that memory does not grow with a film's length.
@@ -24,23 +24,26 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.film import arm, arrows, pace, scene
-from smc_mujoco.draw.film.act import Act
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder, mediapy
 from smc_mujoco.draw.film.pace import Clock
-from smc_mujoco.draw.film.stage import framed
+from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from mediapy import VideoMetadata
 
-FPS, FPS_OF = 30.0, {".webp": 20.0}  # by the ending
+FPS = 30.0
+WEBP_FPS = 20.0
 MAX_WEBP_FRAMES = 600
 MAX_MACHINES = 8  # more are too small to tell apart
-MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
-FULL_WIDTH = 1280  # px, for which sizes of letters are stated
+MIN_SIZE = (320, 180)  # px
+MAX_SIZE = (1920, 1080)
+FULL_SIZE = (1280, 720)  # for which sizes of letters are stated
+SMALL_SIZE = (800, 450)
 CHARTS_SHARE = 0.36  # of the film's height
 MAX_GRID = 120  # times of a run that set the place of all; chosen
 LAST_FRAME_TIME = 1200  # ms for which a clip's last picture stays before the clip repeats
@@ -63,8 +66,8 @@ class Frames:
     traces: Trace | Sequence[Trace]
     labels: Sequence[str] | None = None
     title: str | None = None
-    size: tuple[int, int] = (800, 450)
-    fps: float = 30.0
+    size: tuple[int, int] = SMALL_SIZE
+    fps: float = FPS
     speed: float | None = None
     camera: Camera | None = None
     at: float | None = None
@@ -74,13 +77,13 @@ class Frames:
         self.camera = checked(self.camera)
         if self.at is not None:
             end = max(float(trace.t[-1]) for trace in style.same_plant(self.traces))
-            self.clock = Clock(
-                np.array([number("at", self.at, low=0.0, high=end + 1e-9)]), np.ones(1)
-            )
+            time = number("at", self.at, low=0.0, high=end + 1e-9)
+            self.clock = Clock(np.array([time]), np.ones(1))
         else:
             self.clock = pace.clock(self.traces, self.fps, self.speed)
         if self.span is not None:
-            if len(ends := items_of("span", self.span)) != 2:
+            ends = items_of("span", self.span)
+            if len(ends) != 2:
                 raise ScenarioError(f"span is {errors.shown(self.span)}: give two times, in s")
             start, stop = (number("span", end) for end in ends)
             self.clock = self.clock.part(start, stop)
@@ -182,11 +185,8 @@ def film(
       ScenarioError: nothing to show, a size that is odd or too small or large, another ending, or
         no OpenGL to render with.
     """
-    if path is None:
-        ending = None
-    else:
-        ending = with_ending(path, *WRITERS).suffix
-    if (at is None) if ending == ".png" else (ending is not None and at is not None):
+    ending = "" if path is None else with_ending(path, *WRITERS).suffix
+    if path is not None and (ending == ".png") != (at is not None):
         raise ScenarioError(
             "the picture at a time is a .png: give at, in s, with a path that ends in .png"
         )
@@ -194,21 +194,13 @@ def film(
         raise ScenarioError(
             "at and span exclude each other: give at for a picture, or span for a film"
         )
-    small = ending in (None, ".webp")
-    frames = Frames(
-        traces,
-        labels,
-        title,
-        (size or ((800, 450) if small else (FULL_WIDTH, 720))),
-        FPS_OF.get(ending or "", FPS) if fps is None else fps,
-        speed,
-        camera,
-        at,
-        (0.0, 4.0) if ending == ".webp" and span is None else span,
-    )
-    if path is None:
-        return frames
-    return write(frames, Path(path))
+    if fps is None:
+        fps = WEBP_FPS if ending == ".webp" else FPS
+    if ending == ".webp" and span is None:
+        span = (0.0, 4.0)
+    size = size or (SMALL_SIZE if ending in ("", ".webp") else FULL_SIZE)
+    frames = Frames(traces, labels, title, size, fps, speed, camera, at, span)
+    return frames if path is None else write(frames, Path(path))
 
 
 def write(frames: Frames, path: Path) -> Path:
@@ -260,85 +252,75 @@ def missing() -> str | None:
 def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     """Return width and height of a film; refuse odd ones, and those out of range."""
     sides = items_of("size", size)
-    limits = zip(sides, MIN_SIZE, MAX_SIZE, strict=False)
-    fit = []
-    for side, low, high in limits:
-        fit.append(isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0)
-    if fit != [True, True] or len(sides) != 2:
-        raise ScenarioError(
-            f"a film of {errors.shown(size)} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}"
-        )
+    fit = len(sides) == 2
+    for side, low, high in zip(sides, MIN_SIZE, MAX_SIZE, strict=False):
+        fit &= isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0
+    if not fit:
+        wanted = f"two even numbers from {MIN_SIZE} to {MAX_SIZE}"
+        raise ScenarioError(f"a film of {errors.shown(size)} px: give {wanted}")
     return int(sides[0]), int(sides[1])
 
 
 def pictures(frames: Frames) -> Generator[np.ndarray]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
     traces = style.same_plant(frames.traces)
-    shown = frames.clock
-    chosen = frames.camera
     names = style.labels(traces, frames.labels)
     colours = style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
-    size = _checked_size(frames.size)
+    width, height = _checked_size(frames.size)
     if why := gl.missing():
         raise ScenarioError(why)
-    scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures
-    low = 2 * round(CHARTS_SHARE * size[1] / 2)
-    above = size[0], size[1] - low
-    times = shown.times
-    edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
+    scale = (width / FULL_SIZE[0]) ** 0.6  # letters shrink less than pictures
+    low = 2 * round(CHARTS_SHARE * height / 2)
+    above = (width, height - low)
+    times = frames.clock.times
+    first = times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS)
+    edges = np.append(first, times)
     traces = [finite(trace) for trace in traces]
+    scenario = traces[0].scenario
     scales = arrows.scales(traces)
     arms = scene.are_arms([trace.scenario for trace in traces])
+    whole = end(traces)
     grid = np.linspace(
-        0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1
+        0.0, whole, min(MAX_GRID, max(1, round(FPS * whole))) + 1
     )  # also for a still
-    acts = []
+    tracks = []
     for trace, colour in zip(traces, colours, strict=True):
-        acts.append(Act(trace, colour, edges, grid, scales, arms))
-    row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
-    if arms:
-        below = arm.room(traces, size[0] / len(traces) / scale)
-        words = arm.key(traces)
-    else:
-        below = None
-        words = None
-    told = [act.told for act in acts]
-    caption = Caption(
-        traces, names, colours, frames.title, above, scale, scales, told, row, below, words
-    )
-    charts = Charts(traces, names, colours, (size[0], low), scale)
-    with framed(acts, above, caption.room, chosen, caption.apart, scale) as stage:
+        tracks.append(MachineTrack(trace, colour, edges, grid, scales, arms))
+    row = scene.in_a_row(scenario, scene.turn(scenario, frames.camera))
+    below = arm.room(traces, width / len(traces) / scale) if arms else None
+    words = arm.key(traces) if arms else None
+    told = [track.told for track in tracks]
+    title = frames.title
+    caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
+    charts = Charts(traces, names, colours, (width, low), scale)
+    with Stage(tracks, above, caption.room, frames.camera, caption.apart, scale) as stage:
         caption.place(stage.boxes)
-        if arms:
-            over = arm.Overlay(traces, colours, stage, edges, caption.badges)
-        else:
-            over = None
-        if traces[0].scenario.plant.pose:
-            flights = arm.Paths(traces, colours, stage)
-        else:
-            flights = None
+        over = arm.Overlay(traces, colours, stage, edges, caption.badges) if arms else None
+        flights = arm.Paths(traces, colours, stage) if scenario.plant.pose else None
         for frame, time in enumerate(times.tolist()):
-            failed = tuple(act.failed(time) for act in acts)
             drawn = []
-            for k, act in enumerate(acts):
-                stage.set_shape(k, time)
-                stage.pose(k, act.x[frame], act.ahead[frame], time)
+            for k, track in enumerate(tracks):
                 lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
-                stage.aim(k, act.r[frame] if lost and not failed[k] else None)
-                stage.set_colour(k, style.FAILED if failed[k] else act.colour)
-                if failed[k]:
-                    drawn += []
-                else:
-                    drawn += [(k, *each) for each in act.drawn[frame].arrows]
+                failed = track.failed(time)
+                stage.set_shape(k, time)
+                stage.pose(k, track.x[frame], track.ahead[frame], time)
+                stage.aim(k, track.r[frame] if lost and not failed else None, time)
+                stage.set_colour(k, style.FAILED if failed else track.colour)
+                if not failed:
+                    drawn += [(k, *pair) for pair in track.drawn[frame].arrows]
             picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame)
             if flights:
                 picture = flights.over(picture, time)
-            moods = tuple(act.states[frame] for act in acts)
             picture = caption.over(
-                picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame])
+                picture,
+                time,
+                tuple(track.failed(time) for track in tracks),
+                tuple(track.states[frame] for track in tracks),
+                float(frames.clock.speeds[frame]),
+                float(frames.clock.shown[frame]),
             )
             yield np.concatenate([picture, charts.at(time)])

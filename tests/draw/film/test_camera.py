@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from helpers.films import staged, tracks
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import act, camera, puppet, scene
-from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.draw.film import camera, puppet, scene, track
 
 SIZE = (640, 230)
 ROOM = camera.Room(20, 20, 620, 210)
@@ -83,7 +83,7 @@ def test_an_own_model_s_camera_is_found_by_its_name(trace):
 @renders
 def test_the_chosen_camera_is_the_picture_s(trace):
     for chosen in ("side", (20.0, -40.0)):
-        with Stage([trace] * 2, ["#0072B2", "#D55E00"], SIZE, ROOM, chosen) as shown:
+        with staged([trace] * 2, ["#0072B2", "#D55E00"], SIZE, ROOM, chosen) as shown:
             turn = shown.data.cam("film").xmat.reshape(3, 3)
             assert turn == pytest.approx(scene.turn(trace.scenario, chosen))
             assert (shown.boxes[:, :2] >= (19.9, 19.9)).all()
@@ -91,20 +91,11 @@ def test_the_chosen_camera_is_the_picture_s(trace):
             assert shown.boxes[0, 2] < shown.boxes[1, 0]  # side by side, whatever the direction
 
 
-@renders
-def test_an_own_model_is_in_the_film_s_light(trace):
-    with Stage([trace] * 2, ["#0072B2", "#D55E00"], SIZE, ROOM) as shown:
-        model = shown.model
-        names = {model.light(i).name for i in range(model.nlight)}
-    assert names == {scene.SUN, "fill"}
-    assert model.vis.headlight.ambient == pytest.approx((0.42, 0.43, 0.44))
-
-
 @pytest.mark.slow
 @renders
 @pytest.mark.parametrize("machines", [1, 2])
 def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace, machines):
-    with Stage([trace] * machines, ["#0072B2", "#D55E00"][:machines], SIZE, ROOM) as shown:
+    with staged([trace] * machines, ["#0072B2", "#D55E00"][:machines], SIZE, ROOM) as shown:
         (link,) = shown.links[0]
         ball = next(i for i in range(shown.model.ngeom) if shown.model.geom_rgba[i, 1] > 0.8)
         assert (
@@ -116,17 +107,19 @@ def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace,
 def test_joints_without_a_channel_move_as_in_the_run(trace):
     """The ball falls freely. The run is that of the trace: its channel moves alike."""
     times = np.array([0.0, 0.1, 0.3, 0.4])
-    motion = act.motion(trace, times)
+    motion = track.motion(trace, times)
     assert motion is not None
     arm = motion.poses[:, 0]
     assert arm == pytest.approx(np.interp(times, trace.t, trace.x[:, 0]), abs=1e-9)
     assert motion.poses[:, 3] == pytest.approx(2.0 - 9.81 * times**2 / 2, abs=1e-2)
     assert motion.at(0.2)[3] == motion.poses[1, 3]
-    shown = puppet.Puppet(trace.scenario)
+    shown = puppet.Puppet(trace.scenario, np.array([0.0, -1.0, 0.0]))
     assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx(
         [1.0, motion.poses[2, 3]]
     )
-    low = shown.reach(trace, motion)[:, 2].min()
+    (followed,) = tracks([trace], ["#0072B2"])
+    followed.motion = motion
+    low = shown.reach(followed)[:, 2].min()
     assert low == pytest.approx(
         motion.poses[:, 3].min() - 0.1, abs=0.2
     )  # the ball is in the picture
@@ -147,10 +140,12 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
         ["j"],
     )
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, x0=0.0))
-    reach = puppet.Puppet(trace.scenario).reach(trace)
+    reach = puppet.Puppet(trace.scenario, np.array([0.0, -1.0, 0.0])).reach(
+        *tracks([trace], ["#0072B2"])
+    )
     assert bool(np.ptp(reach[:, 0]) > 1.01) is seen
 
 
 def test_a_library_plant_has_no_other_joints():
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
-    assert act.motion(trace, trace.t) is None
+    assert track.motion(trace, trace.t) is None

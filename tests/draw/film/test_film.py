@@ -11,19 +11,19 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers.films import without_charts
+from helpers.films import staged, tracks, without_charts
 from helpers.sketch import failed
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import act, camera, encoder, film, pace, puppet, scene, stage
+from smc_mujoco.draw.film import camera, encoder, film, pace, puppet, scene, stage
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import key
 from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
-from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.simulation import model as models
 
@@ -94,7 +94,7 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
         """Return the mean column of what differs from the pendulum upright, from the middle."""
         return np.nonzero(np.abs(picture.astype(int) - upright).max(axis=2) > 60)[1].mean() - 320
 
-    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(200, 100, 440, 300)) as scene:
+    with staged([trace], ["#0072B2"], (640, 360), camera.Room(200, 100, 440, 300)) as scene:
         scene.pose(0, np.array([0.0]))
         upright = scene.render().astype(int)
         left, right = (
@@ -111,7 +111,9 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
     good, bad = runs("inverted_pendulum", laws=LAWS[:2])
     goals = []
     monkeypatch.setattr(
-        Stage, "aim", lambda stage, k, r: goals.append((k, r is None or r[0] - traces[k].r[0, 0]))
+        Stage,
+        "aim",
+        lambda stage, k, r, time: goals.append((k, r is None or r[0] - traces[k].r[0, 0])),
     )
     traces = good, bad
     before, after, later = pictures([good, failed(bad, 150)], [0.1, 0.2, 0.3])
@@ -157,12 +159,6 @@ def test_camera_sees_all_points_as_near_as_it_can():
     assert top >= 50 - 1e-6
     assert bottom <= 400 + 1e-6
     assert right - left == pytest.approx(1100) or bottom - top == pytest.approx(350)
-
-
-def test_without_opengl_one_sentence_says_what_to_do(monkeypatch, tmp_path):
-    monkeypatch.setattr(gl, "missing", lambda: "no film: install a renderer")
-    with pytest.raises(smc.ScenarioError, match="install a renderer"):
-        film.film(runs(laws=LAWS[:1]), tmp_path / "a.mp4")
 
 
 # realistic mechanisms
@@ -213,11 +209,11 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
 
 def stood(scenarios) -> np.ndarray:
     """Where machines stand."""
-    found = [puppet.Puppet(scenario) for scenario in scenarios]
-    reaches = []
-    for each, scenario in zip(found[:1], scenarios, strict=False):
-        reaches.append(each.reach(smc.run(scenario)))
-    return stage.standing_places(found, reaches * len(found), scene.turn(scenarios[0]))
+    turn = scene.turn(scenarios[0])
+    found = [puppet.Puppet(scenario, turn[:, 2]) for scenario in scenarios]
+    (track,) = tracks([smc.run(scenarios[0])], ["#0072B2"])
+    reaches = [found[0].reach(track)] * len(found)
+    return stage.placed(found, reaches, turn, SIZE, ROOM, 0.0)[0]
 
 
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::6], ids=str)
@@ -233,26 +229,6 @@ def test_machines_side_by_side_keep_apart(plant, field, name):
             axis=2
         )
         assert apart.min() >= 0.0
-
-
-def test_realistic_carts_stand_so_far_behind_each_other_that_no_part_of_one_meets_another(
-    monkeypatch,
-):
-    """One reaches from y = -0.45 to 0.82 m, the two parts of the other from -0.5 to 1.42 m."""
-    cart = smc.Scenario(plant="duffing", law="none", contact="stops", x0=0.5)
-    turn = scene.turn(cart)
-    bounds = [[(-0.45, 0.82)], [(-0.5, -0.3), (0.1, 1.42)]]
-    boxes = []
-    for machine in bounds:
-        boxes.append(np.array([[(0.0, low, 9.0), (1.0, high, 8.0)] for low, high in machine]))
-    for order, apart in (
-        ((0, 1), 1.37),
-        ((0, 1, 0), 1.92),
-    ):  # 0.82 + 0.5 and 1.42 + 0.45, and a gap of 5 cm
-        machines = iter(boxes[k] for k in order)
-        monkeypatch.setattr(scene, "fixed_boxes", lambda model, machines=machines: next(machines))
-        monkeypatch.setattr(models, "compile_model", lambda scenario: None)
-        assert scene.lane([cart] * len(order), [], turn) == pytest.approx([0.0, apart, 0.0])
 
 
 def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them():
@@ -302,16 +278,6 @@ def test_touch_is_where_the_stop_pushes_and_there_only(hit):
     assert not (pushed & ~touch & ~np.roll(touch, 1)).any()
 
 
-def test_a_gear_that_crosses_too_often_to_be_read_rattles():
-    t = np.arange(1001) * 1e-3
-    for flank, side in (
-        (np.where(np.arange(1001) // 20 % 2, 1.0, -1.0), 2),
-        (np.ones(1001), 1),
-        (np.zeros(1001), 0),
-    ):
-        assert (states.backlash_side(flank, t, states.MIN_STATE_TIME)[200:] == side).all()
-
-
 def test_what_is_held_lasts_and_has_no_short_gaps():
     t = np.arange(100) * 0.01
     on = np.zeros(100, bool)
@@ -352,36 +318,20 @@ def test_a_failed_machine_has_no_state(stuck):
 
 @pytest.mark.slow
 @renders
-def test_a_tendon_that_a_mechanism_shows_is_drawn_where_it_is():
-    def add(spec):
-        spec.body("machine").add_site(name="post", pos=(0, -0.5, 0.8))
-        spec.body("cart").add_site(name="hook", pos=(0, 0, 0.2))
-        line = spec.add_tendon(name="line", width=0.03, rgba=(0.5, 0.0, 1.0, 1.0))
-        line.wrap_site("post")
-        line.wrap_site("hook")
-
-    base = smc.plant("duffing")
-    tied = dataclasses.replace(base, mechanisms={"tied": Variant(add, base.fields)})
-    trace = smc.run(smc.Scenario(plant=tied, law="none", mechanism="tied", duration=0.1))
-    (with_line,), (without,) = pictures([trace], [0.1]), pictures(runs(laws=LAWS[:1]), [0.1])
-    assert share(with_line, style.REACTION) > share(without, style.REACTION) + 3e-3
-
-
-@pytest.mark.slow
-@renders
 def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
-    with Stage([slack], ["#0072B2"], (480, 170), ROOM) as shown:
+    with staged([slack], ["#0072B2"], (480, 170), ROOM) as shown:
         rotor, joint = (shown.data.joint(f"m0/{name}") for name in ("rotor:hinge", "hinge"))
         for flank in (-1.0, 0.0, 1.0):
             shown.pose(0, np.array([0.3]), np.array([flank * 0.1]))
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
-    ahead = act.rotors(slack, np.append(-1e-3, slack.t))
+    edges = np.append(-1e-3, slack.t)
+    ahead = MachineTrack(slack, "#0072B2", edges, edges[:2], {}, arms=True).ahead
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1
     resting = realistic(contact="floor", duration=0.2)
-    with Stage([resting], ["#0072B2"], (480, 170), ROOM) as shown:
+    with staged([resting], ["#0072B2"], (480, 170), ROOM) as shown:
         shown.pose(0, np.array([0.4]))
         assert shown.data.joint("m0/lift").qpos[0] == 0.0
 
@@ -442,13 +392,3 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert not any(
         "pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1])))
     )
-
-
-def test_an_arm_of_many_joints_is_shown_whole():
-    (trace,) = smc.run(
-        [smc.Scenario(plant=smc.plant("pendulum_network", n=8), law="none", duration=0.01)]
-    )
-    assert any("first 6 of 8 pendulums" in words for words in key([trace], scales([trace])))
-    arm = dataclasses.replace(trace.scenario.plant, direct=True)
-    mine = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, plant=arm))
-    assert not any("first 6" in words for words in key([mine], scales([mine])))

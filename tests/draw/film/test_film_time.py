@@ -56,7 +56,8 @@ def test_a_mark_says_when_each_law_has_settled(charts):
     drawn, traces = charts
     left, top, right, bottom = drawn.frames[0]
     picture = drawn.at(4.0)[top:bottom].astype(int)
-    for trace, rate, colour in zip(traces, (8.0, 16.0), drawn.colours, strict=True):
+    colours = map(style.rgb, drawn.colours)
+    for trace, rate, colour in zip(traces, (8.0, 16.0), colours, strict=True):
         middle = round(left + (right - left) * float(drawn.share(np.log(50.0) / rate)))
         alike = np.abs(picture[:, middle - 6 : middle + 7] - colour).max(axis=2) < 12
         beside = np.abs(picture[:, middle + 20 : middle + 33] - colour).max(axis=2) < 12

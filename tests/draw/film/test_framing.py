@@ -12,7 +12,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import arrows, camera, caption, film, stage
+from smc_mujoco.draw.film import arrows, caption, film, stage
 from smc_mujoco.draw.film.pace import Clock
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
@@ -41,7 +41,7 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     seen = {}
     made_by = stage.Stage
     with without_charts, monkeypatch.context() as patch:
-        patch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
+        patch.setattr(film, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
         patch.setattr(
             film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given))
         )
@@ -142,31 +142,3 @@ def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
                 assert shown.project(line)[:, 1].min() > caption.KEY_TOP + caption.KEY_PITCH * len(
                     words.key
                 )
-
-
-def test_what_stands_in_the_world_of_a_model_of_one_s_own_stands_beside_each_machine(monkeypatch):
-    xml = TWO_LINKS.replace(
-        "<worldbody>", '<worldbody><geom name="target" size=".05" pos=".2 0 1.5"/>'
-    )
-    with filmed(two(smc.plant_from(xml, ["a", "b"])), monkeypatch) as (shown, _):
-        places = [shown.data.geom(f"m{k}/target").xpos for k in range(2)]
-        assert np.array(places) - shown.where == pytest.approx(np.array([[0.2, 0.0, 1.5]] * 2))
-
-
-def test_the_key_is_shown_for_two_seconds(monkeypatch):
-    with filmed(two("inverted_pendulum"), monkeypatch) as (_, words):
-        paper = np.full((STAGE, SIZE[0], 3), 255, np.uint8)
-        line = slice(caption.KEY_TOP, caption.KEY_TOP + 20), slice(24, 400)
-        inks = []
-        for time in (0.0, 1.9, 2.2, 2.5):
-            inks.append(words.over(paper, 0.1, (False, False), shown=time)[line].min())
-        assert inks[0] == inks[1] < inks[2] < inks[3] == 255
-
-
-def test_a_picture_s_turn_does_not_hide_a_reference(monkeypatch):
-    """The ghost at the reference is in the picture, wherever the machine goes."""
-    with filmed(two("inverted_pendulum", reference=smc.Step(2.5)), monkeypatch) as (shown, words):
-        ghost = shown.goal.geom_xpos[[shown.model.geom("m0/bob").id]]
-        ((x, y),) = camera.project(ghost, shown.turn, shown.place, shown.size)
-        assert words.room.left <= x <= words.room.right
-        assert words.room.top <= y <= words.room.bottom

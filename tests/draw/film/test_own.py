@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.films import without_charts
-from PIL import Image
+from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film import camera
 from smc_mujoco.draw.film.arrows import Arrow, scales
 from smc_mujoco.draw.film.caption import key
-from smc_mujoco.draw.film.stage import Stage
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SUITE = importlib.util.find_spec("dm_control")
@@ -46,36 +44,13 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
 
 
 @pytest.mark.slow
-@without_charts
-def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
-    """The wall hides the machine from the model's own camera, and from the chosen one."""
-    (tmp_path / "one.xml").write_text("""
-      <mujoco><worldbody><camera name="eye" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/>
-        <geom type="box" pos="0 -.5 1" size="2 .1 2"/><body pos="0 0 .5"><joint name="j" axis="0 1 0"/>
-        <geom size=".1" pos="0 0 .3" rgba="1 0 0 1"/></body></worldbody>
-      <actuator><motor joint="j"/></actuator></mujoco>""")
-    trace = smc.run(
-        smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1)
-    )
-    for chosen in (None, "eye"):
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
-            path = smc.film([trace], tmp_path / "a.png", at=0.1, size=(640, 360), camera=chosen)
-        picture = np.asarray(Image.open(path)).astype(int)[:230]
-        assert (picture[..., 0] - picture[..., 1] > 60).sum() > 50
-        assert [str(one.message).partition(":")[0] for one in told] == [
-            "camera 'eye' shows nothing of one"
-        ] * bool(chosen)
-
-
-@pytest.mark.slow
 def test_arrows_of_a_foreign_cart_are_seen_and_its_rail_is_cut_to_what_moves():
     """The arrow lies before the pole, which stands where it begins; the rail is longer than what
     moves on it.
     """
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
-    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
+    with staged([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
         scene.pose(0, trace.x[0])
         empty = scene.render().astype(int)
         for push in (0.2, -0.2):
@@ -102,7 +77,7 @@ def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp
     trace = smc.run(
         smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1)
     )
-    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
+    with staged([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
         centre = scene.project(scene.data.xanchor[:1])[0]
         for push in (0.8, -0.8):
             red = scene.render([(0, 0, Arrow(0.0, push, (1.0, 0.0, 0.0, 1.0)))])[..., 0] > 250
@@ -122,7 +97,7 @@ def test_an_arrow_that_points_at_the_camera_is_not_drawn():
     )
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
     push = (0, 0, Arrow(0.0, 0.8, (1.0, 0.0, 0.0, 1.0)))
-    with Stage(
+    with staged(
         [trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340), (0.0, 0.0)
     ) as scene:
         bare = scene.render()

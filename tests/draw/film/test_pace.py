@@ -83,14 +83,6 @@ def test_films_have_a_longest_duration(base, monkeypatch):
     assert set(pace.clock([trace], FPS).speeds) == {1.0}
 
 
-def test_frames_ascend_from_start_to_end_and_tell_their_speed(base):
-    found = pace.clock([base], FPS)
-    assert (found.times[0], found.times[-1]) == (0.0, pytest.approx(4.0))
-    steps = np.diff(found.times)
-    assert (steps > 0.0).all()
-    np.testing.assert_allclose(steps[:-1] * FPS, found.speeds[:-2], rtol=1e-6)
-
-
 def test_impacts_are_slowest(monkeypatch):
     trace = smc.run(
         smc.Scenario(plant="duffing", law="observer_free", contact="stops", v0=3.0, duration=1.0)
@@ -118,26 +110,3 @@ def test_a_diverged_run_does_not_make_the_others_rest(base):
     bad = failed(dataclasses.replace(base, x=np.exp(40.0 * base.t)[:, None]), 2000)
     assert at([good, bad], (0.1,)) == [0.125]
     assert len(pace.clock([bad], FPS).times) > 10
-
-
-def test_most_frames_of_a_settling_run_show_motion():
-    traces = smc.run(
-        list(
-            smc.paper.comparison(
-                "van_der_pol", laws=("observer_free", "classical"), duration=10.0
-            ).values()
-        )
-    )
-    shares = []
-    for speed in (1.0, None):
-        found = pace.clock(traces, FPS, speed)
-        shares.append(
-            (pace.travel_of(traces, found.times) > pace.REST_TRAVEL * found.speeds[:-1]).mean()
-        )
-    assert shares[0] < 0.3
-    assert shares[1] > 0.6
-
-
-def test_a_part_of_a_film_has_both_its_ends():
-    whole = pace.Clock(np.linspace(0.0, 0.5, 6), np.ones(6))
-    np.testing.assert_allclose(whole.part(0.1, 0.3).times, [0.1, 0.2, 0.3])

@@ -1,4 +1,4 @@
-"""What one run does in a film: at each frame its pose, its goal, its arrows and its state in words."""
+"""What one run does in a film: at each frame its pose, goal, arrows and state in words."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -34,7 +34,7 @@ class Motion(NamedTuple):
         return self.poses[max(int(np.searchsorted(self.times, time + 1e-9)) - 1, 0)]
 
 
-class Act:
+class MachineTrack:
     """The part of a trace in a film whose frames end at edges[1:], s; an arm has neither arrows nor
     states.
 
@@ -49,35 +49,35 @@ class Act:
         edges: np.ndarray,
         grid: np.ndarray,
         scales: Mapping[Group, arrows.Scale],
-        arms: bool,
+        arms: bool = False,
     ):
         self.trace = trace
         self.colour = colour
         times = edges[1:]
         n = scene.first_channels(trace.scenario).plant.n
-        if arms:
-            sizes = []
-        else:
-            sizes = arrows.scales_by_channel(trace, scales)[:n]
-        self.drawn, self.framing = (drawn(trace, some, sizes, colour) for some in (edges, grid))
-        hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
-        self.states, self.told = (
-            [None] * len(some) if arms else states.timeline(trace, some, hold)
-            for some in (times, grid)
-        )
+        sizes = [] if arms else arrows.scales_by_channel(trace, scales)[:n]
+        self.drawn = drawn(trace, edges, sizes, colour)
+        self.framing = drawn(trace, grid, sizes, colour)
+        self.states = [None] * len(times)
+        self.told = []
+        if not arms:
+            hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
+            self.states = states.timeline(trace, times, hold)
+            self.told = states.timeline(trace, grid, hold)
         self.motion = motion(trace, np.union1d(grid, times))
-        shown = (
-            trace.x.T[:n],
-            trace.r.T[:n],
-        )  # linear between samples; after a failure the last finite one
-        self.x, self.r = (
-            np.stack([np.interp(times, trace.t, each) for each in its], axis=1) for its in shown
-        )
-        self.ahead = rotors(trace, edges)[:, :n]
+        self.x = sampled(trace, trace.x[:, :n], times)
+        self.r = sampled(trace, trace.r[:, :n], times)
+        gap = states.backlash_gap(trace.scenario)  # rotors lead their joints by half of it
+        self.ahead = 0.5 * gap * windows(trace.t, states.flanks(trace), edges).mean[:, :n]
 
     def failed(self, time: float) -> bool:
         """Return whether the run has failed by a time, s."""
         return self.trace.diverged_at is not None and time >= self.trace.diverged_at
+
+
+def sampled(trace: Trace, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return values (K+1, n) at times, s, linear between samples; after a failure the last one."""
+    return np.stack([np.interp(times, trace.t, channel) for channel in values.T], axis=1)
 
 
 def drawn(
@@ -87,22 +87,16 @@ def drawn(
     channels.
     """
     acting = arrows.loads(trace, edges)
-    if trace.scenario.plant.pose and sizes:
-        return [
-            Drawn(float(time), arrows.flying(acting, k, sizes[0], colour))
-            for k, time in enumerate(edges[1:])
-        ]
-    return [
-        Drawn(
-            float(time),
-            [
-                (i, a)
-                for i, size in enumerate(sizes)
-                for a in arrows.arrows(acting, k, i, size, colour)
-            ],
-        )
-        for k, time in enumerate(edges[1:])
-    ]
+    frames = []
+    for k, time in enumerate(edges[1:].tolist()):
+        found = []
+        if trace.scenario.plant.pose and sizes:
+            found = arrows.flying(acting, k, sizes[0], colour)
+        else:
+            for i, size in enumerate(sizes):
+                found += [(i, arrow) for arrow in arrows.arrows(acting, k, i, size, colour)]
+        frames.append(Drawn(time, found))
+    return frames
 
 
 def motion(trace: Trace, times: np.ndarray) -> Motion | None:
@@ -116,23 +110,8 @@ def motion(trace: Trace, times: np.ndarray) -> Motion | None:
         return None
     model = models.compile_model(scenario)
     names = [model.joint(i).name for i in joint_ids(model)]
-    rotors = []
+    known = len(names)
     for name in names:
-        if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0:
-            rotors.append(name)
-    if len(names) + len(rotors) != model.nq:
-        moved = poses(trace, times)
-    else:
-        moved = None
+        known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0
+    moved = None if known == model.nq else poses(trace, times)
     return None if moved is None else Motion(times, moved)
-
-
-def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:
-    """Return the mean lead of the rotors over their joints, (edges - 1, n), rad or m, from the
-    flank that pushes.
-    """
-    return (
-        0.5
-        * states.backlash_gap(trace.scenario)
-        * windows(trace.t, states.flanks(trace), edges).mean
-    )
