@@ -4,8 +4,7 @@
 
 A policy observes the same positions and velocities as in an environment. On a plant of several
 channels it is called once per channel, with that channel's observation. State that a plain function
-keeps elsewhere is shared by all runs. A policy is called in Python. A
-file is first read in another process.
+keeps elsewhere is shared by all runs. A policy is called in Python.
 """
 
 import copy
@@ -18,7 +17,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
@@ -28,7 +27,6 @@ import numpy as np
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.files import reading
-from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, run_isolated
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.law import Law, Measurement, law_function
 
@@ -39,14 +37,11 @@ FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
     ".pt2": ("torch", "give what torch.export.save writes"),
 }
 UNITS = "u_max", "SI"  # of an action: a fraction of u_max, or N and N m
-LOAD_TIMEOUT = 120.0  # s in which a library must read a file; chosen
 ONNX_DTYPES = {
     "tensor(float)": np.float32,
     "tensor(double)": np.float64,
     "tensor(float16)": np.float16,
 }
-
-_arithmetic = functools.cache(Arithmetic)  # of this process
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +53,7 @@ class Policy(Uncompiled):
     reference: bool  # whether r, r' and r'' are at the end of the observation
     units: str  # of the action, one of UNITS
 
-    why = "is a policy, which is Python: several times slower than a law that compiles, and on one core"
+    why = "is a policy, which is Python: several times slower than a law that compiles"
 
     @property
     def __name__(self) -> str:
@@ -76,11 +71,10 @@ class Policy(Uncompiled):
             state = [y.x, y.q, y.v, y.dq]
         else:
             state = [y.x, y.v]
-        observation = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
-        arithmetic = _arithmetic()
+        if self.reference:
+            state += [y.r, y.dr, y.ddr]
+        observation = np.array(state)
         u = np.asarray(self.act(observation), float).ravel()
-        if arithmetic.changed():
-            raise ArithmeticError(f"{self.name} {ALTERS}")
         if len(u) != 1:
             raise ValueError(
                 f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel"
@@ -93,8 +87,9 @@ class Policy(Uncompiled):
             return dataclasses.replace(self, act=copy.deepcopy(self.act))
         except Exception as error:
             warnings.warn(
-                f"policy {self.name!r} cannot be copied ({one_line(str(error))}), so that channels and runs share it: "
-                "give an object that copy.deepcopy copies, or a function only of the observation",
+                f"policy {self.name!r} cannot be copied ({one_line(str(error))}), so that channels "
+                "and runs share it: give an object that copy.deepcopy copies, or a function only of "
+                "the observation",
                 stacklevel=2,
             )
             return self
@@ -109,15 +104,8 @@ class Controller(Policy):
 
     def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
         """Return u and s."""
-        arithmetic = _arithmetic()
         answer = self.act.compute(y.t, np.array([y.x, y.v]), np.array([y.r, y.dr, y.ddr]))  # pyright: ignore[reportFunctionMemberAccess]
-        if arithmetic.changed():
-            raise ArithmeticError(f"{self.name} {ALTERS}")
-        if isinstance(answer, tuple):
-            u, told = answer
-        else:
-            u = answer
-            told = {}
+        u, told = answer if isinstance(answer, tuple) else (answer, {})
         return float(np.asarray(u, float).item()), float(told.get("s", 0.0))
 
 
@@ -133,15 +121,6 @@ class File:
         return load_network(self)(observation)
 
 
-def worker(job: Mapping[str, Any], report: Callable) -> None:
-    """Read the network in a file, in the process of a trial."""
-    report("reading it")
-    try:
-        load_network(File(**job))
-    except ScenarioError as error:
-        raise Fault(str(error)) from None
-
-
 @functools.lru_cache(maxsize=8)
 def load_network(file: File) -> Act:
     """Return the network in a file."""
@@ -150,8 +129,9 @@ def load_network(file: File) -> Act:
         raise ScenarioError(f"policy {path.name!r} is gone or has changed: call smc.policy again")
     name, cure = FORMATS[path.suffix]
     library = _library(name, path.name)
+    read = _onnx if name == "onnxruntime" else _torch
     try:
-        return (_onnx if name == "onnxruntime" else _torch)(library, path)
+        return read(library, path)
     except ScenarioError:
         raise
     except Exception as error:
@@ -168,19 +148,14 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
     inputs = session.get_inputs()
     dtype = ONNX_DTYPES.get(inputs[0].type)
     shape = list(inputs[0].shape)
-    if (
-        len(inputs) != 1
-        or dtype is None
-        or len(shape) != 2
-        or (shape[0] != 1 and isinstance(shape[0], int))
-    ):
+    fits = len(inputs) == 1 and dtype is not None and len(shape) == 2
+    if not fits or (isinstance(shape[0], int) and shape[0] != 1):
         text = ", ".join(f"{tensor.name} {tensor.type} {tensor.shape}" for tensor in inputs)
         raise ScenarioError(
             f"policy {path.name!r} takes {text}: export it for one input of floats, of shape (1, n)"
         )
-    return lambda observation: session.run(None, {inputs[0].name: observation[None].astype(dtype)})[
-        0
-    ]
+    name = inputs[0].name
+    return lambda observation: session.run(None, {name: observation[None].astype(dtype)})[0]
 
 
 def _torch(torch: ModuleType, path: Path) -> Act:
@@ -196,9 +171,7 @@ class Network:
     """
 
     module: Any  # the copy
-    predicts: bool = (
-        False  # whether to call its method `predict`, as of a policy of stable-baselines3
-    )
+    predicts: bool = False  # whether to call its method `predict`, as of stable-baselines3
 
     def __call__(self, observation: np.ndarray) -> Any:
         """Return the action."""
@@ -225,9 +198,8 @@ class Network:
 
 
 def _unpickled(content: bytes, classes: tuple[type, ...], version: str, predicts: bool) -> Network:
-    return Network(
-        _library("torch", "network").load(io.BytesIO(content), weights_only=False), predicts
-    )
+    torch = _library("torch", "network")
+    return Network(torch.load(io.BytesIO(content), weights_only=False), predicts)
 
 
 @constrained
@@ -289,17 +261,14 @@ def _callable(act: Any) -> tuple[Act, str]:
             )
         with reading(path, "policy", "give the path of a file that a library wrote"):
             file = File(str(path.resolve()), _digest(path))
-        try:
-            run_isolated(__name__, dataclasses.asdict(file), LOAD_TIMEOUT)
-        except Failed as failed:
-            raise ScenarioError(failed.fault or f"policy {path.name!r}: {failed}") from None
+        load_network(file)
         return file, path.stem
     torch = sys.modules.get("torch")
     control = sys.modules.get("control")
     name = type(act).__name__
     if control is not None and isinstance(act, control.InputOutputSystem):
         raise ScenarioError(
-            f"policy is a {name} of python-control: give smc.exchange.law_from_control(...) as the law"
+            f"policy is a {name} of python-control: give smc.exchange.law_from_control(...)"
         )
     predicts = callable(getattr(act, "predict", None))
     if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy
@@ -307,9 +276,8 @@ def _callable(act: Any) -> tuple[Act, str]:
     elif not callable(act):
         raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}")
     if torch is None or not isinstance(act, torch.nn.Module):
-        return (act if callable(act) else functools.partial(_predict, act)), getattr(
-            act, "__name__", name
-        )
+        function = act if callable(act) else functools.partial(_predict, act)
+        return function, getattr(act, "__name__", name)
     try:
         _reset_distribution(act)
         module: Any = copy.deepcopy(act)

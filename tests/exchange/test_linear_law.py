@@ -7,7 +7,6 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from helpers.commands import python
 from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
@@ -183,11 +182,6 @@ def test_a_discrete_one_runs_at_its_own_period_only():
     every = sampled(LEAD)
     every.dt = True
     smc.Scenario(plant="duffing", law=smc.exchange.law_from_control(every))
-
-
-def test_python_control_is_not_imported_for_matrices():
-    code = "import sys, smc_mujoco as smc; smc.exchange.law_from_control((0, 1, 1, 0)); print('control' in sys.modules)"
-    assert python("-c", code).stdout == "False\n"
 
 
 # the linear model of a plant

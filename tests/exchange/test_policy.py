@@ -6,8 +6,6 @@ The libraries themselves are no dependency: where they are installed, the last t
 
 import contextlib
 import math
-import pickle
-import platform
 import sys
 import types
 from pathlib import Path
@@ -17,8 +15,6 @@ import pytest
 from helpers.episodes import columns, dm_control_suite, driven_by_dm, flat, run_of
 
 import smc_mujoco as smc
-from smc_mujoco.common import guard
-from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange import policy
 from smc_mujoco.studies import run_key
 
@@ -60,52 +56,6 @@ def test_a_policy_of_a_joint_and_one_that_moves_with_it_sees_both():
     states = driven_by_dm(environment, lambda timestep: np.clip(act(flat(timestep)), -1.0, 1.0))
     trace = smc.run(run_of(environment.task.setting, smc.policy(act, reference=True)))
     assert np.abs(states - columns(trace)).max() < 1e-9
-
-
-def test_a_joint_that_nothing_couples_where_it_is_stays_in_the_observation():
-    seen = []
-    law = smc.policy(lambda o: seen.append(o) or [0.0])
-    alone = Measurement(
-        t=0.0,
-        dt=0.001,
-        x=0.1,
-        v=0.2,
-        e=0.1,
-        de=0.2,
-        r=0.0,
-        dr=0.0,
-        ddr=0.0,
-        f=0.0,
-        g=1.0,
-        limit=6.0,
-    )
-    for y in (alone, alone._replace(q=1.5, fq=2.0, gq=1.0), alone._replace(q=1.6, fq=2.0, gq=0.0)):
-        assert law.function
-        law.function(y, None, np.zeros(1))
-    assert [o.tolist() for o in seen] == [[0.1, 0.2], [0.1, 1.5, 0.2, 0.0], [0.1, 1.6, 0.2, 0.0]]
-
-
-def test_the_warning_of_a_policy_names_its_cost_and_no_compiler():
-    with pytest.warns(smc.errors.PlainLoopWarning) as caught:
-        briefly(smc.policy(proportional))
-    sentence = str(caught[0].message)
-    assert sentence.startswith(
-        "law 'proportional' is a policy, which is Python: several times slower"
-    )
-    assert "compile:" not in sentence
-    assert "umba" not in sentence
-
-
-def test_policies_of_one_callable_are_one_law_that_can_be_sent_away():
-    assert (
-        smc.policy(proportional)
-        == smc.policy(proportional)
-        != smc.policy(proportional, reference=True)
-    )
-    assert (
-        pickle.loads(pickle.dumps(smc.policy(proportional).function))
-        == smc.policy(proportional).function
-    )
 
 
 class Adaptive:
@@ -162,12 +112,6 @@ def test_an_object_that_cannot_be_copied_is_shared_and_says_so():
         briefly(smc.policy(Locked()))
 
 
-def test_an_action_beyond_its_bounds_saturates():
-    trace = briefly(smc.policy(lambda o: [-3.0]))
-    assert np.all(trace.u == -6.0)
-    assert not trace.s.any()  # it has no sliding variable
-
-
 def test_a_policy_may_look_ahead_in_environments_of_its_own():
     gymnasium = pytest.importorskip(
         "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
@@ -185,43 +129,6 @@ def test_a_policy_may_look_ahead_in_environments_of_its_own():
 
 
 # files and modules, with stand-ins for their libraries
-
-
-@pytest.fixture(autouse=True)
-def here(monkeypatch):
-    """Files are tried in this process, where the stand-ins are."""
-    monkeypatch.setattr(
-        policy, "run_isolated", lambda module, job, timeout: policy.load_network(policy.File(**job))
-    )
-
-
-@pytest.mark.slow
-def test_a_library_that_a_file_crashes_is_one_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(policy, "run_isolated", guard.run_isolated)
-    (tmp_path / "onnxruntime.py").write_text("import os\nSessionOptions = os.abort\n")
-    (tmp_path / "net.onnx").write_bytes(b"x")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(smc.ScenarioError, match=r"^policy 'net\.onnx': reading it died of SIGABRT"):
-        smc.policy(tmp_path / "net.onnx")
-    (tmp_path / "onnxruntime.py").write_text("raise ImportError('no library')\n")
-    with pytest.raises(
-        smc.ScenarioError,
-        match=r"^policy 'net\.onnx' needs onnxruntime \(no library\): pip install",
-    ):
-        smc.policy(tmp_path / "net.onnx")
-
-
-def test_a_policy_that_changes_the_rounding_fails_and_harms_no_other():
-    library = guard.Arithmetic().library
-
-    def act(observation):
-        library.fesetround(0x800 if platform.machine() == "x86_64" else 0x400000)
-        return [0.0]
-
-    alone = briefly("pid")
-    trace = briefly(smc.policy(act))
-    assert f"raised ArithmeticError (act {guard.ALTERS})" in str(trace.failure)
-    np.testing.assert_array_equal(briefly("pid").x, alone.x)
 
 
 def onnx(monkeypatch, kind="tensor(float)", shape=("batch", 2), more=()):
@@ -379,14 +286,6 @@ def test_an_object_that_predicts_gives_its_deterministic_action(kind):
     law = smc.policy(kind())
     assert law.name == kind.__name__
     assert briefly(law).u[0, 0] == -1.5
-
-
-def test_a_callable_that_predicts_too_is_called():
-    class Both(Predicts):
-        def __call__(self, observation):
-            return [0.25]
-
-    assert briefly(smc.policy(Both())).u[0, 0] == 1.5
 
 
 class Head(Module):

@@ -131,11 +131,14 @@ class ExportedLaw:
     @functools.cached_property
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
-        of_law = {"joints": self.joints, "plant": self.plant}
-        return {
-            kind: export.translated(p, **of_law if kind == "law" else {})
-            for kind, p in self.parts.items()
-        }
+        code = {kind: export.translated(part) for kind, part in self.parts.items() if kind != "law"}
+        of_law = export.translated(self.law, joints=self.joints, plant=self.plant)
+        return {"law": of_law, **code}
+
+    @property
+    def actuators(self) -> int:
+        """Number of actuators that it commands itself."""
+        return len(mixer(self.plant)) if self.plant else 0
 
     @property
     def of_body(self) -> bool:
@@ -151,13 +154,8 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
         if name in wanted:
-            starts = _starts(name, exported)
-        else:
-            starts = {}
-        listed += [
-            Variable(f"{name}{place}", "SMC_INPUT", words, unit, start)
-            for place, start in starts.items()
-        ]
+            for index, start in _starts(name, exported).items():
+                listed.append(Variable(name + index, "SMC_INPUT", words, unit, start))
     computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
     if exported.surface:
         computed.append(("v_eq", "acceleration of the error that keeps s constant", None))
@@ -165,45 +163,31 @@ def variables(exported: ExportedLaw) -> list[Variable]:
         computed.append(("v_estimated", "estimated velocity", SPEED))
     for name, words, unit in computed:
         listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
-    for i in range(len(mixer(exported.plant)) if exported.plant else 0):
-        listed.append(
-            Variable(f"control[{i + 1}]", "SMC_COMPUTED", "command of an actuator, for u")
-        )
+    for i in range(exported.actuators):
+        words = "command of an actuator, for u"
+        listed.append(Variable(f"control[{i + 1}]", "SMC_COMPUTED", words))
     words = "bound on the magnitude of u"
     for place, bound in zip(places, exported.u_max, strict=True):
         start = bound if math.isfinite(bound) else MAX_DOUBLE
         listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
     for kind, part in exported.parts.items():
         for name, value in part.gains.items():
+            indices = ("",)
             if kind == "law" and name not in part.shared:
                 indices = places
-            else:
-                indices = ("",)
-            listed += [
-                parameter(kind, part, name, gain_at(value, i), place)
-                for i, place in enumerate(indices)
-            ]
-    listed.append(
-        Variable(
-            "dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, exported.period
-        )
-    )
+            for i, index in enumerate(indices):
+                listed.append(parameter(kind, part, name, gain_at(value, i), index))
+    words = "control period: the law runs this often"
+    listed.append(Variable("dt", "SMC_CONSTANT", words, TIME, exported.period))
     for kind, (slots, _) in exported.code.items():
         for i in range(max(1, exported.joints)):
-            if exported.joints:
-                joint = f", joint {i + 1}"
-                place = f"{i + 1},"
-            else:
-                joint = ""
-                place = ""
-            listed += [
-                Variable(
-                    f"{kind}.memory[{place}{k}]",
-                    "SMC_STATE",
-                    f"number {k} of the memory of the {kind}{joint}",
-                )
-                for k in range(1, slots + 1)
-            ]
+            for k in range(1, slots + 1):
+                words = f"number {k} of the memory of the {kind}"
+                index = str(k)
+                if exported.joints:
+                    words += f", joint {i + 1}"
+                    index = f"{i + 1},{k}"
+                listed.append(Variable(f"{kind}.memory[{index}]", "SMC_STATE", words))
     return listed
 
 
@@ -243,31 +227,21 @@ def reads(code: str) -> set[str]:
 
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
     """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
-    if part.template and name in part.template.gains:
-        gain = part.template.gains[name]
-    else:
-        gain = None
+    gain = part.template.gains.get(name) if part.template else None
+    unit = None
+    minimum = -math.inf
+    limits = ""
+    positive = False
     if gain:
         unit = gain.unit_at({key: gain_at(number, 0) for key, number in part.gains.items()})
-    else:
-        unit = None
-    positive = bool(gain and gain.positive)
-    if gain and (gain.positive or gain.nonnegative):
-        minimum = 0.0
-    else:
-        minimum = -math.inf
-    if positive:
-        limits = ", greater than 0"
-    else:
-        limits = ", at least 0" if minimum == 0.0 else ""
-    if math.isfinite(value):
-        finite = value
-    else:
-        finite = math.copysign(MAX_DOUBLE, value)
+        positive = gain.positive
+        if gain.positive or gain.nonnegative:
+            minimum = 0.0
+            limits = ", greater than 0" if gain.positive else ", at least 0"
+    finite = value if math.isfinite(value) else math.copysign(MAX_DOUBLE, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
-    return Variable(
-        f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, minimum, positive
-    )
+    full = f"{kind}.{plain(name)}{index}"
+    return Variable(full, "SMC_PARAMETER", words, unit, finite, minimum, positive)
 
 
 # C
@@ -283,14 +257,10 @@ def header(listed: Sequence[Variable], exported: ExportedLaw, identifier: str, t
 
     `identifier`: the model's name in C.
     """
-    memory = next(
-        (i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed)
-    )
+    kinds = [variable.kind for variable in listed]
+    memory = len(kinds) - kinds.count("SMC_STATE")
     own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
-    if exported.joints:
-        joints = f"\n#define {JOINTS} {exported.joints}"
-    else:
-        joints = ""
+    joints = f"\n#define {JOINTS} {exported.joints}" if exported.joints else ""
     indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
     return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
 #ifndef SMC_CONTROLLER_H

@@ -28,7 +28,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Positive, Timeout, constrained
-from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, number, one_line, unknown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
 from smc_mujoco.common.guard import Failed, run_isolated
@@ -80,7 +80,7 @@ class FmuLaw(Uncompiled):
     period: float | None  # of its steps, s; None for the control period
     once: bool = False  # whether a process can have only one instance
 
-    why = "is an FMU, called from Python: several times slower than a law that compiles, and on one core"
+    why = "is an FMU, called from Python: several times slower than a law that compiles"
 
     @property
     def __name__(self) -> str:
@@ -124,18 +124,14 @@ class FmuLaw(Uncompiled):
             gc.collect()  # ends the instances of runs that are over
             if any(other.law == self for other in _running.values()):
                 raise ScenarioError(
-                    f"FMU {Path(self.path).name!r} can have only one instance in a process, by its description: "
-                    "give a plant of one channel"
+                    f"FMU {Path(self.path).name!r} can have only one instance in a process, by its "
+                    "description: give a plant of one channel"
                 )
         made = Slave(
             str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t
         )
         _running[place] = Running(self, made, y.t, [0.0, 0.0], [0, 0])
-        owner: Any
-        if memory.base is None:
-            owner = memory
-        else:
-            owner = memory.base
+        owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place
 
@@ -174,7 +170,7 @@ def extracted(path: str, digest: str) -> Path:
         now = ""
     if now != digest:
         raise ScenarioError(
-            f"FMU {Path(path).name!r} is gone or has changed: call smc.exchange.law_from_fmu again"
+            f"FMU {Path(path).name!r} is gone or has changed: call law_from_fmu again"
         )
     folder = build.fresh("-fmu")
     with zipfile.ZipFile(path) as archive, no_room(errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
@@ -252,51 +248,24 @@ def _description(file: Path, digest: str) -> Any:
     """Return FMPy's description of an FMU."""
     import fmpy
 
-    if not zipfile.is_zipfile(file):
-        raise ScenarioError(f"{file.name} is not an FMU, as it is no zip archive: {CURE}")
     try:
-        with zipfile.ZipFile(file) as archive:
-            if (wanted := "modelDescription.xml") not in archive.namelist():
-                raise ScenarioError(
-                    f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}"
-                )
         folder = extracted(str(file.resolve()), digest)
         about = fmpy.read_model_description(str(folder), validate=False)
     except ScenarioError:
         raise
     except Exception as error:  # a damaged archive or XML raises any exception there is
+        why = f"{type(error).__name__}: {one_line(str(error), 80)}"
+        raise ScenarioError(f"{file.name} is not an FMU ({why}): {CURE}") from error
+    version = str(about.fmiVersion)
+    if version[:2] not in ("2.", "3.") or about.coSimulation is None:
+        raise ScenarioError(f"{file.name} is of FMI {version}, or not for Co-Simulation: {CURE}")
+    here = fmpy.platform if version.startswith("2") else fmpy.platform_tuple
+    binaries = (folder / "binaries" / here).glob("*")
+    if not any(binary.stem == about.coSimulation.modelIdentifier for binary in binaries):
+        machines = sorted(path.name for path in (folder / "binaries").glob("*"))
         raise ScenarioError(
-            f"{file.name} is not an FMU ({type(error).__name__}: {one_line(str(error), 120)}): {CURE}"
-        ) from error
-    if str(about.fmiVersion)[:2] not in ("2.", "3."):
-        raise ScenarioError(f"{file.name} is of FMI {about.fmiVersion}: {CURE}")
-    if about.coSimulation is None:
-        if about.modelExchange is not None:
-            kind = "Model Exchange"
-        else:
-            kind = "Scheduled Execution"
-        raise ScenarioError(f"{file.name} is for {kind} only: export it for Co-Simulation")
-    if not str(about.coSimulation.modelIdentifier).isidentifier():
-        raise ScenarioError(
-            f"{file.name} has the modelIdentifier {shown(about.coSimulation.modelIdentifier)}, which is no name in C: "
-            "export it with one of letters, digits and _"
-        )
-    if str(about.fmiVersion).startswith("2"):
-        here = fmpy.platform
-    else:
-        here = fmpy.platform_tuple
-    binaries = folder / "binaries" / here
-    if not any(binary.stem == about.coSimulation.modelIdentifier for binary in binaries.glob("*")):
-        if binaries.exists():
-            raise ScenarioError(
-                f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again"
-            )
-        machines = (
-            ", ".join(sorted(path.name for path in (folder / "binaries").glob("*"))) or "no machine"
-        )
-        raise ScenarioError(
-            f"{file.name} has a binary for {machines}, and this one is {here}: export it for this one, or compile its "
-            "sources with FMPy, fmpy compile"
+            f"{file.name} has a binary for {', '.join(machines) or 'no machine'}, and this one is "
+            f"{here}: export it for this one, or compile its sources with FMPy, fmpy compile"
         )
     return about
 
@@ -307,19 +276,16 @@ def _meanings(
     """Return our name -> the FMU's, for its inputs and for its outputs, of the `known` variables by
     name.
     """
-    ins, outs = (
-        [n for n, v in known.items() if v.causality == side] for side in ("input", "output")
-    )
+    names: dict[str, list[str]] = {"input": [], "output": []}
+    for name, variable in known.items():
+        names.setdefault(variable.causality, []).append(name)
+    ins = names["input"]
+    outs = names["output"]
     for ours, theirs in chosen.items():
         if ours not in (*INPUT_FIELDS, *OUTPUTS):
             raise unknown("meaning of a variable", ours, (*INPUT_FIELDS, *OUTPUTS))
-        if ours in OUTPUTS:
-            side = "output"
-            theirs_known = outs
-        else:
-            side = "input"
-            theirs_known = ins
-        errors.find(f"{side} of {file}", theirs, dict.fromkeys(theirs_known, ""))
+        side = "output" if ours in OUTPUTS else "input"
+        errors.find(f"{side} of {file}", theirs, dict.fromkeys(names[side], ""))
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}
@@ -329,10 +295,10 @@ def _meanings(
     )
     if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
         first = strange[0]
-        meaning = f"say which it is, variables={{'x': {first!r}}}, or "
         raise ScenarioError(
             f"{file} has inputs that mean nothing that a law measures, {', '.join(strange[:4])}: "
-            f"{meaning * (known[first].type in REAL_TYPES)}hold each, constants={{{first!r}: 0.0}}"
+            f"say which it is, variables={{'x': {first!r}}}, or hold each, "
+            f"constants={{{first!r}: 0.0}}"
         )
     outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
     outputs |= _by_name(
@@ -347,13 +313,13 @@ def _meanings(
             f"say which it is, as in variables={{'u': {free!r}}}"
         )
     outputs.setdefault("u", outs[0])
-    real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL_TYPES)
-    for theirs, types in {**dict.fromkeys(constants, CONSTANT_TYPES), **real}.items():
-        if known[theirs].type not in types or known[theirs].dimensions:
-            need = "real number: a law measures and returns real numbers"
-            if types is not REAL_TYPES:
-                need = "number: export it without this input"
-            raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
+    types = dict.fromkeys(constants, CONSTANT_TYPES)
+    types |= dict.fromkeys((*inputs.values(), *outputs.values()), REAL_TYPES)
+    for theirs, fitting in types.items():
+        if known[theirs].type not in fitting or known[theirs].dimensions:
+            raise ScenarioError(
+                f"{theirs!r} of {file} is not one number: export it without this variable"
+            )
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
 
 
@@ -369,27 +335,22 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
     """Return name of a gain -> the FMU's name and the Gain, for its real parameters."""
     gains: dict[str, tuple[str, Gain]] = {}
     for variable in variables:
-        if (
-            variable.causality != "parameter"
-            or variable.type not in REAL_TYPES
-            or variable.dimensions
-        ):
+        real = variable.type in REAL_TYPES and not variable.dimensions
+        if variable.causality != "parameter" or not real:
             continue
         try:
             start = float(variable.start)
         except (TypeError, ValueError):
             continue
         ours = re.sub(r"\W+", "_", variable.name).strip("_")
-        ours += "_" * keyword.iskeyword(ours)
+        if keyword.iskeyword(ours):
+            ours += "_"
         if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
         if abs(start) >= MAX_DOUBLE:
             start = math.copysign(math.inf, start)
-        if variable.min is None:
-            lower = math.nan
-        else:
-            lower = float(variable.min)
-        gains[ours] = variable.name, Gain(start, nonnegative=lower == 0.0)
+        lowest = variable.min is not None and float(variable.min) == 0.0
+        gains[ours] = variable.name, Gain(start, nonnegative=lowest)
     return gains
 
 
@@ -398,18 +359,17 @@ def _period(about: Any) -> float | None:
     inside = about.coSimulation
     if inside.canHandleVariableCommunicationStepSize:
         return None
-    steps = (
+    steps = [
         getattr(inside, "fixedInternalStepSize", None),
         getattr(about.defaultExperiment, "stepSize", None),
-    )
-    return next((float(step) for step in steps if step is not None and float(step) > 0.0), None)
+    ]
+    return next((float(step) for step in steps if step and float(step) > 0.0), None)
 
 
 def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
     """Try an FMU in a separate process, with these gains."""
-    folder = str(extracted(law.path, law.digest))
     order = {
-        "folder": folder,
+        "folder": str(extracted(law.path, law.digest)),
         "inputs": dict(law.inputs),
         "outputs": law.outputs,
         "step": law.period,

@@ -8,28 +8,16 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
 
-REAL_TYPES = (
-    "Real",
-    "Float64",
-    "Float32",
-)  # types of real numbers, as in the names of FMPy's functions
-WHOLE_TYPES = (
-    "Integer",
-    "Enumeration",
-    *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)),
-)
+REAL_TYPES = ("Real", "Float64", "Float32")  # as in the names of FMPy's functions
+WHOLE_TYPES = ("Integer", "Enumeration", "Int8", "Int16", "Int32", "Int64")
+WHOLE_TYPES += ("UInt8", "UInt16", "UInt32", "UInt64")
 CONSTANT_TYPES = (*REAL_TYPES, *WHOLE_TYPES, "Boolean")  # types of inputs that may keep one value
-CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {
-    "Boolean": bool
-}  # of numbers into values of other types
-TRIAL_STEPS, TRIAL_PERIOD = (
-    500,
-    1e-3,
-)  # of a trial: number of steps, and their length if the FMU names none, s; chosen
-MAX_POSITION = (
-    3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
-)
-MAX_COMMAND = 6.0  # bound on u in a trial; chosen
+# of numbers into values of other types
+CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}
+TRIAL_STEPS = 500
+TRIAL_PERIOD = 1e-3  # s, of a step if the FMU names none
+MAX_POSITION = 3.0  # where the double integrator of a trial stops: a law need not stabilise it
+MAX_COMMAND = 6.0  # bound on u in a trial
 CURE = "fix the FMU, or its inputs and parameters"
 
 
@@ -62,12 +50,12 @@ class Slave:
         import fmpy
         from fmpy.simulation import instantiate_fmu
 
-        self.arithmetic = Arithmetic()
         about = fmpy.read_model_description(folder, validate=False)
         self.known = {variable.name: variable for variable in about.modelVariables}
         self.two = str(about.fmiVersion).startswith("2")
         self.said = list[str]()
-        self.inputs, self.outputs = self._by_type(inputs), self._by_type(outputs)
+        self.inputs = self._by_type(inputs)
+        self.outputs = self._by_type(outputs)
         self.fmu: Any = self._called(
             "instantiation", instantiate_fmu, folder, about, "CoSimulation", logger=self._log
         )
@@ -76,11 +64,8 @@ class Slave:
         for name, value in fixed.items():
             if self.known[name].causality != "input":
                 self._set(self._by_type([name]), [value])
-        self._called(
-            "initialization",
-            self.fmu.enterInitializationMode,
-            **({} if self.two else {"startTime": start}),
-        )
+        begins = {} if self.two else {"startTime": start}
+        self._called("initialization", self.fmu.enterInitializationMode, **begins)
         for name, value in fixed.items():
             if self.known[name].causality == "input":
                 self._set(self._by_type([name]), [value])
@@ -102,7 +87,6 @@ class Slave:
             self.fmu.terminate()
         finally:
             self.fmu.freeInstance()
-            self.arithmetic.changed()
 
     def _by_type(self, names: Sequence[str]) -> list[Group]:
         """Return groups of variables of the same type, which one call sets or reads."""
@@ -122,9 +106,8 @@ class Slave:
                 setter = "setInteger" if self.two else "setInt64"
             else:
                 setter = f"set{kind}"
-            what = ", ".join(
-                f"{name} = {value:g}" for name, value in zip(names, typed, strict=True)
-            )
+            pairs = [f"{name} = {value:g}" for name, value in zip(names, typed, strict=True)]
+            what = ", ".join(pairs)
             self._called(f"setting {what}", getattr(self.fmu, setter), references, typed)
 
     def _get(self, groups: Sequence[Group]) -> list[float]:
@@ -139,23 +122,14 @@ class Slave:
         return values
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
-        """Call a function of FMPy.
-
-        Raise Fault if it fails, with the FMU's last words, or changes our arithmetic.
-        """
+        """Call a function of FMPy. Raise Fault if it fails, with the FMU's last words."""
         try:
-            result = function(*arguments, **named)
+            return function(*arguments, **named)
         except Exception as error:
+            why = f"{type(error).__name__}: {error}"
             if self.said:
                 why = self.said[-1]
-            else:
-                why = f"{type(error).__name__}: {error}"
             raise Fault(f"{what} fails ({' '.join(why.split())}): {CURE}") from error
-        finally:
-            changed = self.arithmetic.changed()
-        if changed:
-            raise Fault(f"{what} {ALTERS}: {CURE}")
-        return result
 
     def _log(self, *words: Any) -> None:
         """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""
@@ -169,32 +143,27 @@ def worker(job: Mapping[str, Any], report: Callable) -> None:
     `job` is from `load`, and `report` reports a stage.
     """
     report("instantiation")
+    arithmetic = Arithmetic()
     slave = Slave(job["folder"], list(job["inputs"].values()), job["outputs"], job["fixed"])
     length = job["step"] or TRIAL_PERIOD
     x = 0.5
     v = 0.0
     for k in range(TRIAL_STEPS):
         report(f"the step from t = {k * length:g} s")
-        r = 0.1 * math.sin(k * length)
-        dr = 0.1 * math.cos(k * length)
-        seen = {
-            "t": k * length,
-            "dt": length,
-            "x": x,
-            "v": v,
-            "r": r,
-            "dr": dr,
-            "ddr": -r,
-            "e": x - r,
-            "de": v - dr,
-        }
-        seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
-        outputs = slave.step([seen.get(name, 0.0) for name in job["inputs"]], k * length, length)
+        t = k * length
+        r = 0.1 * math.sin(t)
+        dr = 0.1 * math.cos(t)
+        seen = {"t": t, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "a": -r}
+        seen |= {"e": x - r, "de": v - dr, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
+        outputs = slave.step([seen.get(name, 0.0) for name in job["inputs"]], t, length)
         if not all(map(math.isfinite, outputs)):
             raise Fault(f"{job['outputs'][0]} is {outputs[0]:g} after {k + 1} steps: {CURE}")
         v += length * min(max(outputs[0], -MAX_COMMAND), MAX_COMMAND)
         x += length * v
         if abs(x) > MAX_POSITION:
-            x, v = math.copysign(MAX_POSITION, x), 0.0
+            x = math.copysign(MAX_POSITION, x)
+            v = 0.0
+    if arithmetic.changed():
+        raise Fault(f"a step {ALTERS}: {CURE}")
     report("termination")
     slave.close()

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.commands import assert_refused
 from helpers.compiler import needs_compiler
 from helpers.sources import strange
 from numba import njit
@@ -19,7 +18,6 @@ from numba import njit
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import build, export, sandbox
@@ -464,28 +462,6 @@ def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
     assert without.partition("*/")[2] == with_one.partition("*/")[2]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["twistin"], "unknown law 'twistin': did you mean 'twisting'?"),
-        (
-            ["twisting", "--type", "half"],
-            "unknown type of numbers 'half': choose from double, float, q15",
-        ),
-        (
-            ["twisting", "--type", "q15"],
-            "law 'twisting' has no Q15 form: give observer_free or observer_free_q15",
-        ),
-        (["twisting", "--gains", "r3=1"], "unknown gain of twisting 'r3'"),
-        (["twisting", "--gains", "r1=-1"], "twisting's r1 is -1: give a number greater than 0"),
-        (["twisting", "--gains", "r1"], "--gains is 'r1': give names and numbers"),
-        (["none.py"], "no file 'none.py': give a file with a law in it, or a name"),
-    ],
-)
-def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
-    assert_refused(capsys, ["export", *words, "nowhere/a.c"], said)
-
-
 def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
     one = "@smc.law_function(gains={'k': 2.0})\ndef mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
     (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{one}")
@@ -497,16 +473,3 @@ def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
     with pytest.raises(SystemExit):
         cli.main(["export", str(file), str(tmp_path / "a.c")])
     assert f"{file} has several laws, mine, other: give a file with one" in capsys.readouterr().err
-
-
-def test_what_is_no_law_or_is_in_c_already_is_refused(folder):
-    (folder / "none.c").write_text(smc.exchange.law_to_c("none"))
-    with pytest.raises(smc.ScenarioError, match=r"law 'none' is in C already: take none\.c"):
-        smc.exchange.law_to_c(smc.exchange.law_from_c(folder / "none.c"))
-    with pytest.raises(smc.ScenarioError, match="law is 3: give"):
-        smc.exchange.law_to_c(3)
-
-
-def test_gains_that_fixed_point_does_not_hold_are_warned_of():
-    with pytest.warns(GainWarning, match="lam < u_range"):
-        smc.exchange.law_to_c(smc.law("observer_free", lam=9.0), "q15")

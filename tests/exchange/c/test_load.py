@@ -6,7 +6,6 @@ import copy
 import os
 import pickle
 import re
-import stat
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -203,21 +202,6 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
     assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
 
 
-def test_two_laws_of_one_library_are_two(file, tmp_path):
-    target = tmp_path / "laws.so"
-    text = law("out[0] = -y->e;")
-    second = text.partition("int ")[2].replace("smc_law(", "other(").replace("-y->e", "-2 * y->e")
-    source = file(text + "int " + second)
-    shared(source, target)
-    one, other = (
-        scenario(smc.exchange.law_from_c(target, symbol=name, name="mine")())
-        for name in ("smc_law", "other")
-    )
-    assert one != other
-    assert run_key.key(one) != run_key.key(other)
-    assert repr(other.law.function) == "<C function other of laws.so>"
-
-
 def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
     path = file(MINE)
     first = scenario(smc.exchange.law_from_c(path)(lam=4.0))
@@ -236,17 +220,6 @@ def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
     assert len(functions) == 4
 
 
-def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
-    """The rest of the register holds what it likes."""
-    target = tmp_path / "my_law.so"
-    text = "long long smc_law(const double *y, const double *gains, double *memory, double *out)\n"
-    # the int in it is 0
-    text += "{ (void)memory; out[0] = out[1] = -y[4]; return (long long)gains[0] << 32; }"
-    source = file(text)
-    shared(source, target, "-O2")
-    assert smc.run(scenario(smc.exchange.law_from_c(target, gains={"k": 3.0}))).failure is None
-
-
 def test_other_files_and_flags_come_along(file, tmp_path):
     other = file("double twice(double a) { return 2.0 * a; }", "filter.c")
     mine = file(law("out[0] = -K * twice(y->e);", "double twice(double a);"))
@@ -254,14 +227,6 @@ def test_other_files_and_flags_come_along(file, tmp_path):
         scenario(smc.exchange.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None)
     )
     assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
-
-
-def test_set_up_is_called_before_the_first_run(file):
-    text = law(
-        "out[0] = table[3];",
-        "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }",
-    )
-    assert (smc.run(scenario(smc.exchange.law_from_c(file(text)))).u == 0.25).all()
 
 
 def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
@@ -298,17 +263,6 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
     Path(tmp_path / "my_law.c").unlink()
     code = f"import pickle, smc_mujoco as smc; print(smc.run(pickle.loads({pickle.dumps(first)!r})).u[:, 0].tolist())"
     assert eval(python("-c", code).stdout) == trace.u[:, 0].tolist()
-
-
-def test_a_law_of_floats_is_as_large_in_another_process(file):
-    text = "#define SMC_REAL float\n" + law(
-        "memory[99] += gains[0]; out[0] = 0.0f; out[1] = memory[99];"
-    )
-    first = scenario(
-        smc.exchange.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01
-    )
-    trace = smc.run(pickle.loads(pickle.dumps(first)))
-    assert trace.s[:, 0].tolist() == [2.0 * k for k in range(1, 12)]
 
 
 def test_code_of_another_machine_is_one_sentence(file):
@@ -482,27 +436,6 @@ def test_what_would_harm_other_runs_is_not_loaded(file, more, words):
     assert 5e-324 * np.float64(1.0) > 0.0
 
 
-@pytest.mark.slow
-def test_checked_or_refused_it_was_not_in_this_process(call, file, tmp_path):
-    """Not by its constructor, its set-up, a call of the law or its destructor."""
-    told = tmp_path / "pids"
-    lines = [
-        "#include <stdio.h>",
-        "#include <unistd.h>",
-        f'#define TOLD "{told}"',
-        'static void note(void) { FILE *f = fopen(TOLD, "a"); fprintf(f, "%d\\n", (int)getpid()); fclose(f); }',
-        "__attribute__((constructor)) static void start(void) { note(); }",
-        "__attribute__((destructor)) static void end(void) { note(); }",
-        "int smc_setup(void) { note(); return 0; }",
-    ]
-    more = "\n".join(lines)
-    assert call("list", file(law("if (y->t == 0.0) note(); out[0] = -y->e;", more)))[0] == 0
-    with pytest.raises(smc.ScenarioError, match="smc_law returned 3"):
-        smc.exchange.law_from_c(file(law("out[0] = 0.0; return 3;", more)), isolate=True)
-    assert len(told.read_text().split()) > 8
-    assert str(os.getpid()) not in told.read_text().split()
-
-
 def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
     late = smc.exchange.law_from_c(file(law("out[0] = y->t > 0.1 ? y->e / (y->t - y->t) : 0.0;")))
     code = smc.exchange.law_from_c(
@@ -538,21 +471,6 @@ def test_names_of_the_law_may_be_those_of_headers_that_it_does_not_include(file)
     ]
     taken = law("out[0] = y0 * gamma;", "\n".join(more))
     assert (smc.run(scenario(smc.exchange.law_from_c(file(taken)))).u == 6.0).all()
-
-
-def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeypatch):
-    slow = tmp_path / "slowcc"
-    slow.write_text("#!/bin/sh\nsleep 60\n")
-    slow.chmod(slow.stat().st_mode | stat.S_IXUSR)
-    for compiler, words in (
-        ("nocc", "as there is no C compiler 'nocc': install one, or set CC"),
-        (str(slow), "more than 0.5 s to compile"),
-        ("cc '", 'as there is no C compiler "cc \'": install one, or set CC'),
-        ("false", "my_law.c does not compile, false says: it says nothing"),
-    ):
-        monkeypatch.setenv("CC", compiler)
-        with pytest.raises(smc.ScenarioError, match=words):
-            smc.exchange.law_from_c(file(MINE), timeout=0.5)
 
 
 def test_wrong_arguments_are_one_sentence(file):
@@ -608,30 +526,6 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
     assert tuple(re.findall(r"smc_real (\w+);", one)) == Measurement._fields
     assert tuple(re.findall(r"smc_real (\w+)\[", many)) == joint_law.ARRAYS
     assert len(Measurement._fields) == build.MEASUREMENT_SIZE
-
-
-@pytest.mark.slow
-def test_check_c_names_its_own_options(call, file):
-    wants = file(law("memory[20] = 1.0; out[0] = -gains[0] * y->e;"))
-    for words, said in (
-        (
-            (),
-            "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory",
-        ),
-        (
-            ("--memory", 21),
-            "fix it, or name all gains that it reads in smc_law_gains, or give --gains",
-        ),
-        (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "fix it, or give other --flag"),
-    ):
-        code, out, err = call("list", wants, *words)
-        assert (code, out) == (2, "")
-        assert err.endswith(f"{said}\n")
-    assert call("list", wants, "--memory", 21, "--gains", "k=2")[0] == 0
-    assert (
-        "did not end within 3 s: fix what it waits for, or give --timeout\n"
-        in call("list", file(WAITS), "--timeout", 3)[2]
-    )
 
 
 def test_nothing_is_left_behind(file):

@@ -23,10 +23,8 @@ from helpers.pages import ROOT  # noqa: E402
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
 from smc_mujoco.control.law import catalogue  # noqa: E402
-from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_PER_SPEED, RATE  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
 from smc_mujoco.exchange.c import export as c_export  # noqa: E402
-from smc_mujoco.exchange.fmu import description, export  # noqa: E402
 
 pytestmark = needs_compiler
 
@@ -129,13 +127,6 @@ def test_an_fmu_gives_the_bits_of_a_run(combined, folder, one):
     assert ("v" in fmu.at) == (one[2] == "measured")
 
 
-def test_all_surfaces_and_estimators_are_among_the_combinations():
-    assert {one[1] for one in COMBINED} >= {
-        n for n, s in SURFACES.items() if s.relative_degree == 1
-    }
-    assert {one[2] for one in COMBINED} >= set(estimator.catalogue())
-
-
 @pytest.mark.slow
 def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
     one = ("observer_free_third", None, "extended_state_observer")
@@ -175,20 +166,6 @@ def test_the_sources_compile_without_a_warning(twisting, folder):
         [*build.compiler(), *flags], cwd=files, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_an_fmu_holds_no_python_and_no_path_of_this_machine(twisting, folder):
-    again = smc.exchange.law_to_fmu(
-        "super_twisting", folder / "again.fmu", surface="integral", velocity="levant", u_max=3.0
-    )
-    assert again.read_bytes() == twisting[0].read_bytes()
-    with zipfile.ZipFile(again) as archive:
-        (library,) = (name for name in archive.namelist() if name.startswith("binaries/"))
-        needed = subprocess.run(
-            ["ldd", archive.extract(library, folder)], capture_output=True, text=True, check=True
-        )
-        assert "python" not in needed.stdout
-        assert b"smc_mujoco-" not in archive.read(library)  # the folder in which it was compiled
 
 
 @pytest.mark.slow
@@ -250,22 +227,6 @@ def test_a_state_that_was_saved_is_come_back_to(twisting):
     fmu.fmu.freeFMUState(saved)
 
 
-def test_the_memory_is_seen_and_can_be_set_before_the_start(combined, folder):
-    path = combined["pid", None, "measured"][0]
-    fmu = Importer(path, folder / path.stem)
-    slots = [name for name in fmu.at if "memory" in name]
-    assert slots == ["law.memory[1]", "law.memory[2]", "law.memory[3]"]
-    fmu.step(0.0, x=0.5)
-    fmu.step(1e-3, x=0.5)
-    assert fmu.get("law.memory[1]") != [0.0]
-    warm = Importer(path, folder / path.stem, **{"law__memory[2]": 0.25})
-    cold = Importer(path, folder / path.stem)
-    assert warm.step(0.0, x=0.1) != cold.step(0.0, x=0.1)
-    with pytest.raises(Exception, match="fmi3SetFloat64"):
-        warm.set(**{"law__memory[1]": 0.0})
-    assert "law.memory[1] cannot be set now" in warm.said[-1]
-
-
 # parameters
 
 
@@ -288,18 +249,6 @@ def test_gains_are_in_their_order_and_change_while_it_runs(folder):
     assert fmu.step(2e-3)[0] == -0.25
     fmu.set(u_max=sys.float_info.max)
     assert fmu.step(3e-3)[0] == u
-
-
-def test_each_component_has_gains_of_its_own(folder):
-    """Law and surface of the same name of a gain, c, which only the surface's value of decides."""
-    path = smc.exchange.law_to_fmu(
-        "super_twisting", folder / "two.fmu", surface=smc.surface("linear", c=3.0)
-    )
-    fmu = Importer(path, folder / "two")
-    assert fmu.get("law.c", "surface.c") == [2.5, 3.0]
-    assert fmu.step(0.0, x=0.5)[1] == 1.5
-    fmu.set(surface__c=1.0, law__c=7.0)
-    assert fmu.step(1e-3, x=0.5)[1] == 0.5
 
 
 @pytest.mark.parametrize(
@@ -430,19 +379,6 @@ def test_an_input_that_is_not_finite_ends_it_with_the_time(folder):
     fmu.step(0.0, x=0.1)
 
 
-def test_a_token_of_another_fmu_is_refused(twisting):
-    files = twisting[1]
-    Importer(*twisting)
-    about = fmpy.read_model_description(str(files))
-    about.guid = "{another}"
-    said = []
-    with pytest.raises(Exception, match="Failed to instantiate"):
-        fmpy.simulation.instantiate_fmu(
-            str(files), about, "CoSimulation", logger=lambda *words: said.append(words[-1])
-        )
-    assert said == [b"the instantiation token is that of another FMU"]
-
-
 # the example
 
 
@@ -474,17 +410,6 @@ def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
 
 
 # description
-
-
-def test_units_have_names_and_base_units():
-    for unit, joint, name, base in (
-        (RATE, "hinge", "1/s", {"s": -1}),
-        (FORCE_PER_SPEED, "hinge", "N.m.s/rad", {"kg": 1, "m": 2, "s": -1, "rad": -1}),
-        (FORCE_PER_SPEED, "slide", "N.s/m", {"kg": 1, "s": -1}),
-        (FORCE_PER_ROOT, "slide", "N.s^0.5/m^0.5", None),
-    ):
-        assert description.unit_name(unit, joint) == name
-        assert description.base_units(unit, joint) == base
 
 
 def test_the_units_are_those_of_the_scenario_s_joint(folder):
@@ -536,23 +461,3 @@ def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
             call()
         assert "\n" not in str(error.value)
         assert list(tmp_path.iterdir()) == []
-
-
-def test_without_a_compiler_the_cure_is_said(tmp_path, monkeypatch):
-    monkeypatch.setenv("CC", "nocc")
-    with pytest.raises(
-        smc.ScenarioError,
-        match=r"no C compiler 'nocc': install one, set CC, or leave the binary out",
-    ):
-        smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu")
-    assert smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu", binary=False).exists()
-
-
-def test_a_compiler_that_does_not_end_is_not_a_missing_one(tmp_path, monkeypatch):
-    slow = tmp_path / "slow"
-    slow.write_text("#!/bin/sh\nexec sleep 60\n")
-    slow.chmod(0o755)
-    monkeypatch.setenv("CC", str(slow))
-    monkeypatch.setattr(export, "COMPILE_TIMEOUT", 0.1)
-    with pytest.raises(smc.ScenarioError, match=r"slow takes more than 0\.1 s to compile the FMU"):
-        smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu")

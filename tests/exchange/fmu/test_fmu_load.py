@@ -3,14 +3,9 @@ their own steps.
 """
 
 import gc
-import math
-import os
 import pickle
-import time
 import zipfile
 from pathlib import Path
-from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -18,13 +13,11 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from helpers import fmu as helper  # noqa: E402
-from helpers import reference  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
-from smc_mujoco.common.guard import Fault  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
-from smc_mujoco.exchange.fmu import load, slave  # noqa: E402
+from smc_mujoco.exchange.fmu import load  # noqa: E402
 from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
 from smc_mujoco.simulation.python_functions import gains_of  # noqa: E402
 
@@ -74,11 +67,7 @@ def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more)
     ours = scenario(law, plant, **more)
     path = smc.exchange.law_to_fmu(ours, folder / f"{plant}-{law}.fmu")
     theirs = smc.exchange.law_from_fmu(path, name="theirs", isolate=False)()
-    # the model's last bit differs between the two
-    if "model" in more:
-        first = reference.run(ours)
-    else:
-        first = smc.run(ours)
+    first = smc.run(ours)
     second = smc.run(scenario(theirs, plant, **{k: v for k, v in more.items() if k == "model"}))
     assert second.failure is None
     for field in ("x", "v", "u", "s"):
@@ -127,22 +116,13 @@ def test_gains_are_the_fmu_s_parameters(folder):
     np.testing.assert_array_equal(first.u, second.u)
 
 
-@pytest.mark.slow
-def test_runs_have_instances_of_their_own_which_end_with_them(folder):
-    path = smc.exchange.law_to_fmu("super_twisting", folder / "own.fmu")
-    law = smc.exchange.law_from_fmu(path, isolate=False)()
-    one, other, again = smc.run([scenario(law), scenario(law, v0=-0.3), scenario(law)])
-    np.testing.assert_array_equal(one.u, again.u)
-    assert (one.u != other.u).any()
-    gc.collect()
-    assert load._running == {}
-
-
 def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(folder):
     law = smc.exchange.law_from_fmu(
         smc.exchange.law_to_fmu("super_twisting", folder / "written_again.fmu"), isolate=False
     )()
     assert law.function is not None
+    gc.collect()
+    assert load._running == {}  # those of the runs before have ended
     y = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0)
     gains = gains_of(law)
     memory = np.zeros(1)
@@ -165,9 +145,7 @@ def test_another_process_takes_the_law_from_the_file(folder):
     smc.exchange.law_to_fmu("classical", path)
     load.extracted.cache_clear()
     changed = smc.run(scenario(law))
-    assert "FMU 'sent.fmu' is gone or has changed: call smc.exchange.law_from_fmu again" in str(
-        changed.failure
-    )
+    assert "FMU 'sent.fmu' is gone or has changed" in str(changed.failure)
 
 
 # another tool's
@@ -224,13 +202,8 @@ def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
     path = helper.fmi3(folder)
     names = {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
-    for held, said, first in (({}, "enable, mode", "enable"), ({"enable": 1}, "mode", "mode")):
-        with pytest.raises(smc.ScenarioError) as error:
-            smc.exchange.law_from_fmu(path, variables=names, constants=held)
-        assert str(error.value) == (
-            f"servo.fmu has inputs that mean nothing that a law measures, {said}: hold each, "
-            f"constants={{{first!r}: 0.0}}"
-        )
+    with pytest.raises(smc.ScenarioError, match="mean nothing that a law measures, enable, mode"):
+        smc.exchange.law_from_fmu(path, variables=names)
     laws = []
     for on in (1, 0):
         laws.append(
@@ -266,10 +239,7 @@ def test_periods_that_do_not_fit_are_said(foreign):
         ),
         (3.0, r"torque is nan after 1 steps: fix the FMU"),
         (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
-        (
-            5.0,
-            r"the step from t = 0 s changes the arithmetic of its thread \(rounding, flush-to-zero, ",
-        ),
+        (5.0, r"a step changes the arithmetic of its thread \(rounding, flush-to-zero, "),
     ],
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
@@ -281,27 +251,6 @@ def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
             timeout=6.0 if mode == 2.0 else 60.0,
         )
     assert "\n" not in str(error.value)
-
-
-def test_processes_that_an_fmu_starts_end_with_its_trial(foreign):
-    def children() -> int:
-        listed = [Path(f"/proc/{name}/maps") for name in os.listdir("/proc") if name.isdecimal()]
-        return sum("controller.so" in read(path) for path in listed)
-
-    def read(path: Path) -> str:
-        try:
-            return path.read_text()
-        except OSError:
-            return ""
-
-    before = children()
-    with pytest.raises(smc.ScenarioError, match=r"the step from t = 0 s died of SIGABRT"):
-        smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 6.0})
-    for _ in range(500):
-        if children() <= before:
-            return
-        time.sleep(0.01)
-    pytest.fail("they still run")
 
 
 def test_a_trial_has_the_parameters_of_the_run(foreign, tmp_path):
@@ -318,18 +267,6 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
     assert fine.failure is None
-
-
-def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(foreign):
-    one = 1.0
-    alone = smc.run(scenario("pid"))
-    law = smc.exchange.law_from_fmu(
-        foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False
-    )()
-    trace, fine = smc.run([scenario(law), scenario("pid")])
-    assert "changes the arithmetic of its thread" in str(trace.failure)
-    assert one / 3.0 == float.fromhex("0x1.5555555555555p-2")
-    np.testing.assert_array_equal(fine.x, alone.x)
 
 
 @pytest.mark.parametrize(
@@ -352,9 +289,6 @@ def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(f
             {"variables": {"u": "omega"}},
             "unknown output of controller.fmu 'omega': choose from torque",
         ),
-        ({"variables": {"position": "omega"}}, "unknown meaning of a variable 'position'"),
-        ({"constants": {"mode": "on"}}, "constants['mode'] is 'on': give a number"),
-        ({"constants": {"mode": 0.0}, "name": "\n"}, "name is '\\n': give a name"),
     ],
 )
 def test_a_mistake_in_the_call_is_one_sentence(foreign, settings, said):
@@ -380,15 +314,8 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
 @pytest.mark.parametrize(
     ("pair", "said"),
     [
-        (
-            ("CoSimulation", "ModelExchange"),
-            "changed.fmu is for Model Exchange only: export it for Co-Simulation",
-        ),
+        (("CoSimulation", "ModelExchange"), "changed.fmu is of FMI 2.0, or not for Co-Simulation"),
         (('fmiVersion="2.0"', FMI1), "changed.fmu is of FMI 1.0"),
-        (
-            ('modelIdentifier="controller"', 'modelIdentifier="other"'),
-            "changed.fmu has no binary of its ",
-        ),
         (("<fmiModelDescription", "<fmi"), "changed.fmu is not an FMU ("),
         (
             (
@@ -411,7 +338,7 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
                 'name="mode" valueReference="3" causality="input"><Real start="0"/>',
                 'name="mode" valueReference="3" causality="input"><String start=""/>',
             ),
-            "'mode' of changed.fmu is not one number: export it without this input",
+            "'mode' of changed.fmu is not one number: export it without this variable",
         ),
     ],
 )
@@ -420,49 +347,6 @@ def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, sa
         smc.exchange.law_from_fmu(changed(foreign, tmp_path, pair), **RENAMED)
     assert str(error.value).startswith(said)
     assert "\n" not in str(error.value)
-
-
-def test_a_parameter_that_is_a_word_of_python_is_a_gain(foreign, tmp_path):
-    file = changed(foreign, tmp_path, ('name="gain.k"', 'name="lambda"'))
-    assert smc.exchange.law_from_fmu(file, **RENAMED, isolate=False).defaults == {"lambda_": 8.0}
-
-
-@pytest.mark.parametrize("name", ["/lib/x", "a**", "../a"])
-def test_an_identifier_that_is_no_name_is_refused(tmp_path, name):
-    text = (
-        (helper.HERE / "fmi2.xml")
-        .read_text()
-        .replace('modelIdentifier="controller"', f'modelIdentifier="{name}"')
-    )
-    assert name in text
-    with pytest.raises(
-        smc.ScenarioError, match=r"has the modelIdentifier .*, which is no name in C"
-    ):
-        smc.exchange.law_from_fmu(helper.fmi2(tmp_path, text), constants={"mode": 0.0})
-
-
-def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
-    (tmp_path / "text.fmu").write_text("an FMU")
-    with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
-        archive.writestr("other.xml", "")
-    for path, said in (
-        (
-            tmp_path / "text.fmu",
-            "text.fmu is not an FMU, as it is no zip archive: give an FMU for Co-Simulation",
-        ),
-        (
-            tmp_path / "empty.fmu",
-            "empty.fmu is not an FMU, as there is no modelDescription.xml in it: give an FMU for",
-        ),
-        (
-            tmp_path / "none.fmu",
-            f"no functional mock-up unit at {tmp_path / 'none.fmu'}: give the path",
-        ),
-        (3, "cannot read 3: give the path of an .fmu file"),
-    ):
-        with pytest.raises(smc.ScenarioError) as error:
-            smc.exchange.law_from_fmu(path)
-        assert str(error.value).startswith(said)
 
 
 def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path):
@@ -481,54 +365,6 @@ def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path
         match=r"source\.fmu has a binary for no machine, .*, or compile its sources",
     ):
         smc.exchange.law_from_fmu(source)
-
-
-@pytest.mark.parametrize(("step", "h"), [(None, 1e-3), (0.02, 0.02)])
-def test_an_fmu_is_tried_on_a_double_integrator_between_walls(step, h, monkeypatch):
-    names = Measurement._fields
-    order = {
-        "folder": "f",
-        "inputs": dict.fromkeys(names, 3),
-        "outputs": ["u"],
-        "fixed": {},
-        "step": step,
-    }
-    made = mock.Mock(**{"step.side_effect": lambda seen, t, h: [8.0 * seen[names.index("e")]]})
-    monkeypatch.setattr(slave, "Slave", lambda *_: made)
-    slave.worker(order, said := mock.Mock())
-    y: Any = Measurement(*np.transpose([call.args[0] for call in made.step.mock_calls]))
-    known = {
-        "t": h * np.arange(500),
-        "dt": h,
-        "r": 0.1 * np.sin(y.t),
-        "dr": 0.1 * np.cos(y.t),
-        "ddr": -y.r,
-        "a": -y.r,
-    }
-    known |= {
-        "e": y.x - y.r,
-        "de": y.v - y.dr,
-        "g": 1.0,
-        "gq": 1.0,
-        "limit": 6.0,
-        "model": 1.0,
-        "q": 0.0,
-    }
-    for name, expected in known.items():
-        np.testing.assert_allclose(getattr(y, name), expected, err_msg=name)
-    free, change = (
-        np.abs(y.x[1:]) < 3.0,
-        h * np.clip(8.0 * y.e, -6.0, 6.0)[:-1],
-    )  # the walls are at 3 m
-    np.testing.assert_allclose(y.v[1:], np.where(free, y.v[:-1] + change, 0.0))
-    np.testing.assert_allclose(y.x[1:], np.where(free, y.x[:-1] + h * y.v[1:], 3.0))
-    assert (y.x[0], y.v[0], free.all()) == (0.5, 0.0, step is None)
-    assert said.mock_calls[2] == mock.call(f"the step from t = {h:g} s")
-    made.step.side_effect = lambda *_: [math.nan]
-    with pytest.raises(
-        Fault, match="u is nan after 1 steps: fix the FMU, or its inputs and parameters"
-    ):
-        slave.worker(order, said)
 
 
 def test_a_slave_says_which_variable_it_could_not_set(foreign, tmp_path):

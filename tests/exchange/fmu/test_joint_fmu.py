@@ -145,13 +145,6 @@ def other_words(y, gains, memory):
     return inertia(y, -y.e), y.e
 
 
-def test_what_a_function_reads_is_an_input_whatever_it_calls_the_measurement(folder):
-    path = smc.exchange.law_to_fmu(
-        other_words, folder / "words.fmu", joints=2, model="nominal", binary=False
-    )
-    assert "M[1,2]" in {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
-
-
 def test_gains_and_bounds_are_those_of_the_joints_and_change_while_it_runs(made, folder):
     path, trace = made["computed_torque_sliding"]
     fmu = Importer(path, folder / "computed_torque_sliding")
@@ -260,15 +253,6 @@ def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch
         call()
     assert "\n" not in str(error.value)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_it_is_no_law_of_one_channel(made):
-    said = (
-        r"unit_vector\.fmu has inputs that mean nothing that a law measures, x\[1\], x\[2\], x\[3\]"
-    )
-    with pytest.raises(smc.ScenarioError, match=said) as error:
-        smc.exchange.law_from_fmu(made["unit_vector"][0])
-    assert "\n" not in str(error.value)
 
 
 def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
