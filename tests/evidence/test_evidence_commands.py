@@ -133,7 +133,7 @@ def audited(about, ids, sets, quick, threads, report):
     report(1, 2)
     save = lambda path: path  # noqa: E731
     claims = Claims(one for one in CLAIMS if one.id in (ids or "34"))
-    return SimpleNamespace(claims=claims, paper=about, save=save, badge=save)
+    return SimpleNamespace(claims=claims, paper=about, save=save)
 
 
 def repeated(name):
@@ -168,7 +168,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.audit.evidence.check": {
             "paper": {"authors": "A. B and others", "title": "C" * 90},
             "counts": {"supported": 2},
-            "quick": True,
         },
     },
     "report": {
@@ -236,33 +235,33 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "audit(a Paper gaber, ['3'], ['study', 'tuned'], True, 2, report=",
             "reached 1 of 2",
             "whose the paper's, abstract: by eq. 3",
-            "verdict refuted, flips",
+            "verdict ○ refuted, flips",
             "study gains: supported",
             "✓ duffing: settling time, s 2.5 < 4",
             "✗ largest step of u",
             "1.25 <= 1",
             "TV rate 12.5",
             "instead It rests. (smc-mujoco certify)",
-            "○ 1 refuted (1 of all depends on the gains)",
+            "○ 1 refuted; depend on the gains: 1",
             "quick: coarser grids",
         ],
     ),
-    "claims --mutants --evidence e.json --badge b.svg": (
+    "claims --mutants --evidence e.json": (
         1,
         [
             "audit(a Paper gaber, None, None, False, None",
             "survivors(a Paper gaber, None, None, False, None",
             "id study tuned",
-            "3 ● ○ it settles ○ refuted, flips; the paper's, abstract",
+            "3 ● ○ it settles ○ refuted, flips with the gains; the paper's, abstract",
             "= 1.25 (<= 1 asked)",
             "4 – – it is calm – not testable; the paper's Nothing says how.",
             "claim 3 is kept",
-            "wrote e.json, b.svg",
+            "wrote e.json",
         ],
     ),
     "claims 5 --quick": (
         0,
-        ["audit(a Paper gaber, ['5'], None, True, None", "one set of gains of 3"],
+        ["audit(a Paper gaber, ['5'], None, True, None", "fewer sets of gains"],
     ),
     "claims 4 --json --quick": (
         0,
@@ -281,7 +280,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "check(Path(e.json))",
             "wrote mine/claims.py",
             "the seal is whole: A. B and others, C",
-            ": 2 supported, in a quick audit",
+            ": 2 supported",
         ],
     ),
     "report --paper gaber --quick --threads 2": (
@@ -406,4 +405,4 @@ def test_a_terminal_shows_a_claim_s_id_in_cyan_and_a_refuted_one_in_red(full, id
     tables.print_claims(CLAIMS[:1], console, full)
     text = console.export_text(styles=True)
     assert f"\x1b[{id}\x1b[0m" in text
-    assert f"\x1b[{verdict}refuted, flips" in text
+    assert f"\x1b[{verdict}○ refuted, flips" in text

@@ -44,11 +44,6 @@ class Audit:
     ]  # claim -> set of gains -> run's key -> run that it used
     sealable: bool  # whether all runs were made here, none taken from a table
 
-    @property
-    def name(self) -> str:
-        """The paper's name, and that the audit was quick."""
-        return self.paper.name + ", quick audit" * self.quick
-
     def save(self, path: str | Path) -> Path:
         """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict,
         sealed by a hash.
@@ -64,12 +59,6 @@ class Audit:
         from smc_mujoco.evidence.audit import evidence
 
         return write_json(with_ending(path, ".json"), evidence.document(self))
-
-    def badge(self, path: str | Path) -> Path:
-        """Write a badge, an .svg file with the number of claims by verdict."""
-        from smc_mujoco.evidence.audit.figure import save_badge
-
-        return save_badge(self.name, self.claims, path)
 
     def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
         """Draw every check as a multiple of its threshold, a row for each claim; options as of

@@ -1,7 +1,4 @@
-"""The figure of an audit, and its badge, an SVG file with the number of the paper's own sentences
-by verdict.
-
-The figure shows how far every check is from its threshold, a row for each claim.
+"""The figure of an audit: how far every check is from its threshold, a row for each claim.
 
     audit("levant_1993").figure("checks.pdf")
 
@@ -13,27 +10,19 @@ at the edge.
 import math
 import os
 from collections.abc import Sequence
-from html import escape
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
-from smc_mujoco.evidence.audit.verdict import ANSWERS, MARKS, VERDICTS, Check, Claim, totals
+from smc_mujoco.evidence.audit.verdict import ANSWERS, MARKS, VERDICTS, Check, Claim
 
-COLOURS = dict(
-    zip(VERDICTS, ("#2b7a3d", "#8a6100", "#b3322b", "#6a6a6a", "#6a6a6a"), strict=True)
-)  # white on each: 5:1
+COLOURS = dict(zip(VERDICTS, ("#2b7a3d", "#8a6100", "#b3322b", "#6a6a6a", "#6a6a6a"), strict=True))
 COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # answers to questions
-LABEL_COLOUR = "#444"
-HEIGHT, FONT_SIZE, MARGIN = 20, 11, 6  # px
-FONT = "Verdana,Geneva,DejaVu Sans,sans-serif"
 ROW_HEIGHT = 26.0  # points on a full page, height of a claim's row
 MAX_DECADES = 3.0  # on each side of 1
 SETS_SHARE = 0.5  # share of a row's height over which its sets of gains are spread
@@ -132,35 +121,3 @@ def place(check: Check) -> float:
     if not (0.0 < over < math.inf and 0.0 < under < math.inf):
         return edge
     return min(max(math.log10(over / under), -MAX_DECADES), MAX_DECADES)
-
-
-def save_badge(name: str, claims: Sequence[Claim], path: str | Path) -> Path:
-    """Write the badge of a paper to an .svg file, and return its path."""
-    path = with_ending(path, ".svg")
-    with replacing(path) as file:
-        file.write_text(badge(name, claims), encoding="utf-8")
-    return path
-
-
-def badge(name: str, claims: Sequence[Claim]) -> str:
-    """Return the badge: the paper's name, and a field for each verdict that some sentence of the
-    paper has.
-    """
-    fields = [(f"claims of {name}", LABEL_COLOUR)]
-    for verdict, count in totals(claims).items():
-        fields.append((f"{count} {verdict.removesuffix(' supported')}", COLOURS[verdict]))
-    about = escape(f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}")
-    parts = []
-    x = 0
-    for text, colour in fields:
-        length = style.width(text, FONT_SIZE)  # DejaVu Sans is as wide as Verdana
-        width = round(length + 2 * MARGIN)
-        place = f'x="{x + width / 2:g}" y="14" textLength="{length:.0f}" lengthAdjust="spacingAndGlyphs"'
-        parts.append(f'<rect x="{x}" width="{width}" height="{HEIGHT}" fill="{colour}"/>')
-        parts.append(f"<text {place}>{escape(text)}</text>")
-        x += width
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{x}" height="{HEIGHT}" role="img" aria-label="{about}">'
-        f'<title>{about}</title><g fill="#fff" text-anchor="middle" font-family="{FONT}" font-size="{FONT_SIZE}">'
-        f"{''.join(parts)}</g></svg>\n"
-    )

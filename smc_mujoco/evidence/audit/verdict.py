@@ -253,6 +253,21 @@ class Claim(Statement):
     verdicts: dict[str, str]  # set of gains -> verdict
     flips: bool  # whether the verdict depends on the set
 
+    @property
+    def parts(self) -> dict[str, str]:
+        """What a reader is told of it beside the numbers, without what it lacks."""
+        parts = {
+            "whose": ": ".join(filter(None, (self.source, self.how))),
+            "kind": self.quantifier,
+            "gains": f"{self.over} gains that the paper allows" if self.over else "",
+            "measured": self.measured,
+            "holds if": self.holds_if,
+            "note": self.note,
+        }
+        if self.instead and self.verdict != SUPPORTED:
+            parts["instead"] = f"{self.instead} ({self.shown_by})"
+        return {name: text for name, text in parts.items() if text}
+
     def checks(self, gains: str) -> list[Check]:
         """Return the checks under a set of gains."""
         return [Check(what, **numbers) for what, numbers in self.numbers[gains].items()]
@@ -274,33 +289,6 @@ class Claim(Statement):
             return str(check)
         width = f" +- {check.limit:g}" if check.limit else ""
         return f"{what} = {measured(self.beside[gains][what], what)} ({middle}{width} asked)"
-
-    def _repr_html_(self) -> str:
-        lines = []
-        for name in self.verdicts:
-            for check in self.checks(name):
-                value, limit = (measured(size, check.what) for size in (check.value, check.limit))
-                lines.append(
-                    (
-                        name,
-                        "✓" if check.holds else "✗",
-                        check.what,
-                        value,
-                        f"{check.relation} {limit}",
-                    )
-                )
-        about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
-        note = ". ".join(
-            filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note))
-        )
-        return html.table(
-            ("gains", "", "measured", "value", "asked"),
-            lines,
-            about,
-            note,
-            range(3, 5),
-            max_rows=24,
-        )
 
 
 class Claims(list[Claim]):

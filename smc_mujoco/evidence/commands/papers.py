@@ -7,7 +7,6 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
-from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
@@ -38,9 +37,6 @@ def claims(
     evidence: Annotated[
         Path | None,
         typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
-    ] = None,
-    badge: Annotated[
-        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge of the verdicts.")
     ] = None,
     mutants: Annotated[
         bool, typer.Option("--mutants", help="List claims that no broken law loses.")
@@ -74,20 +70,10 @@ def claims(
 
     Example: smc-mujoco claims --new my_paper
 
-    Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
+    Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json
     """
     if papers or new or check:
-        audited = (
-            "ids",
-            "gains",
-            "quick",
-            "paper",
-            "json",
-            "evidence",
-            "badge",
-            "mutants",
-            "threads",
-        )
+        audited = ("ids", "gains", "quick", "paper", "json", "evidence", "mutants", "threads")
         options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
         _papers(papers, new, check)
         return
@@ -104,27 +90,22 @@ def claims(
     sets = None if gains is None else options.names(gains)
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")
-    writable(evidence and with_ending(evidence, ".json"), badge and with_ending(badge, ".svg"))
+    writable(evidence and with_ending(evidence, ".json"))
     asked = about, ids or None, sets, quick, threads
     with bar("claims", counted=True) as drawn:
         done = audit(*asked, report=drawn.reached)
-    written = []
-    for path in (evidence and done.save(evidence), badge and done.badge(badge)):
-        if path:
-            written.append(path)
+    if evidence:
+        evidence = done.save(evidence)
     if json:
         print(document(done.claims))
         return
     tables.print_claims(done.claims, terminal, full=bool(ids))
     kept = mutants and _kept(done, asked, terminal)
-    one = len({name for claim in done.claims for name in claim.verdicts}) == 1 < len(about.sets)
-    less = (
-        "quick: coarser grids than the claims say"
-        + f", and one set of gains of {len(about.sets)}" * one
-    )
-    notes = [f"{terminal.seconds:.0f} s", less * quick]
-    notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
-    terminal.note("; ".join(filter(None, notes)), "dim")
+    terminal.note(f"{terminal.seconds:.0f} s", "dim")
+    if quick:
+        terminal.note("quick: coarser grids than the claims say, and fewer sets of gains", "dim")
+    if evidence:
+        terminal.wrote(evidence)
     if kept:
         raise SystemExit(1)
 
@@ -163,15 +144,10 @@ def _papers(listed: bool, new: Path | None, check: Path | None) -> None:
         data = evidence.check(check)
         counts = ", ".join(f"{count} {verdict}" for verdict, count in data["counts"].items())
         about = f"{data['paper']['authors']}, {data['paper']['title']}"
-        quick = ", in a quick audit" if data["quick"] else ""
-        terminal.note(f"the seal is whole: {about}: {counts}{quick}", wrap=True)
-    if not listed:
-        return
-    lines = {
-        name: f"{known.authors}: {known.title} ({known.contents})"
-        for name, known in paper.papers().items()
-    }
-    rows = []
-    for name, line in lines.items():
-        rows.append((name, tables.with_package(line, paper.catalogue().package(name))))
-    terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
+        terminal.note(f"the seal is whole: {about}: {counts}", wrap=True)
+    if listed:
+        rows = []
+        for name, known in paper.papers().items():
+            line = f"{known.authors}: {known.title} ({known.contents})"
+            rows.append((name, tables.with_package(line, paper.catalogue().package(name))))
+        terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))

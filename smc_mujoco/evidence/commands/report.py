@@ -40,7 +40,7 @@ def report(
     it again.
 
     With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html,
-    evidence.json, badge.svg and checks.svg.
+    evidence.json and checks.svg.
 
     Example: smc-mujoco report --quick --out look
 

@@ -15,7 +15,7 @@ from rich.text import Text
 from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.text import capital, number
 from smc_mujoco.evidence.audit import verdict as verdicts
-from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measured
 from smc_mujoco.evidence.certificates.certificate import Certificate
 from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.evidence.rigs.identify import Identified
@@ -25,6 +25,7 @@ from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 # questions have their own.
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
+CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REFUTED])}
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 
@@ -51,37 +52,39 @@ def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
     else:
         console.print(_claims_overview(claims))
     flips = sum(claim.flips for claim in claims)
-    if flips:
-        depend = f" ({flips} of all depend{'s' * (flips == 1)} on the gains)"
-    else:
-        depend = ""
-    console.print(Text(capital(verdicts.summary(claims)) + depend), highlight=False)
+    totals = f"{capital(verdicts.summary(claims))}; depend on the gains: {flips}"
+    console.print(Text(totals), highlight=False)
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:
     """Return a table of claims: verdicts by set of gains, the words, and the check that decides for
     the last set.
     """
-    sets = list(claims[0].verdicts) if claims else []
-    shown = sets if len(sets) > 1 else []
-    if sets:
-        words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains"
-    else:
-        words = "claim"
-    columns = [
-        Column("id", justify="right", style="cyan"),
-        *(Column(name, justify="center") for name in shown),
-        words,
-    ]
-    table = titled("", *columns, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    sets = list(claims[0].verdicts)
+    columns = [Column("id", justify="right", style="cyan")]
+    for name in sets:
+        columns.append(Column(name, justify="center"))
+    words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains"
+    table = titled("", *columns, words, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
     for claim in claims:
-        marks = [MARKS[claim.verdicts[name]] for name in shown]
-        verdict = f"{claim.verdict}{', flips' * claim.flips}", COLOURS[claim.verdict]
+        marks = [MARKS[claim.verdicts[name]] for name in sets]
         lines = Text.assemble(
-            (claim.text, "bold"), "\n", MARKS[claim.verdict], " ", verdict, f"; {claim.source}\n"
+            (claim.text, "bold"),
+            "\n",
+            (_verdict(claim), COLOURS[claim.verdict]),
+            f"; {claim.source}\n",
+            (claim.decided(sets[-1]), "dim"),
         )
-        table.add_row(claim.id, *marks, lines.append(claim.decided(sets[-1]), "dim"))
+        table.add_row(claim.id, *marks, lines)
     return table
+
+
+def _verdict(claim: Claim) -> str:
+    """Return a claim's verdict with its mark, and whether it flips."""
+    mark = f"{verdicts.MARKS[claim.verdict]} {claim.verdict}"
+    if claim.flips:
+        return f"{mark}, flips with the gains"
+    return mark
 
 
 def _print_claim(claim: Claim, console: Console) -> None:
@@ -92,39 +95,20 @@ def _print_claim(claim: Claim, console: Console) -> None:
         Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim"))
     )
     about = plain(Column(style="dim"), "")
-    lost = claim.verdict != verdicts.SUPPORTED
-    parts = {
-        "whose": claim.source + (f": {claim.how}" if claim.how else ""),
-        "kind": claim.quantifier,
-        "gains": f"{claim.over} gains that the paper allows" if claim.over else "",
-        "measured": claim.measured,
-        "holds if": claim.holds_if,
-        "note": claim.note,
-        "instead": f"{claim.instead} ({claim.shown_by})" if lost and claim.instead else "",
-        "verdict": Text(
-            f"{claim.verdict}{', flips with the gains' * claim.flips}",
-            f"bold {COLOURS[claim.verdict]}",
-        ),
-    }
-    for label, text in parts.items():
-        if text:
-            about.add_row(label, Text(text) if isinstance(text, str) else text)
+    for label, text in claim.parts.items():
+        about.add_row(label, Text(text))
+    about.add_row("verdict", Text(_verdict(claim), f"bold {COLOURS[claim.verdict]}"))
     console.print(Padding(about, (0, 0, 1, 2)))
     for name, verdict in claim.verdicts.items():
         columns = "", "", Column(justify="right"), ""
         title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
         table = plain(*columns, title=title, title_justify="left")
         for check in claim.checks(name):
-            if check.holds:
-                mark = Text("✓", COLOURS[verdicts.SUPPORTED])
-            else:
-                mark = Text("✗", COLOURS[verdicts.REFUTED])
-            limit = f"{check.relation} {verdicts.measured(check.limit, check.what)}"
-            table.add_row(mark, Text(check.what), verdicts.measured(check.value, check.what), limit)
+            limit = f"{check.relation} {measured(check.limit, check.what)}"
+            value = measured(check.value, check.what)
+            table.add_row(CHECKED[check.holds], Text(check.what), value, limit)
         for what, value in claim.beside[name].items():
-            table.add_row(
-                "", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), ""
-            )
+            table.add_row("", Text(what, "dim"), Text(measured(value, what), "dim"), "")
         console.print(Padding(table, (0, 0, 1, 2)))
 
 

@@ -1,4 +1,4 @@
-"""The audit of one paper as one HTML file, with its evidence, badge and figure beside it.
+"""The audit of one paper as one HTML file, with its evidence and figure beside it.
 
 report("levant_1993", "levant")      # levant/report.html, which needs no other file, no network
 """
@@ -27,8 +27,8 @@ def report(
     threads: int | None = None,
     progress: bool = False,
 ) -> Path:
-    """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and
-    checks.svg beside it.
+    """Audit a paper and write its report, out/report.html, with evidence.json and checks.svg
+    beside it.
     """
     if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
@@ -39,7 +39,6 @@ def report(
         done = audit(paper, quick=quick, threads=threads, report=shown.reached)
     document = evidence.document(done)
     write_json(folder / "evidence.json", document)
-    done.badge(folder / "badge.svg")
     done.figure(folder / "checks.svg")
     about = done.paper
     read = [

@@ -202,18 +202,13 @@ def test_evidence_of_a_table_or_under_another_ending_is_refused(folder, done, tm
     assert evidence.document(audit(folder, only=["2"]))["left_out"] == ["1"]
 
 
-# figure, badge and table
+# figure and table
 
 
 def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
     (head,) = done.figure(tmp_path / "checks.svg", size=(9.0, 6.0)).legends
     assert head.get_title().get_text() == "Claims of A. Nobody: Small"
     assert (tmp_path / "checks.svg").is_file()
-    assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == figure.badge(
-        "small", done.claims
-    )
-    quick = dataclasses.replace(done, quick=True).badge(tmp_path / "quick.svg")
-    assert quick.read_text(encoding="utf-8") == figure.badge("small, quick audit", done.claims)
     assert done._repr_html_() == done.claims._repr_html_()
 
 
@@ -231,28 +226,20 @@ def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_anothe
 # the command
 
 
-def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_path):
-    files = tmp_path / "evidence.json", tmp_path / "badge.svg"
-    words = [
-        "claims",
-        "--paper",
-        str(folder),
-        "--evidence",
-        str(files[0]),
-        "--badge",
-        str(files[1]),
-    ]
+def test_the_command_writes_evidence_and_checks_the_seal(folder, tmp_path):
+    file = tmp_path / "evidence.json"
+    words = ["claims", "--paper", str(folder), "--evidence", str(file)]
     written = CliRunner().invoke(main.app, words)
     assert written.exit_code == 0, written.output
     assert "the law is calm" in written.stdout
-    assert all(file.is_file() for file in files)
+    assert file.is_file()
     asked = CliRunner().invoke(main.app, ["claims", "1", "--paper", str(folder), "--mutants"])
     assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), (
         asked.output
     )
     without = CliRunner().invoke(main.app, ["claims", "2", "--paper", str(folder), "--mutants"])
     assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
-    checked = CliRunner().invoke(main.app, ["claims", "--check", str(files[0])])
+    checked = CliRunner().invoke(main.app, ["claims", "--check", str(file)])
     assert "the seal is whole: A. Nobody, Small: 1 refuted" in " ".join(checked.stdout.split())
     listed = CliRunner().invoke(main.app, ["claims", "--papers"])
     assert "gaber" in listed.stdout

@@ -2,7 +2,6 @@
 few real ones.
 """
 
-import itertools
 import json
 import math
 import re
@@ -130,9 +129,7 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
 
     What is measured at several places is told by its mean, its ends and their number.
     """
-    monkeypatch.setattr(
-        measured, "nanoseconds", lambda laws, quick: {law: 1.0 + len(law) for law in laws}
-    )
+    monkeypatch.setattr(measured, "nanoseconds", lambda laws: {law: 1.0 + len(law) for law in laws})
 
     def told(s: Scenario) -> dict[str, float]:
         found = lots(s, *(m.name for m in metrics()))
@@ -433,9 +430,7 @@ def test_the_plane_shows_a_rise_of_v_if_there_is_one(rate, expected, monkeypatch
 def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
     """Claim 14; another may be slower."""
     told = {OURS: time, CLASSICAL: 1.0}
-    monkeypatch.setattr(
-        measured, "nanoseconds", lambda laws, quick: dict.fromkeys(laws, 9.0) | told
-    )
+    monkeypatch.setattr(measured, "nanoseconds", lambda laws: dict.fromkeys(laws, 9.0) | told)
     assert judged(Stub(), "14") == expected
 
 
@@ -694,44 +689,3 @@ def test_a_broken_law_loses_its_claims():
     ids = ["29", "35", "38", "45", "50", "57"]
     runs = Runs(GABER, "study", substitute={OURS: lambda law: variant(law, "reversed")})
     assert {id: judged(runs, id) for id in ids} == dict.fromkeys(ids, REFUTED)
-
-
-def test_the_timed_loop_calls_a_law_with_each_state_and_its_four_arrays(monkeypatch):
-    monkeypatch.setattr("numba.njit", lambda loop: loop)
-    seen = np.zeros(len(measured.FIELD_INDEX))
-    calls = []
-    monkeypatch.setattr(measured, "call", lambda *given: calls.append([*given, *seen[[e, de]]]))
-    e, de = (measured.FIELD_INDEX[name] for name in ("e", "de"))
-    measured._loop.__wrapped__()(
-        5, seen, np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([6, 7, 8, 9])
-    )
-    assert calls == [[5, 6, 7, 8, 9, 0.1, 0.2], [5, 6, 7, 8, 9, 0.3, 0.4]]
-
-
-def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkeypatch):
-    """A clock that ticks 3 s in the first round and 1 s from then on, and a law that is not called."""
-    ticks = itertools.accumulate([0.0, *[3.0] * 3, *[1.0] * 999])
-    seen = []
-    monkeypatch.setattr(measured, "perf_counter", lambda: next(ticks))
-    monkeypatch.setattr(
-        measured, "_loop", lambda: lambda *given: seen.append([np.copy(one) for one in given[1:3]])
-    )
-    laws = {name: smc.law(name) for name in (OURS, CLASSICAL)}
-    for quick, rounds in ((False, 60), (True, 20)):
-        assert measured.nanoseconds(laws, quick=quick) == {
-            OURS: 5e4,
-            CLASSICAL: 5e4,
-        }  # 1 s of 20,000 calls
-        assert len(seen) == 2 * rounds
-        seen.clear()
-    measured.nanoseconds(laws, quick=True)
-    sample, states = seen[0]
-    assert {name: sample[measured.FIELD_INDEX[name]] for name in ("dt", "g", "limit", "model")} == {
-        "dt": 1e-3,
-        "g": 8.0,
-        "limit": 6.0,
-        "model": 0.0,
-    }
-    assert states.shape == (20_000, 2)
-    np.testing.assert_allclose(np.diff(states[:, 0]) / 1e-3, states[:-1, 1], atol=0.01)
-    assert states[:, 0].max() == pytest.approx(0.3, rel=1e-3)

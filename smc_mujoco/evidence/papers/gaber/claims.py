@@ -9,19 +9,17 @@ way up the network's pendulums are nor how strongly they are coupled: a claim on
 it holds on both networks of the study.
 """
 
-import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from time import perf_counter
 from types import SimpleNamespace
 
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory
+from smc_mujoco.analysis.law_time import law_time
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
 from smc_mujoco.analysis.ranking import RELEVANT
-from smc_mujoco.common.jit import call
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import estimator
@@ -35,7 +33,7 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
-from smc_mujoco.simulation import cfunctions
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 
 OURS, CLASSICAL, ADAPTIVE, HOSMC = LAWS  # the paper's law, and those that it compares
@@ -356,13 +354,6 @@ MEASURES = (  # sentence, name, metric, condition
     ("smoothness", "TV rate", "tv_rate", "nominal"),
     ("robustness", "steady error under d", "steady_error", "constant"),
 )
-CALLS, TIMED_ROUNDS, QUICK_TIMED_ROUNDS = 20_000, 60, 20  # of the law's C function alone
-FIELD_INDEX = {name: i for i, name in enumerate(Measurement._fields)}
-FIXED_FIELDS = {
-    "dt": 1e-3,
-    "g": 8.0,
-    "limit": 6.0,
-}  # what a pendulum's sample holds besides the state; no model
 GENERAL_LAWS = (CLASSICAL, ADAPTIVE, HOSMC, CONDITIONED, "boundary_layer")
 
 
@@ -444,59 +435,21 @@ def synchronises(runs):
     return checks
 
 
-def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str, float]:
-    """Return the least time per call of each law's C function, ns, on states that vary from call to
-    call.
+def nanoseconds(laws: Mapping[str, Component]) -> dict[str, float]:
+    """Return the time of each law's compiled code a sample, ns, on what it measures in a run.
 
-    Rounds of the laws are interleaved, and the least time counts, since other processes can only
-    add to it. Only ratios within one call mean anything. benchmarks/laws.py measures the whole
-    sample, with reading and logging.
+    Only ratios within one call mean anything.
     """
-    t = np.arange(CALLS) * 1e-3
-    states = np.column_stack([0.3 * np.sin(7 * t), 2.1 * np.cos(7 * t)])
-    # kept alive while their addresses are used
-    functions = {name: cfunctions.compile_component(law) for name, law in laws.items()}
-    shortest = dict.fromkeys(laws, np.inf)
-    loop = _loop()
-    for _ in range(QUICK_TIMED_ROUNDS if quick else TIMED_ROUNDS):
-        for name, law in laws.items():
-            seen = np.zeros(len(FIELD_INDEX))
-            gains = np.array([*law.gains.values(), 0.0])
-            for field, value in FIXED_FIELDS.items():
-                seen[FIELD_INDEX[field]] = value
-            arrays = seen, gains, np.zeros(law.memory), np.zeros(2)
-            addresses = np.array([a.ctypes.data for a in arrays])
-            start = perf_counter()
-            loop(functions[name].address, seen, states, addresses)
-            shortest[name] = min(shortest[name], perf_counter() - start)
-    return {name: 1e9 * seconds / CALLS for name, seconds in shortest.items()}
-
-
-@functools.cache
-def _loop() -> Callable:
-    """Return a compiled loop that calls a law once per state."""
-    from numba import njit
-
-    e = FIELD_INDEX["e"]
-    de = FIELD_INDEX["de"]
-
-    @njit
-    def loop(function, seen, states, addresses):
-        for k in range(len(states)):
-            seen[e], seen[de] = states[k, 0], states[k, 1]
-            call(function, addresses[0], addresses[1], addresses[2], addresses[3])  # pyright: ignore[reportCallIssue] an intrinsic
-
-    loop(
-        0, np.zeros(len(FIELD_INDEX)), np.zeros((0, 2)), np.zeros(4, np.int64)
-    )  # compiles, and calls nothing
-    return loop
+    times = {}
+    for name, law in laws.items():
+        timed = law_time(Scenario(plant="inverted_pendulum", law=law))
+        times[name] = 1e9 * timed.median if timed else math.nan
+    return times
 
 
 def simple(runs):
     """Claim 14: low complexity."""
-    spent = nanoseconds(
-        {name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL_LAWS)}, quick=runs.quick
-    )
+    spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL_LAWS)})
     others = {f"that of {name}": ratio(spent[OURS], spent[name]) for name in GENERAL_LAWS}
     return {
         "time per sample / that of the fastest other law": max(others.values()),

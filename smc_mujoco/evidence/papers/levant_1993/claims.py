@@ -38,7 +38,7 @@ def sweep(runs):
     if runs.quick:
         plants, starts = (runs.plants[:1], starts[:1])
     else:
-        plants, starts = (runs.plants, starts)
+        plants = runs.plants
     scenarios = []
     for plant in plants:
         for h in values["periods"]:
