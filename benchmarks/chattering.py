@@ -96,7 +96,7 @@ def main() -> None:
         amplitude, frequency = loop.cycle()
         if not frequency > SLOWEST:
             continue
-        cycle = smc.chattering(scenario(loop))
+        cycle = smc.design.chattering(scenario(loop))
         none += not cycle
         rows.append(
             (

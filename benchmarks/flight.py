@@ -22,6 +22,7 @@ from typing import Any
 from families import leads
 
 import smc_mujoco as smc
+from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.report.flight import CONDITIONS
 
 FAMILIES = {
@@ -37,7 +38,7 @@ def conditions() -> list[Any]:
     return ["nominal", *(smc.condition(name, **fields) for name, fields in CONDITIONS.items())]
 
 
-def twins() -> list[smc.Law]:
+def twins() -> list[Law]:
     """Return two laws with their default gains, and each without its idea.
 
     `quaternion_sliding` has a line of the same slope in place of each tanh, which below 90 degrees

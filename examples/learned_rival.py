@@ -28,6 +28,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv
 
 import smc_mujoco as smc
+from smc_mujoco.control.law import Law
 
 PLANT, CONDITIONS = "inverted_pendulum", ["nominal", "noise", "constant", "sine", "coulomb"]
 RIVALS = ["pd_observer", "adrc", "mpc", "super_twisting", "pid"]
@@ -115,7 +116,7 @@ class Training(VecEnv):
         return [False] * COPIES
 
 
-def law_of(layers: list[tuple[np.ndarray, np.ndarray]], name: str) -> smc.Law:
+def law_of(layers: list[tuple[np.ndarray, np.ndarray]], name: str) -> Law:
     """Return a trained network as a law that compiles.
 
     It acts without chance; its memory is what the policy saw.

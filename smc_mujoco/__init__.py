@@ -13,20 +13,24 @@ take.
 The names by task, those of a first script first; `help(smc.run)` tells what a name does:
 
     Run and look: Scenario, run, Trace, load, score, figure, plot, film, show, view
-    Laws: law, laws, law_function, Measurement, law_from
+    Laws: law, laws, law_function, law_from
     Plants: plant, plants, plant_from, Channel
-    Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder, Backlash,
-    DCMotor, Lag Compare: compare, which, tune, margins, grid, study, leaderboard, Table More to run
-    and to look at: stream, scores, Scene, play, ScenarioError Surfaces, estimators, policies:
-    surface, surface_function, estimator, estimator_function, Law, policy Machines: Plant, Contact,
-    rig, rigs, identify Signals and time: Signal, Push, Jump, Clock Analyse: accuracy, basin,
-    chattering, worst_case, sensitivity, Uncertainty Audit: audit, claims, certify, report
+    Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder,
+        Backlash, DCMotor, Lag
+    Compare: compare, which, tune, margins, grid, study, leaderboard, Table
+    More to run and to look at: stream, scores, Scene, play, ScenarioError
+    Surfaces, estimators, policies: surface, surface_function, estimator, estimator_function,
+        policy
+    Machines: Contact, rig, rigs, identify
+    Signals and time: Signal, Jump, Clock
+    Analyse: worst_case, sensitivity, Uncertainty
     Benchmark: problem, results
 
-What is needed less often is in modules: `smc.signals` (paths, gusts, series), `smc.hardware` (more
-friction, servos), `smc.design` (gains from theory), `smc.fidelity`, `smc.metrics` (of joints and
-tips), `smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents),
-`smc.errors` (warnings) and `smc.paper`.
+What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, series),
+`smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
+attraction), `smc.audits` (claims of papers, certificates, orders of accuracy, the report),
+`smc.fidelity`, `smc.metrics` (of joints and tips), `smc.exchange` (laws from and to C and FMUs),
+`smc.envs` (environments for agents), `smc.errors` (warnings) and `smc.paper`.
 
 `__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that
 importing the package costs nothing. Types that are only returned are in their modules, such as

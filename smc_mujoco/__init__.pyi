@@ -1,4 +1,5 @@
 import smc_mujoco.evidence.papers.gaber.scenarios
+from smc_mujoco import audits as audits
 from smc_mujoco import design as design
 from smc_mujoco import envs as envs
 from smc_mujoco import errors as errors
@@ -7,9 +8,7 @@ from smc_mujoco import fidelity as fidelity
 from smc_mujoco import hardware as hardware
 from smc_mujoco import metrics as metrics
 from smc_mujoco import signals as signals
-from smc_mujoco.analysis.chattering import chattering as chattering
 from smc_mujoco.analysis.margins import margins as margins
-from smc_mujoco.analysis.region_of_attraction import basin as basin
 from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty as Uncertainty
 from smc_mujoco.benchmark.problem import problem as problem
@@ -19,8 +18,6 @@ from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.control.estimator import estimator as estimator
 from smc_mujoco.control.estimator import estimator_function as estimator_function
 from smc_mujoco.control.from_text import law as law
-from smc_mujoco.control.law import Law as Law
-from smc_mujoco.control.law import Measurement as Measurement
 from smc_mujoco.control.law import law_function as law_function
 from smc_mujoco.control.law import laws as laws
 from smc_mujoco.control.surface import surface as surface
@@ -30,11 +27,6 @@ from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import film as film
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.draw.studio import view as view
-from smc_mujoco.evidence.accuracy.accuracy import accuracy as accuracy
-from smc_mujoco.evidence.audit.audit import audit as audit
-from smc_mujoco.evidence.audit.audit import claims as claims
-from smc_mujoco.evidence.certificates.maker import certify as certify
-from smc_mujoco.evidence.report import report as report
 from smc_mujoco.evidence.rigs.identify import identify as identify
 from smc_mujoco.evidence.rigs.rig import rig as rig
 from smc_mujoco.evidence.rigs.rig import rigs as rigs
@@ -49,7 +41,6 @@ from smc_mujoco.mechanisms.hardware.drives import Lag as Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder as Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb as Coulomb
 from smc_mujoco.mechanisms.hardware.friction import Viscous as Viscous
-from smc_mujoco.mechanisms.plant import Plant as Plant
 from smc_mujoco.mechanisms.plant import plant as plant
 from smc_mujoco.mechanisms.plant import plants as plants
 from smc_mujoco.metrics.catalogue import score as score
@@ -64,7 +55,6 @@ from smc_mujoco.simulation.signals import Clock as Clock
 from smc_mujoco.simulation.signals import Constant as Constant
 from smc_mujoco.simulation.signals import Jump as Jump
 from smc_mujoco.simulation.signals import Noise as Noise
-from smc_mujoco.simulation.signals import Push as Push
 from smc_mujoco.simulation.signals import Signal as Signal
 from smc_mujoco.simulation.signals import Sine as Sine
 from smc_mujoco.simulation.signals import Step as Step

@@ -292,7 +292,11 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
-    "smc.report('r', quick=True)": ["a report", "jinja2", "pip install 'smc-mujoco[report]'"],
+    "smc.audits.report('r', quick=True)": [
+        "a report",
+        "jinja2",
+        "pip install 'smc-mujoco[report]'",
+    ],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }
 

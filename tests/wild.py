@@ -15,6 +15,7 @@ import numpy as np
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import shown
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import NAMED, find_condition
 
 ARM = """<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0" damping="0.1"/>
@@ -310,7 +311,7 @@ def signal(random: Random) -> smc.Signal:
             return smooth(random)
 
 
-def plant(random: Random) -> smc.Plant:
+def plant(random: Random) -> Plant:
     """A plant, of networks 2 to 4 channels, some parameters wild; now and then a user's own."""
     if random.random() < 0.1:
         Path("arm.xml").write_text(ARM)
@@ -371,7 +372,7 @@ def law(random: Random) -> Any:
 
 def factors(random: Random, plant: Any) -> dict[str, float]:
     """Factors on parameters that the plant has, now and then on one that it lacks."""
-    if isinstance(plant, smc.Plant) and random.random() < 0.98:
+    if isinstance(plant, Plant) and random.random() < 0.98:
         known = [*plant.parameters, "mass"]
     else:
         known = ["mass", "no"]
@@ -429,12 +430,12 @@ def fields(random: Random) -> dict[str, Any]:
         where = value(random)
     else:
         where = plant(random)
-    n = where.n if isinstance(where, smc.Plant) else 1
-    if isinstance(where, smc.Plant):
+    n = where.n if isinstance(where, Plant) else 1
+    if isinstance(where, Plant):
         offered = [*where.contacts, "none"]
     else:
         offered = ["none"]
-    if isinstance(where, smc.Plant):
+    if isinstance(where, Plant):
         builds = [*where.mechanisms, "equation"]
     else:
         builds = ["equation"]
@@ -511,7 +512,7 @@ def gridded(random: Random, fields: dict[str, Any]) -> list[smc.Scenario]:
         mine = smc.condition("wild", **left)
     else:
         mine = find_condition(ours)
-    around = starts(random, fields["plant"].n if isinstance(fields["plant"], smc.Plant) else 1)
+    around = starts(random, fields["plant"].n if isinstance(fields["plant"], Plant) else 1)
     way = random.randrange(3)
     if way == 0 and left:
         condition = mine + find_condition(ours)

@@ -31,7 +31,8 @@ TASKS = re.compile(
 SHELVES = {  # module of public names -> title of its page
     "signals": "References and disturbances",
     "hardware": "Real mechanisms",
-    "design": "Gains from theory",
+    "design": "Gains from theory, chattering, regions of attraction",
+    "audits": "Audits, certificates, orders of accuracy",
     "fidelity": "Fidelity",
     "metrics": "Scores of joints and tips",
     "exchange": "Laws from and to C and FMUs",

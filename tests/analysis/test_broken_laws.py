@@ -15,7 +15,7 @@ def late(y, gains, memory):
 
 
 QUESTIONS = {
-    "basin": lambda law: smc.basin("duffing", law, points=(3, 3), duration=2.0),
+    "basin": lambda law: smc.design.basin("duffing", law, points=(3, 3), duration=2.0),
     "margins": lambda law: smc.margins("duffing", law, kinds="delay", quick=True),
     "worst_case": lambda law: smc.worst_case(
         smc.Scenario(plant="duffing", law=law, duration=1.0),

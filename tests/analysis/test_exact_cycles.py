@@ -75,7 +75,7 @@ def test_a_limit_cycle_with_default_steps_is_that_of_the_machine(name):
 @pytest.mark.parametrize("name", VECTORS)
 def test_the_predicted_ranges_hold_the_limit_cycle_of_the_machine(name):
     loop, amplitude, frequency = VECTORS[name]
-    cycle = smc.chattering(scenario(loop))
+    cycle = smc.design.chattering(scenario(loop))
     assert cycle.amplitude_range[0] <= amplitude <= cycle.amplitude_range[1]
     assert cycle.frequency_range[0] <= frequency <= cycle.frequency_range[1]
 
@@ -108,7 +108,7 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
     """
     held = []
     for loop, amplitude, frequency in itertools.islice(loops(2), 20):
-        cycle = smc.chattering(scenario(loop))
+        cycle = smc.design.chattering(scenario(loop))
         (low, high), (slow, fast) = cycle.amplitude_range, cycle.frequency_range
         held.append((low <= amplitude <= high, slow <= frequency <= fast))
     assert (np.sum(held, axis=0) >= 18).all()

@@ -77,7 +77,7 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     assert both.chattering.amplitude_range[1] <= 5e-3
     assert both.chattering.frequency <= wanted
     gains = dict(both.law.gains) | {"k": 1.01 * both.law.gains["k"]}
-    larger = smc.chattering(smc.law("classical", **gains), plant="duffing", **fields)
+    larger = smc.design.chattering(smc.law("classical", **gains), plant="duffing", **fields)
     assert larger.amplitude_range[1] > 5e-3 or larger.frequency > wanted
     assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
 

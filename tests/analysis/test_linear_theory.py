@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import steady_error
 
 H = 1e-3  # s, control period
@@ -21,9 +23,7 @@ PLANTS = [smc.plant(name) for name in scenarios.PLANTS]
 each_plant = pytest.mark.parametrize("plant", PLANTS, ids=lambda p: p.name)
 
 
-def growth(
-    plant: smc.Plant, lam: float, k1: float, control_period: float, periods: int = 0
-) -> float:
+def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: int = 0) -> float:
     """Return the growth per period of the loop with a delay of whole control periods, in the end:
     stable below 1.
 
@@ -45,12 +45,12 @@ def growth(
     return largest
 
 
-def own(plant: smc.Plant, name: str = "observer_free") -> smc.Law:
+def own(plant: Plant, name: str = "observer_free") -> Law:
     return gains.law(plant.name, name, "study")
 
 
 def from_near_rest(
-    plant: smc.Plant, law: smc.Law, delay: float = 0.0, duration: float = 24.0
+    plant: Plant, law: Law, delay: float = 0.0, duration: float = 24.0
 ) -> np.ndarray:
     """|x| of the worst channel at the samples, after a push that leaves every mode moving."""
     x0 = [SMALL * x for x in plant.x0]

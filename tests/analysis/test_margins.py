@@ -13,6 +13,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.mechanisms.plant import Plant
 
 margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
 
@@ -271,7 +272,7 @@ MOTORS = (
 def poles(tmp_path):
     """A function that makes a plant of two poles whose motors are of unlike strength."""
 
-    def make(rest="", channels=("a", "b")) -> smc.Plant:
+    def make(rest="", channels=("a", "b")) -> Plant:
         path = tmp_path / f"{'tied' if rest else 'free'}.xml"
         path.write_text(POLES.format(motors=MOTORS, rest=rest))
         return smc.plant_from(path, channels)

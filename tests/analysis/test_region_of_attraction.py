@@ -11,15 +11,16 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
+from smc_mujoco.control.law import Law
 
-# smc.basin is the function
+# smc.design.basin is the function
 maps = importlib.import_module("smc_mujoco.analysis.region_of_attraction")
 
 PENDULUM = smc.plant("inverted_pendulum")
 WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere
 
 
-def base(plant: str, law: smc.Law, duration: float = 6.0) -> smc.Scenario:
+def base(plant: str, law: Law, duration: float = 6.0) -> smc.Scenario:
     return smc.Scenario(plant=plant, law=law, duration=duration, integrator="implicitfast")
 
 

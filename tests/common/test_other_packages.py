@@ -393,7 +393,7 @@ if __name__ == "__main__":
     here = smc.study(runs, "here")
     assert there.data.drop(["hash"]).equals(here.data.drop(["hash"]))
     print(len(here), len(smc.study(runs, "here")))
-    print([claim.verdict for claim in smc.claims(paper="my_paper")])
+    print([claim.verdict for claim in smc.audits.claims(paper="my_paper")])
 """
 
 

@@ -19,7 +19,7 @@ def trace():
 
 
 def test_a_blow_and_a_payload_are_marked_and_named(trace):
-    push = smc.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
+    push = smc.signals.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
     hit = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, disturbance=push))
     page = figure([hit])
     shown = page.axes[:3]
@@ -30,7 +30,7 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     ]
     assert [text.get_text() for ax in shown for text in ax.texts] == ["blow of 50 N for 20 ms"]
     assert all([0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines] for ax in shown)
-    push = smc.Push("link5", y=30.0, z=40.0, time=0.001, width=0.02)
+    push = smc.signals.Push("link5", y=30.0, z=40.0, time=0.001, width=0.02)
     picked = smc.Scenario(
         plant="panda",
         law="none",

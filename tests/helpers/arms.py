@@ -4,6 +4,7 @@ import functools
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import FREE_BODY, joint_catalogue
+from smc_mujoco.mechanisms.plant import Plant
 
 # laws that an arm can have; those of a free body take parts of arrays, which have no translation
 # into C
@@ -36,7 +37,7 @@ ARM = """
 
 
 @functools.cache
-def arm() -> smc.Plant:
+def arm() -> Plant:
     """Three joints of two units, driven in another order than the model's, beside a tree without a
     channel.
     """

@@ -114,7 +114,7 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
 
 def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
     """A cart leans on a stop, whose reaction a trace has."""
-    push = smc.Push("cart", x=4.0, time=1.0, width=2.0)  # largest at 2 s; it is in d
+    push = smc.signals.Push("cart", x=4.0, time=1.0, width=2.0)  # largest at 2 s; it is in d
     pushed = {"feedforward": smc.Constant(4.0), "disturbance": (smc.Constant(4.0), push)}
     motor = smc.DCMotor(inductance=0.0)
     cart = smc.Scenario(
@@ -127,7 +127,7 @@ def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
 
 def test_contact_forces_know_a_push(pressed):
     """The wall is soft: at an unchanged depth, its force grows by at most a hundredth of the push."""
-    push = smc.Push("link7", x=30.0, time=0.5, width=0.1)
+    push = smc.signals.Push("link7", x=30.0, time=0.5, width=0.1)
     more = tip.contacts(changed(pressed, disturbance=push)).force - tip.contacts(pressed).force
     assert np.abs(np.delete(more, np.s_[500:601])).max() < 1e-9
     assert np.all(more[502:599] > 0.0)

@@ -228,7 +228,7 @@ def test_an_error_of_measurement_is_a_known_signal(refused):
 
 
 def test_a_push_is_on_a_body_that_has_a_name(refused):
-    refused(lambda: scenario(disturbance=smc.Push(3)))
+    refused(lambda: scenario(disturbance=smc.signals.Push(3)))
 
 
 def test_a_plant_keeps_a_positive_mass(refused):

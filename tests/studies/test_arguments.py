@@ -190,7 +190,7 @@ REFUSED = {
         {"needs": "two-gains", "laws": "pid"},
         {"laws": [LAW, LAW(k=2.0)]},
     ],
-    smc.accuracy: [
+    smc.audits.accuracy: [
         {"periods": [1e-3]},
         {"periods": [1e-3, 1e-3]},
         {"periods": [1e-3, 0.0]},
@@ -216,7 +216,7 @@ GIVEN = {
     smc.study: {"scenarios": [RUN], "out": "study"},
     smc.which: {"plant": "duffing"},
     smc.compare: {"laws": "classical", "plants": "duffing", "conditions": "nominal"},
-    smc.accuracy: {"laws": "classical", "plants": "duffing"},
+    smc.audits.accuracy: {"laws": "classical", "plants": "duffing"},
     smc.worst_case: {"scenario": RUN},
     smc.Scene: {"title": "Two", "conditions": {"nominal": {"a": RUN}}},
 }

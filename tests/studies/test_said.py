@@ -379,7 +379,7 @@ def test_an_accuracy_has_three_starts_at_five_periods_and_one_run_at_half_the_st
         lambda scenarios, threads, report: asked.append((scenarios, threads)) or {},
     )
     with pytest.raises(KeyError):  # no run was measured
-        smc.accuracy("classical", "duffing")
+        smc.audits.accuracy("classical", "duffing")
     (scenarios, threads), *_ = asked
     periods = [4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]
     runs = [(seed, period, min(period, 1e-3)) for seed in range(3) for period in periods] + [

@@ -80,7 +80,7 @@ class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 
     `chattering` bounds the predicted amplitude of the limit cycle of s of the first channel, in its
-    unit, in the first condition, see `smc.chattering`. None: chattering costs its variation only.
+    unit, in the first condition, see `smc.design.chattering`. None: chattering costs its variation only.
     """
 
     # names, or your own; each is one run of a candidate

@@ -71,7 +71,7 @@ def holds(name: str, margin: float) -> bool:
 class Certificate:
     """What is proven of a law on a plant.
 
-    `smc.certify` makes it, and a separate checker has accepted it.
+    `smc.audits.certify` makes it, and a separate checker has accepted it.
 
     Attributes:
       data: all of it, as in its file: plant, law, bounds of the disturbance, theorems with their

@@ -2,7 +2,7 @@
 can push.
 
     scenario = smc.Scenario(plant="duffing", law="observer_free")
-    certificate = smc.certify(scenario, within=smc.Uncertainty(disturbance=1.0))
+    certificate = smc.audits.certify(scenario, within=smc.Uncertainty(disturbance=1.0))
     certificate.bound                      # |x| in the end, m, under every |d| <= 1 N
     certificate.save("duffing.json")       # smc-mujoco certify --check duffing.json proves it again
 
@@ -63,7 +63,7 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
         with more than disturbances.
       MissingPackageError: python-flint is not installed.
     """
-    with extra("proof", "smc.certify"):
+    with extra("proof", "smc.audits.certify"):
         import flint  # noqa: F401
 
         from smc_mujoco.evidence.certificates import checker

@@ -510,7 +510,7 @@ LAGGED = Objective(conditions=(LAGGING,), duration=0.5)
 
 
 def predicted(tuned) -> float:
-    return smc.chattering(tuned.law, plant=tuned.plant, actuator=smc.Lag(0.01)).amplitude
+    return smc.design.chattering(tuned.law, plant=tuned.plant, actuator=smc.Lag(0.01)).amplitude
 
 
 @pytest.mark.slow

@@ -160,7 +160,7 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
 ):
     monkeypatch.setattr(tip, "knows_contacts", lambda scenario: True)
     monkeypatch.setattr(tip, "contacts", lambda trace: SimpleNamespace(push=20.0 * trace.x))
-    push = smc.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
+    push = smc.signals.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
     trace = machine(arms.arm(), "none", u_max=limits, reference=smc.Sine(0.3, 4.0), duration=0.3)
     trace = dataclasses.replace(
         trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)

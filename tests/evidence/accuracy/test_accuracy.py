@@ -1,4 +1,4 @@
-"""What `smc.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for
+"""What `smc.audits.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for
 every other one.
 """
 
@@ -23,7 +23,7 @@ def double_integrator():
 
 
 def defaults(names, **options):
-    return smc.accuracy(names, double_integrator(), gains="default", **SHORT | options)
+    return smc.audits.accuracy(names, double_integrator(), gains="default", **SHORT | options)
 
 
 @smc.law_function(gains={"k": 4.0, "c": 2.5}, accuracy={"s": 1, "e": 1})
@@ -50,7 +50,9 @@ def test_every_law_states_its_order_of_accuracy():
 @pytest.mark.slow
 def test_dry_friction_orders_the_laws_as_textbooks_do():
     laws = ["observer_free", "classical", "super_twisting", "twisting"]
-    table = smc.accuracy(laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1)
+    table = smc.audits.accuracy(
+        laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1
+    )
     assert [row.law for row in table] == [
         "super_twisting",
         "twisting",
@@ -107,7 +109,7 @@ def test_laws_that_fail_come_last_and_say_so():
 
 def test_theory_promises_nothing_behind_a_drive():
     drive = smc.condition("slow valve", actuator=smc.Lag(0.02))
-    row = smc.accuracy("twisting", "duffing", (4e-3, 2e-3), drive, seeds=1, duration=10.0)[0]
+    row = smc.audits.accuracy("twisting", "duffing", (4e-3, 2e-3), drive, seeds=1, duration=10.0)[0]
     assert row.e.theory is None
     assert "no promise behind a drive" in row.why
     assert abs(row.e.order) < 0.5, "the lag, not the period, sets the amplitude"
@@ -130,7 +132,7 @@ def test_every_period_has_every_start_and_one_run_more_has_half_the_step():
 
 
 def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
-    table = smc.accuracy(
+    table = smc.audits.accuracy(
         ["hierarchical"], "cart_pole", (4e-3, 2e-3), "nominal", seeds=2, duration=1.0
     )
     assert table[0].gains == "default"
@@ -145,7 +147,7 @@ def test_a_table_reads_as_text_html_data_and_file(tmp_path):
     plants = [double_integrator(), "van_der_pol"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        table = smc.accuracy(
+        table = smc.audits.accuracy(
             ["classical", "observer_free"], plants, (4e-3, 2e-3, 1e-3), seeds=2, duration=4.0
         )
     text = str(table)
@@ -180,7 +182,7 @@ def test_a_table_reads_as_text_html_data_and_file(tmp_path):
 )
 def test_what_cannot_be_measured_is_one_sentence(options, message):
     with pytest.raises(smc.ScenarioError, match=message):
-        smc.accuracy(**{"laws": "classical", "plants": "duffing"} | options)
+        smc.audits.accuracy(**{"laws": "classical", "plants": "duffing"} | options)
 
 
 def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(

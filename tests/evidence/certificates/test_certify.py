@@ -57,7 +57,7 @@ def certificate(plant, law="observer_free", disturbance=0.0, slope=None, gains="
         within = smc.Uncertainty(disturbance=disturbance, slope=slope)
     else:
         within = None
-    return smc.certify(scenario(plant, law, gains), within)
+    return smc.audits.certify(scenario(plant, law, gains), within)
 
 
 def refused(data):
@@ -106,11 +106,13 @@ def test_van_der_pol_has_no_global_theorem_but_a_region():
 
 def test_a_coupling_that_is_no_spring_fails_by_its_margin():
     network = smc.plant("inverted_pendulum_network", kc=-0.3)
-    made = smc.certify(smc.Scenario(plant=network, law=gain_sets.law(network, "observer_free")))
+    made = smc.audits.certify(
+        smc.Scenario(plant=network, law=gain_sets.law(network, "observer_free"))
+    )
     assert (made.stable, margins(made)["coupling"]) == (False, -0.3)
     real = scenario("pendulum_network", mechanism="springs")  # its torque is kc sin(x_j - x_i)
     z = np.linspace(0.1, 20.0, 1_000_001)
-    assert margins(smc.certify(real))["coupling"] == pytest.approx(
+    assert margins(smc.audits.certify(real))["coupling"] == pytest.approx(
         0.5 * (np.sin(z) / z).min(), rel=1e-8
     )
     assert certificate("pendulum_network").stable
@@ -121,7 +123,9 @@ def test_hanging_pendulums_need_more_than_their_weight_to_be_stable_from_everywh
     plant = smc.plant("pendulum_network")
     weight = math.prod(plant.parameters[name] for name in ("m", "grav", "l"))
     for lam, stable in ((0.9 * weight, False), (1.1 * weight, True)):
-        made = smc.certify(smc.Scenario(plant=plant, law=smc.law("observer_free", lam=lam, k1=5.0)))
+        made = smc.audits.certify(
+            smc.Scenario(plant=plant, law=smc.law("observer_free", lam=lam, k1=5.0))
+        )
         assert made.stable is stable
         assert (margins(made)["restoring"] < 0.0) is not stable
 
@@ -168,7 +172,7 @@ def test_classical_comes_to_rest_from_a_set_under_a_disturbance():
     assert (made.bound, made.stable) == (None, False)  # its own start lies outside
     assert made.sentences[2].startswith("proven by level sets")
     assert ("level sets", "end in |x| up to", 0.0, "rad") in made.ranges
-    near = smc.certify(
+    near = smc.audits.certify(
         scenario("inverted_pendulum", "classical", x0=0.07), smc.Uncertainty(disturbance=1.0)
     )
     assert near.bound == 0.0
@@ -177,7 +181,7 @@ def test_classical_comes_to_rest_from_a_set_under_a_disturbance():
 def test_a_law_as_strong_as_the_disturbance_reaches_nothing():
     within = smc.Uncertainty(disturbance=1.0)
     for law in (smc.law("classical", k=1.0), smc.law("terminal", k=1.0, bound=4.0)):
-        made = smc.certify(smc.Scenario(plant="duffing", law=law), within)
+        made = smc.audits.certify(smc.Scenario(plant="duffing", law=law), within)
         assert made.sentences[1] == "not proven by reaching: reaching"
 
 
@@ -186,7 +190,7 @@ def test_the_margin_of_a_set_is_that_of_its_weakest_place():
     """The weight is largest at pi/2, within the set; at its end the margin is 3.9 N m."""
     law = smc.law("classical", k=5.0, c=0.5)
     within = smc.Uncertainty(disturbance=1.0)
-    made = smc.certify(smc.Scenario(plant="inverted_pendulum", law=law), within)
+    made = smc.audits.certify(smc.Scenario(plant="inverted_pendulum", law=law), within)
     assert part(made.data, "reaching")["X"] > 3.0
     assert margins(made, "reaching")["reaching"] < 5.0 - 1.0 - 0.5 * 9.81 * 0.5
 
@@ -196,13 +200,13 @@ def test_levels_of_a_law_that_switches_fall_along_its_surface():
     """Where W is level far out, s = 0 leads nowhere: the outer level lies below."""
     law = smc.law("classical", k=5.0, c=0.3)
     within = smc.Uncertainty(disturbance=1.0)
-    assert smc.certify(smc.Scenario(plant="duffing", law=law), within).bound == 0.0
+    assert smc.audits.certify(smc.Scenario(plant="duffing", law=law), within).bound == 0.0
 
 
 def test_the_bound_is_that_of_the_inner_level_to_its_last_digit():
     plant = smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803)
     law = smc.law("classical", k=2.271, c=0.275)
-    assert smc.certify(smc.Scenario(plant=plant, law=law, x0=1.58)).bound == 0.0
+    assert smc.audits.certify(smc.Scenario(plant=plant, law=law, x0=1.58)).bound == 0.0
 
 
 def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
@@ -224,7 +228,7 @@ def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
 def test_what_has_no_theorem_is_one_sentence(changes, word):
     fields = {"plant": "duffing", "law": smc.law("observer_free", lam=6.0, k1=3.0)} | changes
     with pytest.raises(smc.ScenarioError, match=word) as said:
-        smc.certify(smc.Scenario(**fields))
+        smc.audits.certify(smc.Scenario(**fields))
     assert "\n" not in str(said.value)
 
 
@@ -696,7 +700,7 @@ def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d
 @pytest.mark.slow
 def test_region_of_van_der_pol_as_a_share_of_the_true_one():
     made = certificate("van_der_pol")
-    found = smc.basin("van_der_pol", scenario("van_der_pol").law, points=(8, 8))
+    found = smc.design.basin("van_der_pol", scenario("van_der_pol").law, points=(8, 8))
     x, v = np.meshgrid(found.x, found.v)
     inside = made.contains(x, v)
     assert inside.any()
@@ -709,7 +713,7 @@ def test_without_damping_no_bound_holds_from_everywhere():
     grow from 20.
     """
     free = smc.plant("inverted_pendulum", b=0.0)
-    made = smc.certify(smc.Scenario(plant=free, law=gain_sets.law(free, "observer_free")))
+    made = smc.audits.certify(smc.Scenario(plant=free, law=gain_sets.law(free, "observer_free")))
     x = np.array([10.0, 20.0])
     v = np.zeros(2)
     reached = [x for x, _ in steps(made, x, v, lambda t, x, v: np.sign(v), 20.0)]
@@ -765,7 +769,7 @@ def test_no_run_contradicts_a_certificate(law):
         d0 = round(rng.uniform(0.01, 0.5), 3)
         one = smc.Scenario(plant=plant, law=smc.law(law, **gains), duration=40.0, x0=0.05)
         try:
-            made = smc.certify(one, smc.Uncertainty(disturbance=d0, slope=3.0 * d0))
+            made = smc.audits.certify(one, smc.Uncertainty(disturbance=d0, slope=3.0 * d0))
         except smc.ScenarioError:  # the gains are too small
             continue
         told = list(claims(made, d0))
@@ -821,8 +825,8 @@ def test_the_command_proves_writes_and_checks(tmp_path, monkeypatch, capsys):
 
 def test_without_python_flint_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "flint", None)
-    with pytest.raises(smc.ScenarioError, match=r"smc.certify needs .*smc-mujoco\[proof\]"):
-        smc.certify(scenario("duffing"))
+    with pytest.raises(smc.ScenarioError, match=r"smc.audits.certify needs .*smc-mujoco\[proof\]"):
+        smc.audits.certify(scenario("duffing"))
 
 
 if __name__ == "__main__":

@@ -404,7 +404,7 @@ def refused(**changes):
     """What is said of a scenario that no theorem is about."""
     fields = {"plant": "duffing", "law": smc.law("observer_free", lam=6.0, k1=3.0)} | changes
     with pytest.raises(smc.ScenarioError) as error:
-        smc.certify(smc.Scenario(**fields))
+        smc.audits.certify(smc.Scenario(**fields))
     return str(error.value)
 
 
@@ -442,7 +442,7 @@ def test_what_no_theorem_is_about_is_named(changes, what):
 )
 def test_what_is_no_class_or_scenario_is_named(given, within, words):
     with pytest.raises(smc.ScenarioError, match=words):
-        smc.certify(given or smc.Scenario(plant="duffing", law="observer_free"), within)
+        smc.audits.certify(given or smc.Scenario(plant="duffing", law="observer_free"), within)
 
 
 @pytest.mark.parametrize(

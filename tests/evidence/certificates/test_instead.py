@@ -39,7 +39,7 @@ def told(command):
         within = smc.Uncertainty(disturbance=d0)
     else:
         within = None
-    made = smc.certify(smc.Scenario(plant=plant, law=law), within)
+    made = smc.audits.certify(smc.Scenario(plant=plant, law=law), within)
     margins = {number(one.margin) for one in made.conditions}
     return margins | {number(value) for _, _, value, _ in made.ranges} | {str(d0)}
 
@@ -106,7 +106,7 @@ def test_the_series_of_order_7_falls_where_claim_55_says():
 
 def test_the_share_of_van_der_pol_s_map_is_that_of_its_certificate():
     pytest.importorskip("flint")
-    made = smc.certify(
+    made = smc.audits.certify(
         smc.Scenario(plant="van_der_pol", law=gain_sets.law("van_der_pol", "observer_free"))
     )
     x, v = np.meshgrid(

@@ -365,8 +365,8 @@ def test_other_uses_of_a_free_joint_are_refused(drone):
 @pytest.mark.parametrize("law", ["geometric", "pid"])
 def test_analyses_of_joints_refuse_a_free_body_whatever_the_law(drone, law):
     for ask in (
-        lambda: smc.basin(drone, law),
-        lambda: smc.chattering(smc.Scenario(plant=drone, law="geometric")),
+        lambda: smc.design.basin(drone, law),
+        lambda: smc.design.chattering(smc.Scenario(plant=drone, law="geometric")),
     ):
         with pytest.raises(
             ScenarioError, match=r"drone is a free body, .* is for joints: give another plant"

@@ -27,6 +27,7 @@ from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import UserModel
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
 from smc_mujoco.studies import run_key
 
@@ -71,25 +72,25 @@ def gym(name: str) -> Path:
     return installed("gymnasium", f"envs/mujoco/assets/{name}.xml")
 
 
-def cartpole() -> smc.Plant:
+def cartpole() -> Plant:
     return smc.plant_from(suite("cartpole"), {"slider": smc.Channel(partner="hinge_1")})
 
 
-def acrobot() -> smc.Plant:
+def acrobot() -> Plant:
     return smc.plant_from(suite("acrobot"), {"elbow": smc.Channel(partner="shoulder")})
 
 
-def both_links() -> smc.Plant:
+def both_links() -> Plant:
     return smc.plant_from(
         suite("acrobot"), {j: smc.Channel(motor=True) for j in ("shoulder", "elbow")}
     )
 
 
-def reacher() -> smc.Plant:
+def reacher() -> Plant:
     return smc.plant_from(gym("reacher"), ["joint0", "joint1"])
 
 
-def pusher() -> smc.Plant:
+def pusher() -> Plant:
     path = gym("pusher_v5")
     raw = mujoco.MjModel.from_xml_path(str(path))
     names = [name for i in range(raw.njnt) if (name := raw.joint(i).name).startswith("r_")]
@@ -107,7 +108,7 @@ def test_every_channel_has_the_unit_of_its_joint():
 def arm(tmp_path):
     """A function that writes an arm and makes a plant of it."""
 
-    def make(channels=("shoulder", "elbow"), rest=ACTUATED, bodies="", **given) -> smc.Plant:
+    def make(channels=("shoulder", "elbow"), rest=ACTUATED, bodies="", **given) -> Plant:
         path = tmp_path / "arm.xml"
         path.write_text(LINKS.format(rest=rest, bodies=bodies))
         return smc.plant_from(path, channels, **given)
@@ -115,14 +116,14 @@ def arm(tmp_path):
     return make
 
 
-def joints_of(plant: smc.Plant, raw: mujoco.MjModel) -> list:
+def joints_of(plant: Plant, raw: mujoco.MjModel) -> list:
     """The plant's channels in the model as its file has it."""
     assert isinstance(plant.build, UserModel)
     names = own_channels.joints_of(plant.build.channels)
     return [raw.joint(name) for name in names]
 
 
-def read(plant: smc.Plant) -> mujoco.MjModel:
+def read(plant: Plant) -> mujoco.MjModel:
     """The model as its file has it."""
     assert isinstance(plant.build, UserModel)
     return mujoco.MjModel.from_xml_path(plant.build.source.path)
@@ -678,7 +679,7 @@ def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
     assert "hierarchical" not in smc.laws(acrobot_alone())
 
 
-def acrobot_alone() -> smc.Plant:
+def acrobot_alone() -> Plant:
     return smc.plant_from(suite("acrobot"), {"elbow": None})
 
 
@@ -726,7 +727,7 @@ ELBOW = {"elbow": smc.Channel(partner="shoulder", partner_x0=3.0)}
 def bounded(arm, tmp_path):
     """A function that writes an arm whose elbow has a range, and makes a plant of it."""
 
-    def make(channels=("elbow",), more="", keyframe=None) -> smc.Plant:
+    def make(channels=("elbow",), more="", keyframe=None) -> Plant:
         arm(rest=ACTUATED + more)
         path = tmp_path / "arm.xml"
         path.write_text(path.read_text().replace('name="elbow"', 'name="elbow" range="-30 60"'))

@@ -7,12 +7,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
+from smc_mujoco.mechanisms.plant import Plant
 
 DURATION = 0.2
 PERIOD = 1e-3
 
 
-def exact(plant: smc.Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
+def exact(plant: Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
     """Positions at the samples, of x'' = f + g F and tau F' = u - F with commands that are held, to
     1e-12.
     """

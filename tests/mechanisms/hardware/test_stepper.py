@@ -370,7 +370,7 @@ REFUSED = {
     ),
     "prediction": (lambda: chattering(scenario(MOTOR, None, law="pid")), "measure it in a run"),
     "certificate": (
-        lambda: smc.certify(scenario(MOTOR, None, law="classical")),
+        lambda: smc.audits.certify(scenario(MOTOR, None, law="classical")),
         "no theorem for an acceleration",
     ),
     "both drives": (
@@ -402,14 +402,14 @@ TAKEN = {  # an analysis -> what it finds
         smc.margins("duffing", HELD, ["noise"], quick=True, condition="stepper")[0].value > 0.0
     ),
     "basin": lambda out: (
-        smc.basin(ON, HELD, (3, 3), duration=1.0, condition="stepper").outcome[1, 1] == 1
+        smc.design.basin(ON, HELD, (3, 3), duration=1.0, condition="stepper").outcome[1, 1] == 1
     ),
     "worst case": lambda out: (
         smc.worst_case(held(), within=smc.Uncertainty(disturbance=1.0), budget=8).value > 0.0
     ),
     "sensitivity": lambda out: "share" in str(smc.sensitivity(held(), points=8)),
     "order of accuracy": lambda out: (
-        smc.accuracy(HELD, ON, (2e-3, 1e-3), "stepper", 1, duration=0.5)[0].law == "pid"
+        smc.audits.accuracy(HELD, ON, (2e-3, 1e-3), "stepper", 1, duration=0.5)[0].law == "pid"
     ),
     "tuning": lambda out: (
         smc.tune(ON, "pid", conditions=["stepper"], budget=1, searches=1).objective > 0.0
