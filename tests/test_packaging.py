@@ -185,8 +185,8 @@ def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binar
     ("shell", "typed", "meant"),
     [
         ("bash", "smc-mujoco mar", "margins"),
-        ("zsh", "smc-mujoco accuracy duffing,van", "duffing,van_der_pol"),
-        ("fish", "smc-mujoco basin duffing --condition noise+enc", "noise+encoder"),
+        ("zsh", "smc-mujoco margins duffing,van", "duffing,van_der_pol"),
+        ("fish", "smc-mujoco chatter duffing --condition noise+enc", "noise+encoder"),
     ],
 )
 def test_a_shell_completes_commands_and_names(binaries, tmp_path, shell, typed, meant):

@@ -33,7 +33,7 @@ from smc_mujoco.exchange.c.export import law_to_c
 from smc_mujoco.mechanisms.plant import Plant, model_path
 from smc_mujoco.mechanisms.plant import catalogue as plants
 
-GAINS = re.compile(r"^Gains?: ", re.MULTILINE)
+GAINS = re.compile(r"(?:^|(?<=\. ))Gains?: ", re.MULTILINE)
 POWER = re.compile(r"\^(-?[\w./]+|\([^)]*\))")
 UNIT = re.compile(r"\s*\[([^\]]*)\]")
 HEADER_END = "#endif\n\n"  # of smc_law.h, before the law
@@ -523,25 +523,25 @@ def _capital(text: str, plant: Plant) -> str:
 
 
 def units(plant: Plant) -> list[str]:
-    """Return the unit of each parameter, from the comment beside or above them in the module that
-    has them.
+    """Return the unit of each parameter, from the comment beside, above or at the end of their
+    dictionary in the module that has them.
     """
     named = explained_by(plant) or plant
-    alike = (
-        one for one in plants().values() if one.parameters == named.parameters
-    )  # one may have another's
-    sources = (
-        inspect.getsource(sys.modules[one.build.__module__]).splitlines() for one in (named, *alike)
-    )
+    alike = [one for one in plants().values() if one.parameters == named.parameters]
     has = re.compile(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{").search
-    lines, at = next((lines, i) for lines in sources for i, line in enumerate(lines) if has(line))
-    above = list(
-        itertools.takewhile(lambda line: line.strip().startswith("#"), reversed(lines[:at]))
-    )
-    comment = lines[at].partition("#")[2] or " ".join(
-        line.partition("#")[2] for line in reversed(above)
-    )
-    return [unit.strip() for unit in comment.split(",") if unit.strip()]
+    for one in (named, *alike):  # one may have another's
+        lines = inspect.getsource(sys.modules[one.build.__module__]).splitlines()
+        for at, line in enumerate(lines):
+            if has(line):
+                above = itertools.takewhile(
+                    lambda text: text.strip().startswith("#"), reversed(lines[:at])
+                )
+                end = next(text for text in lines[at:] if "}" in text)
+                words = line.partition("#")[2] or end.partition("#")[2]
+                if not words:
+                    words = " ".join(text.partition("#")[2] for text in reversed([*above]))
+                return [unit.strip() for unit in words.split(",") if unit.strip()]
+    raise LookupError(f"no parameters of {plant.name}")
 
 
 def _parameters(plant: Plant) -> str:

@@ -32,7 +32,6 @@ GROUPS: dict[str, list[Callable[..., None]]] = {
         analysis.margins,
         analysis.worst,
         analysis.sensitivity,
-        analysis.basin,
         analysis.chatter,
     ],
 }

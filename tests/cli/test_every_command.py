@@ -38,10 +38,8 @@ CALLS = {
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
-    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --unchecked --out there --searches 2 --figure f "
-    "--latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": [
-        "studies.compare.compare"
-    ],
+    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 --figure f "
+    "--latex t.tex --executor dask://a:1 --traces all --threads 2": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [
@@ -49,15 +47,13 @@ CALLS = {
         "studies.leaderboard.leaderboard",
     ],
     "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
-    "--executor dask://a:1 --threads 2 --defaults --unchecked --relevant 0.05 --noise-key 0": [
+    "--executor dask://a:1 --threads 2 --defaults --relevant 0.05": [
         "studies.study.study",
         "studies.leaderboard.leaderboard",
     ],
     "which duffing": ["studies.adviser.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
-    "--relevant 0.05 --out there --defaults --unchecked --disturbance 2 --threads 2": [
-        "studies.adviser.which"
-    ],
+    "--relevant 0.05 --out there --defaults --disturbance 2 --threads 2": ["studies.adviser.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],
@@ -75,14 +71,6 @@ CALLS = {
     "sensitivity duffing --law pid --disturbance 2 --bound delay=0:0.01,encoder=256:4096,period=1:4 "
     "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --out s "
     "--json s.json --threads 2": ["studies.sensitivity.sensitivity"],
-    "accuracy duffing": ["evidence.accuracy.accuracy.accuracy"],
-    "accuracy duffing van_der_pol --law pid --condition sine --periods 0.002,0.001 --seeds 2 --gains default "
-    "--duration 2 --x0 0.4 --out a --json a.json --threads 2": [
-        "evidence.accuracy.accuracy.accuracy"
-    ],
-    "basin duffing": ["analysis.region_of_attraction.basin"],
-    "basin duffing --law pid --points 3 --gains default --duration 2 --out b --json b.json --condition noise "
-    "--threads 2": ["analysis.region_of_attraction.basin"],
     "chatter duffing": ["simulation.grid.case"],
     "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
         "simulation.grid.case"
@@ -107,13 +95,11 @@ PRINTED = [  # command lines that are run to their ends
     "margins duffing --law classical,pid --kinds delay --quick --json m.json",
     "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf --json w.json",
     "sensitivity duffing --law classical --bound mass=0.7:1.3 --points 8 --duration 0.2 --out s.pdf --json s.json",
-    "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
-    "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
     "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
     "tune duffing classical --searches 2 --budget 32 --condition nominal --out t.json",
     "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 --duration 0.1 --out c "
     "--figure f.pdf --latex f.tex",
-    "compare --rig simple_pendulum_ak80 --law classical --seeds 1 --duration 0.1 --noise-key 0 --out r",
+    "compare --rig simple_pendulum_ak80 --law classical --seeds 1 --duration 0.1 --out r",
     "export classical.fmu --no-binary",
 ]
 
@@ -126,7 +112,6 @@ FLAGS = {
     "--worst",
     "--quick",
     "--defaults",
-    "--unchecked",
 }
 FLAGS |= {"--no-binary"}
 SWITCHES = {
@@ -163,7 +148,6 @@ UNTOLD = {
     "sensitivity(scenario)",
     "view(scenario)",
 }  # not told in whole
-UNTOLD |= {"study(noise_key)"}  # 0 is the function's own default
 
 
 class Reached(BaseException):
@@ -413,7 +397,7 @@ def test_what_a_command_prints_fits_and_what_it_writes_is_parsed_as_ever(
         if path.is_file() and path.parent.name != "parts":
             files.add(path.relative_to(folder))
     told = [Path(name) for name in re.findall(r"^wrote (\S+)", out, re.MULTILINE)]
-    beside = {"one.npz", "noise_key.json", "classical.fmu"}
+    beside = {"one.npz", "classical.fmu"}
     untold = {
         file
         for file in files - set(told)

@@ -369,68 +369,6 @@ def _attacked_cases(
     return chosen, [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
 
 
-def basin(
-    plant: options.PlantName,
-    law: options.OneLaw = "observer_free",
-    points: Annotated[
-        int, typer.Option(min=2, help="Number of positions, and of velocities.")
-    ] = 50,
-    gains: options.Gains = "tuned",
-    duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
-    out: Annotated[Path | None, options.picture("the map")] = None,
-    json: options.Json = None,
-    condition: options.Condition = "nominal",
-    threads: options.Threads = None,
-) -> None:
-    """Map a region of attraction: run a grid of initial positions and velocities, and show which
-    come to rest.
-
-    Positions reach half a turn to either side; on a rail, twice as far as the plant's start. The
-    largest velocity is three times the largest position, per second. All channels of a network have
-    the same start. A run ends as soon as its outcome is decided, by the rule in
-    smc_mujoco.analysis.region_of_attraction.
-
-    Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
-    """
-    with delay_ctrl_c():
-        from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
-        from smc_mujoco.analysis.region_of_attraction import basin as search
-        from smc_mujoco.common.progress import bar
-        from smc_mujoco.draw.page import files
-        from smc_mujoco.draw.region import draw
-
-    terminal = Terminal()
-    pictures = files(out)
-    chosen = options.law(law)
-    options.check_files(json, *pictures)
-    with bar(f"{law} on {plant}") as progress:
-        region = search(
-            plant,
-            chosen,
-            (points, points),
-            gains=gains,
-            duration=duration,
-            threads=threads,
-            report=progress.reached,
-            condition=condition,
-        )
-    terminal.note(
-        f"{region.law} on {region.plant}: {100 * region.share:.3g} % of the states converge"
-    )
-    yes, no, undecided = (
-        int((region.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)
-    )
-    counts = f"{yes} converge, {no} do not, {undecided} undecided after {duration:g} s"
-    terminal.note(
-        f"{counts}; {options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s", "dim"
-    )
-    if json:
-        terminal.wrote(region.save(json))
-    if pictures:
-        draw([region], out)
-        terminal.wrote(*pictures)
-
-
 def chatter(
     plant: options.PlantName,
     law: options.Laws = None,

@@ -308,7 +308,7 @@ def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[M
         given = _of_plant(given, traces[0].scenario if traces else None)
     if not isinstance(given, Rig):
         raise ScenarioError(
-            f"cannot identify {shown(given)}: give a rig, the name of one, or a smc.Plant"
+            f"cannot identify {shown(given)}: give a rig, the name of one, or a plant"
         )
     return given.reading(many)
 
