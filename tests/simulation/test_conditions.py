@@ -271,13 +271,13 @@ def test_named_law_is_another_in_tables(tmp_path):
 
 
 def test_start_is_set_by_condition_or_starts(refused):
-    for search in (smc.grid, smc.margins, smc.tune, smc.basin):
+    for search in (smc.grid, smc.margins, smc.tune, smc.design.basin):
         far = smc.condition("far", x0=1.0)
         if search in (smc.grid, smc.tune):
             fields = {"conditions": far}
         else:
             fields = {"condition": far}
-        if search is smc.basin:
+        if search is smc.design.basin:
             more = {}
         else:
             more = {"starts": smc.starts(x0=0.5)}

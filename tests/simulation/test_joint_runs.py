@@ -90,14 +90,14 @@ def cases(arm):
         **common | loaded,
     )
     pushes = (
-        smc.Push(
+        smc.signals.Push(
             "upper",
             x=3.0,
             z=-5.0,
             time=0.01,
             width=0.02,
         ),
-        smc.Push("hand", y=2.0, time=0.02),
+        smc.signals.Push("hand", y=2.0, time=0.02),
         smc.Sine(0.2, 9.0),
     )
     yield smc.Scenario(
@@ -274,7 +274,7 @@ def test_a_push_gives_its_impulse_to_its_body(refused):
     text = """<mujoco><option gravity="0 0 0"/><worldbody><body name="bob"><joint name="a" axis="0 1 0"/>
       <geom type="sphere" size="0.01" pos="0 0 -1" mass="2"/></body></worldbody></mujoco>"""
     plant = smc.plant_from(text, channels={"a": {"motor": True}}, name="bob")
-    push = smc.Push(
+    push = smc.signals.Push(
         "bob",
         x=-30.0,
         y=9.0,
@@ -291,7 +291,7 @@ def test_a_push_gives_its_impulse_to_its_body(refused):
     )
     assert np.abs(trace.v[trace.t < 0.1]).max() == 0.0
     assert trace.v[-1, 0] == pytest.approx(30.0 * 0.02 * 2 / math.pi / 2.0, rel=1e-3)
-    refused(lambda: smc.Scenario(plant=plant, law="none", disturbance=smc.Push("bub")))
+    refused(lambda: smc.Scenario(plant=plant, law="none", disturbance=smc.signals.Push("bub")))
 
 
 def test_a_failing_law_ends_its_own_run_with_the_reason():
