@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import wild
 
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
@@ -27,65 +26,16 @@ def test_gain_keeps_its_unit_and_the_decorators_sign():
     made = smc.law_function(
         gains={"a": Gain(1.0, RATE), "b": 2.0}, positive=("a",), nonnegative=("b",)
     )(zero)
-    assert made.gains == {"a": Gain(1.0, RATE, positive=True), "b": Gain(2.0, nonnegative=True)}
+    assert made.gains == {
+        "a": Gain(1.0, RATE, positive=True),
+        "b": Gain(2.0, nonnegative=True),
+    }
     assert made.defaults == {"a": 1.0, "b": 2.0}
-
-
-@pytest.mark.parametrize(
-    "decorator", [smc.surface_function, smc.estimator_function, smc.law_function]
-)
-def test_option_of_no_such_component_is_one_sentence(decorator):
-    if decorator is smc.law_function:
-        option = "colours"
-    else:
-        option = "plants"
-    with pytest.raises(smc.ScenarioError, match=f"unknown option of .*{option}"):
-        decorator(**{option: ()})
-
-
-@pytest.mark.parametrize(
-    ("option", "value"), [("colour", "red"), ("colour", 3), ("accuracy", 3), ("admits", {"x": 1.0})]
-)
-def test_colour_that_cannot_be_drawn_and_bound_of_nothing_are_refused(option, value):
-    with pytest.raises(smc.ScenarioError, match=f"^{option} is .*: give "):
-        smc.law_function(**{option: value})
-
-
-@pytest.mark.parametrize("value", [{"shoulder": 1.0}, {1.0, 2.0}])
-def test_gain_that_is_no_list_of_numbers_is_refused(value):
-    with pytest.raises(smc.ScenarioError, match=r"k is {.*: give a number$"):
-        smc.law("classical", k=value)
 
 
 def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_channel_s():
     assert [gain_at((1.0, 2.5), i) for i in range(4)] == [1.0, 2.5, 2.5, 2.5]
     assert [gain_at(1.5, i) for i in range(2)] == [1.5, 1.5]
-
-
-def test_unit_of_a_gain_that_is_a_text_is_refused():
-    with pytest.raises(
-        smc.ScenarioError,
-        match=r"^unit of gain k is '1/s': write .*Gain\(2, UNIT\).* where UNIT is ",
-    ):
-        smc.law_function(gains={"k": Gain(2.0, "1/s")})  # pyright: ignore[reportArgumentType]
-
-
-def test_template_prints_as_name_and_gains():
-    template = smc.law_function(gains={"k": 2.0, "w": Gain((1.0, 0.5))})(
-        lambda y, gains, memory: (0.0, 0.0)
-    )
-    assert repr(template) == "<Template of law('<lambda>', k=2, w=(1, 0.5))>"
-
-
-def test_builtin_without_a_signature_is_refused():
-    with pytest.raises(smc.ScenarioError, match=r"law 'type' takes \(y, gains, memory\)"):
-        smc.law_function()(type)
-
-
-@pytest.mark.parametrize("value", [wild.nested(50_000), wild.Shy()], ids=["deep", "shy"])
-def test_what_python_cannot_print_is_refused(value):
-    with pytest.raises(smc.ScenarioError, match=r"surface is <.*>: give a function"):
-        smc.surface_function(value)
 
 
 # conditions

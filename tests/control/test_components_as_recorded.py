@@ -120,7 +120,12 @@ def joint_measurements(model, n):
 
 def readings():
     return (
-        Reading(dt=DT, x=math.sin(0.2 * k) + 0.1 * e, v=de) for k, (e, de, _) in enumerate(seen())
+        Reading(
+            dt=DT,
+            x=math.sin(0.2 * k) + 0.1 * e,
+            v=de,
+        )
+        for k, (e, de, _) in enumerate(seen())
     )
 
 
@@ -130,8 +135,14 @@ def ways(template):
         return {"computes": readings()}
     if template.joint:
         n = joints(template)
-        return {"alone": joint_measurements(0.0, n), "with the model": joint_measurements(1.0, n)}
-    both = {"alone": measurements(0.0, 0.0), "with the model": measurements(1.0, 0.0)}
+        return {
+            "alone": joint_measurements(0.0, n),
+            "with the model": joint_measurements(1.0, n),
+        }
+    both = {
+        "alone": measurements(0.0, 0.0),
+        "with the model": measurements(1.0, 0.0),
+    }
     if template.kind == "law":
         return both | {"on a surface": measurements(1.0, 1.0)}
     return both

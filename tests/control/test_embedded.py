@@ -1,13 +1,10 @@
 """The paper's law as embedded controllers compute it: how far from tanh."""
 
-import math
-
 import numpy as np
 import pytest
 from helpers.plants_ab import measured
 
 import smc_mujoco as smc
-from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.simulation import python_functions
 
@@ -45,24 +42,6 @@ def test_the_table_is_as_close_as_linear_interpolation_allows(size):
     assert 0.85 * bound < error <= bound
 
 
-@pytest.mark.parametrize("size", [1, 7, 100, 255])
-def test_a_size_that_divides_nothing_gets_at_least_its_steps(size):
-    error = np.abs(squash("observer_free_table", size=size) - np.tanh(GRID)).max()
-    assert error <= max(0.0963 * (5.0 / size) ** 2, 9.1e-5, 1.0 if size == 1 else 0.0)
-
-
-def test_the_table_is_exact_at_its_nodes_and_one_beyond_its_end():
-    nodes = np.arange(64) * 5.0 / 64
-    np.testing.assert_allclose(squash("observer_free_table", nodes), np.tanh(nodes), rtol=1e-15)
-    assert squash("observer_free_table", np.array([5.0, 6.0, 1e9, -5.0, -1e9])).tolist() == [
-        1,
-        1,
-        1,
-        -1,
-        -1,
-    ]
-
-
 @pytest.mark.parametrize(("terms", "error"), [(1, 3.3e-3), (3, 5.5e-6), (5, 2.3e-7)])
 def test_the_series_is_as_close_as_its_terms_allow(terms, error):
     assert (
@@ -77,35 +56,11 @@ def test_every_form_is_odd_bounded_and_rises(name):
     T = squash(name)
     np.testing.assert_array_equal(T, -T[::-1])
     assert np.abs(T).max() <= 1.0
-    slack = {"observer_free_single": 2e-7, "observer_free_taylor": 1e-6}.get(
-        name, 0.0
-    )  # their last bits ripple
+    slack = {
+        "observer_free_single": 2e-7,
+        "observer_free_taylor": 1e-6,
+    }.get(name, 0.0)  # their last bits ripple
     assert np.diff(T).min() >= -slack
-
-
-@pytest.mark.parametrize("name", FORMS)
-def test_every_form_is_bounded_by_lam_however_wild_the_state(name):
-    law = smc.law(name, lam=LAM)
-    wild = [-1e30, -1e9, -100.0, 0.0, 100.0, 1e9, 1e30]
-    u = forces(law, *(a.ravel() for a in np.meshgrid(wild, wild)))[:, 0]
-    assert np.isfinite(u).all()
-    assert np.abs(u).max() <= LAM
-
-
-@pytest.mark.parametrize(
-    ("name", "gains"),
-    [
-        ("observer_free_table", {"size": 300}),
-        ("observer_free_taylor", {"terms": 6}),
-        ("observer_free_taylor", {"terms": 2.5}),
-        ("observer_free_q15", {"lam": 8.0}),
-        ("observer_free_q15", {"k1": 50.0}),
-    ],
-)
-def test_what_a_form_cannot_hold_is_said(name, gains):
-    with pytest.warns(GainWarning):
-        law = smc.law(name, **gains)
-    assert np.abs(forces(law, [0.3], [0.2])[0, 0]) <= law.gains["lam"]
 
 
 # single precision
@@ -186,26 +141,3 @@ def test_fixed_point_is_as_close_as_its_words_allow():
     error = np.abs(u + LAM * np.tanh(de + K1 * e)).max()
     bound = LAM * (1.6e-4 + (K1 * 4.0 + 8.0 + 16.0) / 2**16) + 8.0 / 2**16
     assert 0.3 * bound < error <= bound
-
-
-def test_fixed_point_saturates_each_word_at_its_range():
-    law = smc.law("observer_free_q15", lam=LAM, k1=0.25, e_range=1.0)  # e is held at 1: s at 1/4
-    (u, s), (at_range, _) = forces(law, [50.0, 1.0], [0.0, 0.0])
-    assert u == at_range
-    assert s == pytest.approx(0.25, abs=1e-3)
-    assert u == pytest.approx(-LAM * math.tanh(0.25), abs=2e-3)
-
-
-def test_words_round_to_the_nearest_away_from_zero():
-    for a, n in (
-        (0.0, 0),
-        (0.5, 1),
-        (-0.5, -1),
-        (0.49, 0),
-        (1.5, 2),
-        (40_000, 32767),
-        (-40_000, -32767),
-    ):
-        assert q15.word.py_func(a / 32768, 1.0) == n
-    for a, b, bits, n in ((3, 1, 1, 2), (-3, 1, 1, -2), (5, 1, 2, 1), (6, 1, 2, 2), (0, -5, 3, 0)):
-        assert q15.product.py_func(a, b, bits) == n

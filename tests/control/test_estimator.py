@@ -1,6 +1,5 @@
 """What each velocity estimator gives on polynomials, sines and noise, and inside a run."""
 
-import cmath
 import itertools
 import math
 
@@ -12,8 +11,6 @@ from scipy.signal import savgol_coeffs
 import smc_mujoco as smc
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.estimators.kalman import square_root
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.simulation import python_functions
 
 pytestmark = pytest.mark.quick
@@ -43,11 +40,6 @@ def estimates(estimator, x, v=None, h=H):
 
 def differenced(tau):
     return smc.estimator("filtered_difference", tau=tau)
-
-
-def test_measured_is_the_sensor():
-    x, v = np.random.default_rng(0).normal(size=(2, 100))
-    np.testing.assert_array_equal(estimates(smc.estimator("measured"), x, v), v)
 
 
 @pytest.mark.parametrize(("tau", "h"), [(0.0, 5e-3), (1e-3, 1e-3), (0.1, 5e-3)])
@@ -90,8 +82,16 @@ def show_acceleration(y, gains, memory):
 def test_in_a_run_every_channel_has_its_own_estimate_of_what_it_measures(name, period):
     """Memory shared between channels or runs, or a dt from elsewhere, would show."""
     estimator = smc.estimator(name)
-    common = {"plant": "pendulum_network", "duration": 0.3, "control_period": period, "seed": 2}
-    common |= {"velocity": estimator, "noise": smc.Noise(position=0.01, velocity=9.0)}
+    common = {
+        "plant": "pendulum_network",
+        "duration": 0.3,
+        "control_period": period,
+        "seed": 2,
+    }
+    common |= {
+        "velocity": estimator,
+        "noise": smc.Noise(position=0.01, velocity=9.0),
+    }
     laws = (show_position(), show_velocity(), show_acceleration(), show_velocity())
     x, v, a, again = (
         trace.s for trace in smc.run([smc.Scenario(law=law, **common) for law in laws])
@@ -100,8 +100,18 @@ def test_in_a_run_every_channel_has_its_own_estimate_of_what_it_measures(name, p
     for i in range(5):
         expected = both(estimator, x[:, i], h=period)
         scale = np.abs(expected).max(axis=1) + 1e-3
-        np.testing.assert_allclose(v[:, i], expected[0], rtol=0, atol=1e-9 * scale[0])
-        np.testing.assert_allclose(a[:, i], expected[1], rtol=0, atol=1e-9 * scale[1])
+        np.testing.assert_allclose(
+            v[:, i],
+            expected[0],
+            rtol=0,
+            atol=1e-9 * scale[0],
+        )
+        np.testing.assert_allclose(
+            a[:, i],
+            expected[1],
+            rtol=0,
+            atol=1e-9 * scale[1],
+        )
 
 
 # what holds of every estimator
@@ -120,8 +130,18 @@ def test_an_estimate_of_a_ramp_is_its_slope_and_no_acceleration(name, h):
     estimator = smc.estimator(name)
     v, a = both(estimator, 5.0 - 3.0 * t, h=h)[:, -100:]
     L = estimator.gains.get("L", 0.0)
-    np.testing.assert_allclose(v, -3.0, rtol=0, atol=1e-9 + 8 * L * h**2)
-    np.testing.assert_allclose(a, 0.0, rtol=0, atol=1e-6 + 5 * L * h)
+    np.testing.assert_allclose(
+        v,
+        -3.0,
+        rtol=0,
+        atol=1e-9 + 8 * L * h**2,
+    )
+    np.testing.assert_allclose(
+        a,
+        0.0,
+        rtol=0,
+        atol=1e-6 + 5 * L * h,
+    )
 
 
 @pytest.mark.parametrize("name", SECOND)
@@ -133,27 +153,18 @@ def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
         late = 3.0 / smc.estimator(name).gains["w"]
     L = smc.estimator(name).gains.get("L", 0.0)
     v, a = both(smc.estimator(name), 1.0 - 3.0 * t + 2.0 * t**2)[:, -100:]
-    np.testing.assert_allclose(v, -3.0 + 4.0 * (t[-100:] - late), rtol=0, atol=1e-7 + 8 * L * H**2)
-    np.testing.assert_allclose(a, 4.0, rtol=0, atol=1e-4 + 5 * L * H)
-
-
-@pytest.mark.slow
-@ESTIMATORS
-def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name):
-    """Without a velocity sensor."""
-    if name == "levant":
-        laws = scenarios.LAWS
-    else:
-        laws = ("observer_free",)
-    pairs = []
-    for plant in scenarios.GAINS:
-        for law in laws:
-            pairs.append((plant, law))
-    changes = {"velocity": name, "noise": smc.Noise(position=0.01), "integrator": "Euler"}
-    traces = smc.run([scenarios.scenario(*pair, duration=5.0, changes=changes) for pair in pairs])
-    for pair, trace in zip(pairs, traces, strict=True):
-        assert trace.failure is None, pair
-        assert smc.score(trace)["ultimate_bound"] <= 0.1 * np.abs(trace.x[0]).max(), pair
+    np.testing.assert_allclose(
+        v,
+        -3.0 + 4.0 * (t[-100:] - late),
+        rtol=0,
+        atol=1e-7 + 8 * L * H**2,
+    )
+    np.testing.assert_allclose(
+        a,
+        4.0,
+        rtol=0,
+        atol=1e-4 + 5 * L * H,
+    )
 
 
 # noise gains: white noise passes with the root of the impulse response's energy
@@ -177,16 +188,6 @@ def test_observers_pass_noise_by_their_formulas(w):
     np.testing.assert_allclose(gains_of("extended_state_observer", w=w), [v, a], rtol=1e-6)
 
 
-@pytest.mark.parametrize("w", [10.0, 30.0])
-def test_the_integral_chain_passes_less_noise_than_the_observer_of_its_poles(w):
-    """For small w h its energies are those in continuous time, w^3 / 16 and 3 w^5 / 16, times h for
-    sampled noise.
-    """
-    v, a = gains_of("integral_chain", w=w)
-    np.testing.assert_allclose([v, a], np.sqrt([H * w**3 / 16, H * 3 * w**5 / 16]), rtol=0.025)
-    assert v < gains_of("extended_state_observer", w=w)[0] / 4
-
-
 # each by itself
 
 
@@ -203,7 +204,7 @@ def test_high_gain_lags_by_two_over_w_on_a_parabola(w):
 
 @pytest.mark.parametrize("w", [30.0, 100.0])
 def test_the_extended_state_observer_s_errors_are_bounded_by_the_jerk_and_attained(w):
-    """|x'' - z3| <= 3 J / w and |x' - z2| <= 3 J / w^2; a cubic attains both, a sine stays within."""
+    """|x'' - z3| <= 3 J / w and |x' - z2| <= 3 J / w^2; a cubic attains both."""
     t = np.arange(4000) * 1e-4
     v, a = both(smc.estimator("extended_state_observer", w=w), t**3 / 6, h=1e-4)
     assert t[-1] - a[-1] == pytest.approx(3 / w, rel=0.02)
@@ -231,53 +232,44 @@ def test_kalman_s_gains_are_those_of_the_riccati_equation(lam):
         z = z + K * (reading - z[0])
         expected.append(z[1:])
     for h in (1.0, 1e-3):
-        out = both(smc.estimator("kalman", sigma=0.01, q=lam * 1e-4 / h**5), x, h=h) * np.array(
-            [[h], [h * h]]
-        )
+        out = both(
+            smc.estimator(
+                "kalman",
+                sigma=0.01,
+                q=lam * 1e-4 / h**5,
+            ),
+            x,
+            h=h,
+        ) * np.array([[h], [h * h]])
         np.testing.assert_allclose(
             out, np.transpose(expected), rtol=1e-5, atol=1e-7 * np.abs(expected).max()
-        )
-
-
-def test_the_square_roots_of_kalman_s_factors_are_those_of_complex_numbers():
-    for a, b in itertools.product((-3.0, -1.0, 0.0, 0.5, 4.0), repeat=2):
-        assert complex(*square_root.py_func(a, b)) == pytest.approx(
-            cmath.sqrt(complex(a, b)), rel=1e-15
         )
 
 
 @pytest.mark.parametrize(("window", "degree"), [(2, 1), (5, 2), (15, 3), (31, 2), (128, 4)])
 def test_savitzky_golay_is_scipy_s_filter_at_the_last_point(window, degree):
     x = np.random.default_rng(0).normal(size=400)
-    out = both(smc.estimator("savitzky_golay", window=window, degree=degree), x)
+    out = both(
+        smc.estimator(
+            "savitzky_golay",
+            window=window,
+            degree=degree,
+        ),
+        x,
+    )
     for order in (1, 2):
         if degree >= order:
-            c = savgol_coeffs(window, degree, deriv=order, delta=H, pos=window - 1, use="dot")
+            c = savgol_coeffs(
+                window,
+                degree,
+                deriv=order,
+                delta=H,
+                pos=window - 1,
+                use="dot",
+            )
         else:
             c = [0.0]
         expected = np.convolve(x, c[::-1], "valid")[-200:]
         np.testing.assert_allclose(
             out[order - 1, -200:], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max()
         )
-
-
-def test_levant_s_default_gain_is_the_largest_jerk_of_the_study_s_actuator():
-    g = max(
-        plant.nominal(np.zeros(plant.n), np.zeros(plant.n), 0, plant.values({}))[1]
-        for plant in map(smc.plant, scenarios.PLANTS)
-    )
-    lag = scenarios.scenario("duffing", "none", "lag_20ms").actuator[0].tau
-    assert smc.estimator("levant").gains["L"] == pytest.approx(
-        2.0 * g * scenarios.U_MAX / lag, rel=1e-9
-    )
-
-
-def test_levant_is_lost_on_what_is_rougher_than_its_gain():
-    """|x''| = 4 against L = 1: the estimate cannot turn as fast."""
-    t = np.arange(10_000) * H
-    lost, held = (
-        np.abs(estimates(smc.estimator("levant", L=L, order=1), np.sin(2 * t)) - 2 * np.cos(2 * t))
-        for L in (1, 4)
-    )
-    assert held[5000:].max() < 0.02
-    assert lost[5000:].max() > 0.5

@@ -1,7 +1,5 @@
 """Laws as text: names, gains in brackets, and files, at every door that takes a law."""
 
-import json
-
 import pyarrow.parquet
 import pytest
 
@@ -46,7 +44,12 @@ def files(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def tuned():
-    return smc.tune("duffing", smc.law("boundary_layer", k=0.01), budget=4, searches=1)
+    return smc.tune(
+        "duffing",
+        smc.law("boundary_layer", k=0.01),
+        budget=4,
+        searches=1,
+    )
 
 
 @pytest.mark.parametrize(
@@ -115,17 +118,6 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
         assert not end.value.code, (words, capsys.readouterr().err)
     rows = pyarrow.parquet.read_table("compared/results.parquet")
     assert {*rows["law"].to_pylist()} == {"boundary_layer", "mine", "other"}
-
-
-def test_gains_of_your_own_law_are_named_where_its_code_is_missing(files):
-    smc.tune("duffing", smc.law("mine.py"), budget=1, searches=1).save("mine.json")
-    gains = json.loads((files / "mine.json").read_text())["scenario"]["law"]["gains"]
-    with pytest.raises(
-        smc.ScenarioError, match=r"law mine of mine\.json is your own: give .* FILE\.py\(k="
-    ) as error:
-        smc.law("mine.json")
-    text = str(error.value).rpartition("FILE.py")[2]
-    assert smc.law(f"mine.py{text}").gains == gains
 
 
 TEXTS = (

@@ -51,7 +51,11 @@ def traces():
     and no bound here is near its error. Van der Pol's oscillator without its model takes the
     longest to settle.
     """
-    common = {"integrator": "Euler", "control_period": 2e-3, "physics_step": 2e-3}
+    common = {
+        "integrator": "Euler",
+        "control_period": 2e-3,
+        "physics_step": 2e-3,
+    }
     found = {}
     for name in smc.laws():
         first = (
@@ -109,7 +113,12 @@ def test_a_law_is_odd_in_what_it_measures_and_commands_nothing_where_there_is_no
         ours = np.zeros(law.memory)
         mirrored = np.zeros(law.memory)
         for k, (e, de, f, a) in enumerate(np.random.default_rng(0).normal(size=(100, 4))):
-            common = {"g": 2.0, "t": k * 1e-3, "limit": 6.0, "model": model}
+            common = {
+                "g": 2.0,
+                "t": k * 1e-3,
+                "limit": 6.0,
+                "model": model,
+            }
             u, s = called(law, measured(e, de, f=f, a=a, **common), ours)
             assert called(law, measured(-e, -de, f=-f, a=-a, **common), mirrored) == (-u, -s)
 
@@ -130,7 +139,14 @@ def swings():
     names = [name for name in smc.laws() if not catalogue()[name].plants]
     scenarios = []
     for name in names:
-        scenarios.append(smc.Scenario(plant=plant, law=name, x0=(0.5, 0.0, -0.5), duration=0.1))
+        scenarios.append(
+            smc.Scenario(
+                plant=plant,
+                law=name,
+                x0=(0.5, 0.0, -0.5),
+                duration=0.1,
+            )
+        )
     ran = smc.run(scenarios + scenarios[::-1])
     return {name: (ran[i], ran[-1 - i]) for i, name in enumerate(names)}
 

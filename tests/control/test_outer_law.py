@@ -25,7 +25,13 @@ def run(law, **changes):
 def test_each_joint_obeys_the_outer_loop_whatever_the_others_do():
     """e'' + 2 w e' + w^2 e = 0 from rest, with a gain for each joint, is e0 (1 + w t) exp(-w t)."""
     w = np.array([3.0, 5.0])
-    trace = run(smc.law("computed_torque", kp=(w**2).tolist(), kd=(2.0 * w).tolist()))
+    trace = run(
+        smc.law(
+            "computed_torque",
+            kp=(w**2).tolist(),
+            kd=(2.0 * w).tolist(),
+        )
+    )
     wt = w * trace.t[:, None]
     np.testing.assert_allclose(trace.x, np.array([0.3, -0.2]) * (1.0 + wt) * np.exp(-wt), atol=2e-3)
 
@@ -41,7 +47,11 @@ def test_an_outer_law_leaves_no_error_under_a_constant_force(name, gains):
         smc.law(name, **gains), disturbance=smc.Constant(1.0), duration=8.0, control_period=1e-3
     )
     assert np.abs(trace.x[-1]).max() < 1e-3
-    proportional = run(smc.law("computed_torque"), disturbance=smc.Constant(1.0), duration=8.0)
+    proportional = run(
+        smc.law("computed_torque"),
+        disturbance=smc.Constant(1.0),
+        duration=8.0,
+    )
     assert np.abs(proportional.x[-1]).max() > 1e-2
 
 

@@ -11,7 +11,7 @@ from helpers.plants_ab import called, chain, measured, plant_a, rest
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import Measurement, catalogue, law_function
-from smc_mujoco.control.properties import PROPERTIES, families, reads, searched, suitable
+from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
 
 pytestmark = pytest.mark.quick
 
@@ -101,11 +101,43 @@ def jump(name, model):
         for k in range(20):  # what a run would leave in it
             e, de, a = random.normal(size=3) * 0.3
             if not fresh:
-                called(law, measured(e, de, a=a, dt=1e-3, t=1e-3 * k, **common), memory)
-        called(law, measured(*centre[:2], a=centre[2], dt=STEP, t=7.31, **common), memory)
+                called(
+                    law,
+                    measured(
+                        e,
+                        de,
+                        a=a,
+                        dt=1e-3,
+                        t=1e-3 * k,
+                        **common,
+                    ),
+                    memory,
+                )
+        called(
+            law,
+            measured(
+                *centre[:2],
+                a=centre[2],
+                dt=STEP,
+                t=7.31,
+                **common,
+            ),
+            memory,
+        )
         line = centre + np.outer(along, random.normal(size=3))
         us = [
-            called(law, measured(e, de, a=a, dt=STEP, t=7.31, **common), memory.copy())[0]
+            called(
+                law,
+                measured(
+                    e,
+                    de,
+                    a=a,
+                    dt=STEP,
+                    t=7.31,
+                    **common,
+                ),
+                memory.copy(),
+            )[0]
             for e, de, a in line
         ]
         worst = max(worst, np.abs(np.diff(us)).max() / 6.0)
@@ -173,31 +205,6 @@ def names(*needs, **options):
     return [law.name for law in suitable(needs, **options)]
 
 
-def test_laws_are_chosen_by_all_that_is_asked():
-    assert names() == smc.laws()
-    assert {"continuous_twisting"} == {"continuous_twisting", "twisting", "lqr"} & {
-        *names("finite-time", "continuous")
-    }
-    assert set(names("two-gains")) < set(smc.laws())
-    assert "lqr" in names("two-gains")  # its weight r and its plant are held
-    assert {"none"} == {"none", "pid", "classical"} & {*names("no-velocity")}
-    assert {"none"} == {"none", "hierarchical"} & {*names("no-model", plant="cart_pole")}
-
-
-@pytest.mark.parametrize(("need", "counts"), [("one-gain", [1]), ("two-gains", [1, 2])])
-def test_a_law_with_few_gains_to_choose_has_at_least_one(need, counts):
-    def law(y, gains, memory):
-        return 0.0, 0.0
-
-    made = [smc.law_function(gains=dict.fromkeys("abcd"[:n], 1.0))(law) for n in range(5)]
-    assert [n for n in range(5) if PROPERTIES[need].holds(made[n])] == counts
-
-
-def test_every_law_is_in_one_family():
-    assert sorted(name for laws in families().values() for name in laws) == smc.laws()
-    assert {"disturbance_observer", "extended_state"} <= {*families()["disturbance-observer"]}
-
-
 def test_an_unknown_property_is_named():
     with pytest.raises(smc.ScenarioError, match="unknown property of a law 'smooth'"):
         suitable(["smooth"])
@@ -205,14 +212,3 @@ def test_an_unknown_property_is_named():
 
 def test_gains_that_are_held_are_not_counted():
     assert searched(catalogue()["super_twisting"]) == ["k1", "k2", "c"]
-
-
-def test_a_law_of_a_user_says_its_properties_in_the_decorator():
-    @law_function(gains={"k": 2.0}, family="mine", continuous=True, finite_time="e")
-    def my_law(y, gains, memory):
-        return -gains.k * y.e, y.e
-
-    for need in ("continuous", "finite-time", "finite-reaching", "one-gain", "no-velocity"):
-        assert PROPERTIES[need].holds(my_law)
-    with pytest.raises(smc.ScenarioError, match="finite_time is 'soon': give 's', 'e' or ''"):
-        law_function(finite_time="soon")

@@ -53,15 +53,6 @@ def test_the_default_surface_solves_the_riccati_equation_of_the_default_plant():
     assert gains["J"] == pytest.approx(1.0 / plant.nominal(rest, rest, 0, p)[1], rel=1e-3)
 
 
-def test_the_qube_servos_laws_are_on_the_surface_of_its_identified_quantities_in_volts():
-    rig = smc.rig("qube_servo")
-    row = surface(rig.scenario("none").plant, rig.values["torque_per_volt"], rig.values["back_emf"])
-    for law in rig.laws[:-1]:
-        np.testing.assert_allclose(
-            [law.gains[name] for name in ("c1", "c2", "c3", "c4")], row, rtol=1e-5
-        )
-
-
 @pytest.mark.parametrize("start", [-np.pi, np.pi, 2.0])
 def test_it_swings_up_and_stays(start):
     """From hanging, at rest, and from another angle: upright at the end, with the arm within a

@@ -22,7 +22,13 @@ SURFACES = pytest.mark.parametrize("name", laws(kind="surface"))
 SECOND = [
     name for name in laws(kind="surface") if name != "higher_order"
 ]  # those that an acceleration of the error keeps
-MASS = smc.plant("duffing", M=1.0, alpha=0.0, beta=0.0, delta=0.0)
+MASS = smc.plant(
+    "duffing",
+    M=1.0,
+    alpha=0.0,
+    beta=0.0,
+    delta=0.0,
+)
 HUM = smc.Sine(amplitude=0.4, omega=3.0)
 SHAKEN = 1.2e-3 * 3.0  # bound on s from sampling: (k + D) dt for k = 2, and half as much again
 
@@ -66,7 +72,14 @@ def test_eq_is_the_acceleration_that_keeps_s(name):
                 t += h
             s, eq = at(slid, memory, e, de, t=t, h=h)
             a = eq + extra
-            moved, _ = at(slid, memory, e + h * de + h * h * a / 2, de + h * a, t=t + h, h=h)
+            moved, _ = at(
+                slid,
+                memory,
+                e + h * de + h * h * a / 2,
+                de + h * a,
+                t=t + h,
+                h=h,
+            )
             if extra:
                 assert (moved - s) / h > 0.05
             else:
@@ -176,7 +189,15 @@ def shares(name, law):
     plants = ("duffing", "van_der_pol", "inverted_pendulum")
     runs = []
     for p in plants:
-        runs.append(smc.Scenario(plant=p, law=law, surface=name, duration=8.0, integrator="Euler"))
+        runs.append(
+            smc.Scenario(
+                plant=p,
+                law=law,
+                surface=name,
+                duration=8.0,
+                integrator="Euler",
+            )
+        )
     traces = smc.run(runs)
     assert not any(trace.failure for trace in traces)
     return [smc.score(trace)["ultimate_bound"] / np.abs(trace.x[0]).max() for trace in traces]
@@ -194,26 +215,6 @@ def test_first_order_laws_settle_every_plant_on_every_surface(name, law):
     assert max(shares(name, law)) <= 0.05
 
 
-def test_tanh_leaves_an_error_on_non_singular_terminal_surfaces():
-    """There s is a length, of which its layer takes 1 whole unit."""
-    found = shares("nonsingular_terminal", "observer_free")
-    assert found[0] < 0.05 < found[2] < 0.2
-
-
-@pytest.mark.parametrize("law", ["classical", "boundary_layer", "observer_free", "super_twisting"])
-def test_first_order_laws_take_the_surface_of_order_3_behind_an_actuator_lag(law):
-    common = {
-        "surface": "higher_order",
-        "actuator": smc.Lag(0.05),
-        "velocity": smc.estimator("levant", order=2, L=200.0),
-    }
-    for trace in smc.run(
-        [smc.Scenario(plant=p, law=law, **common) for p in ("duffing", "van_der_pol")]
-    ):
-        assert trace.failure is None
-        assert smc.score(trace)["ultimate_bound"] <= 0.05 * np.abs(trace.x[0]).max()
-
-
 def test_the_surface_of_order_3_holds_its_polynomial_on_s_equal_to_zero():
     """An acceleration of eq lies on it, and with it e'' + k2 e' + k1 e = 0."""
     slid = surface("higher_order")
@@ -221,16 +222,6 @@ def test_the_surface_of_order_3_holds_its_polynomial_on_s_equal_to_zero():
         _, eq = at(slid, np.zeros(1), e, de)
         assert at(slid, np.zeros(1), e, de, a=eq)[0] == pytest.approx(0.0, abs=1e-12)
         assert eq == pytest.approx(-5.0 * de - 6.25 * e)
-
-
-def test_the_surface_replaces_the_laws_own():
-    """c of the law is of no account, and the trace's s is the surface's."""
-    common = {"plant": "duffing", "duration": 0.5, "surface": surface("linear", c=2.0)}
-    one, other = smc.run(
-        [smc.Scenario(law=smc.law("classical", c=c), **common) for c in (1.0, 9.0)]
-    )
-    np.testing.assert_array_equal(one.u, other.u)
-    np.testing.assert_allclose(one.s, one.v + 2.0 * one.x, atol=1e-12)
 
 
 def test_memory_of_a_surface_belongs_to_a_channel_and_a_run():

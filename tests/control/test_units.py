@@ -49,7 +49,13 @@ def called(component, ys):
 def test_surface_does_the_same_in_every_system_of_units(name):
     def seen(X, T):
         return [
-            measured(t=0.01 * i * T, dt=0.01 * T, e=e * X, de=de * X / T, a=a * X / T**2)
+            measured(
+                t=0.01 * i * T,
+                dt=0.01 * T,
+                e=e * X,
+                de=de * X / T,
+                a=a * X / T**2,
+            )
             for i, (e, de, a, _) in enumerate(WAY)
         ]
 
@@ -59,8 +65,18 @@ def test_surface_does_the_same_in_every_system_of_units(name):
         T = system["T"]
         s, eq = called(converted(surface.surface(name), system), seen(X, T)).T
         ratio = s[-1] / plain[-1, 0]  # s has its own unit
-        np.testing.assert_allclose(s, plain[:, 0] * ratio, rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(eq, plain[:, 1] * X / T**2, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            s,
+            plain[:, 0] * ratio,
+            rtol=1e-9,
+            atol=1e-12,
+        )
+        np.testing.assert_allclose(
+            eq,
+            plain[:, 1] * X / T**2,
+            rtol=1e-9,
+            atol=1e-12,
+        )
 
 
 @pytest.mark.parametrize(
@@ -70,7 +86,11 @@ def test_surface_does_the_same_in_every_system_of_units(name):
 def test_estimator_does_the_same_in_every_system_of_units(name, gains):
     def seen(X, T):
         return [
-            Reading(dt=0.01 * T, x=X * (math.sin(0.3 * i) + x), v=v * X / T)
+            Reading(
+                dt=0.01 * T,
+                x=X * (math.sin(0.3 * i) + x),
+                v=v * X / T,
+            )
             for i, (x, v, *_) in enumerate(WAY)
         ]
 
@@ -81,4 +101,9 @@ def test_estimator_does_the_same_in_every_system_of_units(name, gains):
         T = system["T"]
         units = [X / T, X / T**2][: plain.shape[1]]
         found = called(converted(one, system), seen(X, T)).reshape(len(WAY), -1)
-        np.testing.assert_allclose(found, plain * units, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            found,
+            plain * units,
+            rtol=1e-9,
+            atol=1e-9,
+        )

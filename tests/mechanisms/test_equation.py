@@ -53,7 +53,12 @@ SINE = smc.Sine(amplitude=0.2, omega=5.0)
 def integrated(slope, y, t, h):
     """y at t + h, where y' = slope(t, y) and y is an array of any shape."""
     solver = ode(lambda t, flat: slope(t, flat.reshape(y.shape)).ravel())
-    solver.set_integrator("dopri5", rtol=1e-12, atol=1e-14, first_step=h)
+    solver.set_integrator(
+        "dopri5",
+        rtol=1e-12,
+        atol=1e-14,
+        first_step=h,
+    )
     end = solver.set_initial_value(y.ravel(), t).integrate(t + h)
     assert solver.successful()
     return end.reshape(y.shape)
@@ -125,7 +130,7 @@ def long(plant):
 
 
 def everything(plant, law):
-    """A tracking run with delay, sine disturbance, a plant 30 % heavier than believed, and a jump."""
+    """A tracking run with delay, sine disturbance, 30 % more mass than believed, and a jump."""
     return dataclasses.replace(
         smc.paper.scenario(plant, law, "jump_mild", duration=DURATION.get(plant, 2.0)),
         reference=smc.Sine(amplitude=0.1, omega=2.0),
@@ -169,7 +174,11 @@ def test_a_delay_that_is_no_multiple_of_the_control_period_is_exact(plant):
 
 @PLANTS
 def test_a_mass_off_by_a_millionth_is_noticed(plant):
-    scenario = dataclasses.replace(everything(plant, "observer_free"), duration=0.5, jump=None)
+    scenario = dataclasses.replace(
+        everything(plant, "observer_free"),
+        duration=0.5,
+        jump=None,
+    )
     assert error(smc.run(scenario), *oracle([scenario], factor=1 + 1e-6))[0] > 1e-8
 
 
@@ -200,7 +209,14 @@ def coarse(plant):
 def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, order):
     (scenario, states), steps = coarse(plant), (8e-3, 4e-3, 2e-3)
     traces = smc.run(
-        [dataclasses.replace(scenario, physics_step=h, integrator=integrator) for h in steps]
+        [
+            dataclasses.replace(
+                scenario,
+                physics_step=h,
+                integrator=integrator,
+            )
+            for h in steps
+        ]
     )
     errors = [error(trace, states)[0] for trace in traces]
     slopes = np.diff(np.log(errors)) / np.diff(np.log(steps))
@@ -255,7 +271,10 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     fields = CONDITIONS[condition]
     if condition == "jump":
         fields = {
-            "jump": smc.Jump(time=HALF, factors=smc.plant(plant).jumps["mild"]),
+            "jump": smc.Jump(
+                time=HALF,
+                factors=smc.plant(plant).jumps["mild"],
+            ),
             "disturbance": SINE,
         }
     scenarios = []
@@ -281,13 +300,26 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
 
 
 def test_a_cart_that_becomes_heavier_on_its_way_accelerates_less():
-    cart = smc.plant("servo_axis", M=2.0, b=0.0, cf=0.0, offset=0.0)
+    cart = smc.plant(
+        "servo_axis",
+        M=2.0,
+        b=0.0,
+        cf=0.0,
+        offset=0.0,
+    )
     parts = {
         "disturbance": smc.Constant(1.0),
         "jump": smc.Jump(0.1, {"mass": 4.0}),
         "duration": 0.3,
     }
-    trace = smc.run(smc.Scenario(plant=cart, law="none", x0=0.0, **parts))
+    trace = smc.run(
+        smc.Scenario(
+            plant=cart,
+            law="none",
+            x0=0.0,
+            **parts,
+        )
+    )
     after = np.maximum(trace.t - 0.1, 0.0)
     np.testing.assert_allclose(
         trace.v[:, 0], np.minimum(trace.t, 0.1) / 2.0 + after / 8.0, atol=1e-12

@@ -5,12 +5,8 @@ they say.
 import mujoco
 import numpy as np
 import pytest
-from helpers.models import unnamed
 
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms import fidelity
 from smc_mujoco.mechanisms.fidelity import deviation
-from smc_mujoco.mechanisms.geometry import coil
 from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK_ARM
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
@@ -99,7 +95,12 @@ def test_a_spring_between_rods_gives_kc_times_the_sine_of_the_difference(name):
     expected = np.zeros(p.n)
     expected[:-1] += torque
     expected[1:] -= torque
-    np.testing.assert_allclose(pull(model, data, x) * 0.5 * 0.5**2, expected, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        pull(model, data, x) * 0.5 * 0.5**2,
+        expected,
+        rtol=1e-9,
+        atol=1e-12,
+    )
     assert p.parameters["l"] > HOOK_ARM
 
 
@@ -112,21 +113,6 @@ def test_in_a_row_a_spring_between_rods_has_the_couplings_stiffness(name):
     x[1] = 1e-6
     torque = pull(model, data, x) * 0.5 * 0.5**2
     np.testing.assert_allclose(torque[:3], 0.5e-6 * np.array([1.0, -2.0, 1.0]), rtol=1e-4)
-
-
-@NETWORKS
-def test_in_a_row_the_equation_is_the_same(name):
-    p = catalogue()[name]
-    spec = p.spec()
-    p.contacts["bobs"](spec)
-    row = spec.compile()
-    chain = p.load()
-    rng = np.random.default_rng(2)
-    for _ in range(5):
-        x = rng.uniform(-0.02, 0.02, p.n)
-        v = rng.uniform(-1.0, 1.0, p.n)
-        expected = pull(chain, mujoco.MjData(chain), x, v)
-        np.testing.assert_allclose(pull(row, mujoco.MjData(row), x, v), expected, rtol=1e-9)
 
 
 DEVIATIONS = {
@@ -144,71 +130,3 @@ def test_every_other_mechanism_has_its_deviation_here():
 @pytest.mark.parametrize(("name", "other"), OTHERS)
 def test_a_mechanism_departs_from_its_equation_as_far_as_it_says(name, other):
     assert deviation(catalogue()[name], other) == pytest.approx(DEVIATIONS[name], abs=0.001)
-
-
-@pytest.mark.parametrize(
-    "name", sorted(set(DEVIATIONS) - {"duffing"})
-)  # whose hill is in the middle
-def test_a_smaller_reach_has_a_smaller_deviation(name):
-    assert deviation(catalogue()[name], "springs", 0.1) < 0.5 * DEVIATIONS[name]
-
-
-@pytest.mark.parametrize(("name", "other"), OTHERS)
-def test_everything_is_named_and_the_channels_stay_where_they_were(name, other):
-    p = catalogue()[name]
-    model, _ = built(p, other)
-    assert unnamed(model) == []
-    assert model.nv == p.n
-    driven = []
-    for i in range(model.nu):
-        if not model.actuator(i).name.startswith("passive:"):
-            driven.append(model.actuator(i).name)
-    assert driven == [model.actuator(i).name for i in range(p.n)]
-    assert np.count_nonzero(model.body_mass) == p.n
-
-
-def test_springs_that_cannot_be_are_refused():
-    for parameters in ({"beta": 0.0}, {"beta": -1.0}, {"alpha": 3.0}):
-        p = plant("duffing", **parameters)
-        with pytest.raises(ScenarioError, match="duffing has no springs for alpha"):
-            built(p)
-
-
-def test_an_unknown_mechanism_is_refused():
-    with pytest.raises(
-        ScenarioError, match="unknown mechanism of duffing 'spring': did you mean 'springs'"
-    ):
-        deviation(plant("duffing"), "spring")
-
-
-def test_a_coil_winds_as_often_as_it_says_at_its_radius_about_its_line():
-    spec = mujoco.MjSpec()
-    fixed = ("world", (0.0, 0.0, 0.0))
-    coil.draw(
-        spec,
-        "coil",
-        (*fixed, (0.1, 0.0, 0.3)),
-        (*fixed, (0.5, 0.0, 0.3)),
-        radius=0.02,
-        turns=3,
-        wire=1e-3,
-        material="",
-    )
-    x, y, z = (
-        np.reshape(spec.skins[0].vert, (-1, coil.SIDES, 3)).mean(axis=1).T
-    )  # of the middle of the wire
-    angle = np.unwrap(np.arctan2(y, z - 0.3))
-    assert abs(angle[-1] - angle[0]) == pytest.approx(3 * 2 * np.pi)
-    np.testing.assert_allclose(np.hypot(y, z - 0.3), 0.02, rtol=1e-5)
-    np.testing.assert_allclose(x, np.linspace(0.1, 0.5, len(x)), rtol=1e-5)
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 8])
-def test_states_of_each_channel_fill_what_is_reached_and_channels_differ(n):
-    states = fidelity._states(n, 2.0)
-    assert states.shape[1:] == (2, n)
-    assert len(states) >= 500
-    assert np.abs(states).max() <= 2.0
-    assert (states.max(axis=0) > 1.9).all()
-    assert (states.min(axis=0) < -1.9).all()
-    assert n == 1 or not np.allclose(states[:, :, 0], states[:, :, -1])

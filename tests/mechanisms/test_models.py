@@ -2,18 +2,16 @@
 plant.
 """
 
-import importlib
 from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
-from helpers.episodes import dm_control_suite
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.mechanisms.plant import catalogue, model_path, plant, write
+from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
 pytestmark = pytest.mark.quick
 
@@ -162,48 +160,6 @@ def test_nothing_moves_but_the_equation(name, n):
     assert np.all(model.actuator_gear[:, 0] == 1.0)
 
 
-@CASES
-def test_everything_the_contract_names_is_there(name, n):
-    p = sized(name, n)
-    model = p.load()
-    for kind in ("body", "machine"), ("camera", "look"), ("material", "accent"), ("geom", "floor"):
-        assert getattr(model, kind[0])(kind[1]).id >= 0
-    counts = {
-        "geom": model.ngeom,
-        "body": model.nbody,
-        "site": model.nsite,
-        "tendon": model.ntendon,
-    }
-    for kind, count in counts.items():
-        assert all(getattr(model, kind)(i).name for i in range(count)), kind
-    np.testing.assert_array_equal(model.key("home").qpos[joint_ids(model)], p.x0)
-    assert model.nkey == 1
-
-
-@PLANTS
-def test_machines_attach_side_by_side_with_their_own_accent(name):
-    p = catalogue()[name]
-    scene = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
-    scene.copy_during_attach = True
-    scene.option = p.spec().option
-    for i, law in enumerate(("a", "b", "c")):
-        frame = scene.worldbody.add_frame(pos=np.multiply(i, p.lane))
-        frame.attach_body(p.spec().body("machine"), f"{law}/", "")
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    assert model.nq == 3 * p.load().nq
-    if p.pose:
-        data.qpos[:] = model.qpos0
-    else:
-        data.qpos[:] = np.tile(p.x0, 3)
-    mujoco.mj_forward(model, data)
-    used = {model.mat(i).name for i in model.geom_matid if i >= 0}
-    assert {"a/accent", "b/accent", "c/accent"} <= used
-    left = data.body("a/machine").xpos
-    right = data.body("b/machine").xpos
-    np.testing.assert_allclose(right - left, p.lane)
-
-
 def energy_drift(p, h, seconds=2.0):
     """Largest change of the energy of the undamped, unforced plant, J."""
     model = p.load()
@@ -230,38 +186,16 @@ def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
     assert coarse / fine >= 16
 
 
-@pytest.mark.slow
-def test_pymjcf_reads_every_file():
-    dm_control_suite()
-    mjcf = importlib.import_module("dm_control.mjcf")
-    files = sorted(model_path("").rglob("*.xml"))
-    assert len(files) >= 7
-    for file in files:
-        made = mujoco.MjModel.from_xml_path(str(file))
-        written = mjcf.from_path(str(file))
-        again = mjcf.Physics.from_mjcf_model(written).model
-        for count in ("nq", "nbody", "ngeom", "nsite", "nmat", "ntendon", "nsensor", "nkey"):
-            assert getattr(again, count) == getattr(made, count), f"{count} of {file.name}"
-        np.testing.assert_array_equal(again.body_mass, made.body_mass)
-        np.testing.assert_array_equal(again.geom_pos, made.geom_pos)
-
-
-def test_a_plant_takes_the_sizes_that_it_says(refused):
-    for name in NAMES:
-        base = smc.plant(name)
-        for n in (base.sizes[0] - 1, base.sizes[1] + 1):
-            said = "n of {} is {}: give a whole number from {} to {}".format(name, n, *base.sizes)
-            assert refused(lambda name=name, n=n: smc.plant(name, n=n)) == said
-    refused(lambda: smc.plant("duffing").load(nuserdata=-1))
-
-
-def test_springs_are_drawn_for_fifty_pendulums_and_no_more():
-    assert [len(smc.plant("pendulum_network", n=n).spec().skins) for n in (50, 51)] == [49, 0]
-
-
 @pytest.mark.parametrize("name", ["cart_pole", "pendulum_network", "overhead_crane"])
 def test_a_true_parameter_beyond_what_a_plant_takes_is_refused(name):
     with pytest.raises(
         smc.ScenarioError, match=rf"{name}'s true l becomes \S+: give other factors"
     ):
-        smc.run(smc.Scenario(plant=name, law="none", duration=0.01, mismatch={"l": 1e277}))
+        smc.run(
+            smc.Scenario(
+                plant=name,
+                law="none",
+                duration=0.01,
+                mismatch={"l": 1e277},
+            )
+        )

@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.rotors import ROTOR, spun
 from smc_mujoco.mechanisms.plant import Field
@@ -83,7 +82,14 @@ def newton_euler(duration, period, p, wind):
                 [v, dq, force / p["m"] - [0.0, 0.0, G], np.linalg.solve(J, torque), dW]
             )
 
-        state = solve_ivp(rates, (0.0, period), state, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+        state = solve_ivp(
+            rates,
+            (0.0, period),
+            state,
+            "DOP853",
+            rtol=1e-11,
+            atol=1e-13,
+        ).y[:, -1]
     return (
         state[:3],
         Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(),
@@ -94,7 +100,12 @@ def newton_euler(duration, period, p, wind):
 
 @pytest.mark.parametrize("name", ["crazyflie", "crazyflow"])
 def test_two_seconds_of_a_flip_in_wind_are_those_of_an_integration_without_mujoco(name):
-    plant = smc.plant("quadrotor", set=name, Dx=0.02, Jr=3e-7)
+    plant = smc.plant(
+        "quadrotor",
+        set=name,
+        Dx=0.02,
+        Jr=3e-7,
+    )
     place, turn, v, w = newton_euler(2.0, 4e-3, dict(plant.parameters), np.array([1.0, -2.0, 0.5]))
     misses = []
     for step in (2e-3, 1e-3):
@@ -200,47 +211,63 @@ def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
         return [a * (told - W[0]) + b * (told**2 - W[0] ** 2)]
 
     found, slope = spun.py_func(rotor, first, told, 0.3)
-    expected = solve_ivp(rate, (0.0, 0.3), [first], "DOP853", rtol=1e-12, atol=1e-9).y[0, -1]
+    expected = solve_ivp(
+        rate,
+        (0.0, 0.3),
+        [first],
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-9,
+    ).y[0, -1]
     assert found == pytest.approx(expected, rel=1e-9)
-    assert slope == pytest.approx(rate(0.0, [found])[0], rel=1e-6, abs=1e-9)
+    assert slope == pytest.approx(
+        rate(0.0, [found])[0],
+        rel=1e-6,
+        abs=1e-9,
+    )
     half = spun.py_func(rotor, first, told, 0.1)[0]
     assert spun.py_func(rotor, half, told, 0.2)[0] == pytest.approx(found, rel=1e-12)
 
 
 def falling(**fields):
     """Return a run of a body that falls with its rotors at rest."""
-    plant = fields.pop("plant", smc.plant("quadrotor", lift=0.0, Dx=0.02, Dy=0.01, Dz=0.03))
-    start = {"x0": (0.0, 0.0, 50.0, 0.0, 0.0, 0.0), "v0": (3.0, -2.0, 4.0, 0.0, 0.0, 0.0)}
+    plant = fields.pop(
+        "plant",
+        smc.plant(
+            "quadrotor",
+            lift=0.0,
+            Dx=0.02,
+            Dy=0.01,
+            Dz=0.03,
+        ),
+    )
+    start = {
+        "x0": (0.0, 0.0, 50.0, 0.0, 0.0, 0.0),
+        "v0": (3.0, -2.0, 4.0, 0.0, 0.0, 0.0),
+    }
     return smc.run(
-        smc.Scenario(**(start | {"plant": plant, "law": "none", "duration": 2.0} | fields))
+        smc.Scenario(
+            **(
+                start
+                | {
+                    "plant": plant,
+                    "law": "none",
+                    "duration": 2.0,
+                }
+                | fields
+            )
+        )
     )
-
-
-def test_a_body_thrown_without_thrust_loses_its_speed_to_drag_exponentially():
-    trace = falling()
-    d = np.array([0.02, 0.01, 0.03]) / P["m"]
-    last = np.array([0.0, 0.0, -G]) / d
-    expected = last + (trace.v[0, :3] - last) * np.exp(-trace.t[:, None] * d)
-    np.testing.assert_allclose(trace.v[:, :3], expected, atol=1e-10)
-
-
-def test_in_wind_a_body_moves_as_in_still_air_seen_from_the_air():
-    wind = np.array([2.0, -1.0, 0.5])
-    still = falling()
-    blown = falling(
-        v0=(*(still.v[0, :3] + wind), 0.0, 0.0, 0.0), disturbance=smc.signals.Wind(*wind)
-    )
-    np.testing.assert_allclose(blown.v[:, :3] - wind, still.v[:, :3], atol=1e-10)
-    turned = falling(x0=(0.0, 0.0, 50.0, 0.3, -0.5, 0.8), disturbance=smc.signals.Wind(*wind))
-    R = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
-    np.testing.assert_allclose(
-        turned.d[0, :3], R @ np.diag([0.02, 0.01, 0.03]) @ R.T @ wind, atol=1e-15
-    )
-    assert np.all(turned.d[:, 3:] == 0.0)
 
 
 def test_a_gust_of_wind_is_a_raised_cosine():
-    trace = falling(disturbance=smc.signals.Wind(x=3.0, time=0.5, width=1.0))
+    trace = falling(
+        disturbance=smc.signals.Wind(
+            x=3.0,
+            time=0.5,
+            width=1.0,
+        )
+    )
     shape = np.where(
         np.abs(trace.t - 1.0) < 0.5, 0.5 - 0.5 * np.cos(2 * np.pi * (trace.t - 0.5)), 0.0
     )
@@ -252,9 +279,19 @@ def test_turbulence_has_its_rms_and_its_correlation_whatever_the_step(step):
     """MIL-F-8785C's lengths and sizes at 3.05 m; 60 runs of 20 s, 8 correlation times each along x
     and y.
     """
-    wind = smc.signals.Dryden(w20=7.7, height=3.048, speed=5.0)
+    wind = smc.signals.Dryden(
+        w20=7.7,
+        height=3.048,
+        speed=5.0,
+    )
     base = {
-        "plant": smc.plant("quadrotor", lift=0.0, Dx=1.0, Dy=1.0, Dz=1.0),
+        "plant": smc.plant(
+            "quadrotor",
+            lift=0.0,
+            Dx=1.0,
+            Dy=1.0,
+            Dz=1.0,
+        ),
         "law": "none",
         "duration": 20.0,
     }
@@ -289,10 +326,21 @@ def hovering(**parameters):
     def weight(y, gains, memory):
         return np.array([0.0, 0.0, 0.0319 * 9.81, 0.0, 0.0, 0.0]), np.zeros(6)
 
-    plant = smc.plant("quadrotor", Jx=1e3, Jy=1e3, Jz=1e3, **parameters)
-    return smc.run(smc.Scenario(plant=plant, law=weight, duration=2.0, x0=QUADROTOR.rest)).force[
-        -1, 2
-    ]
+    plant = smc.plant(
+        "quadrotor",
+        Jx=1e3,
+        Jy=1e3,
+        Jz=1e3,
+        **parameters,
+    )
+    return smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=weight,
+            duration=2.0,
+            x0=QUADROTOR.rest,
+        )
+    ).force[-1, 2]
 
 
 def test_a_weak_battery_and_a_fading_rotor_lose_their_share_of_the_thrust():
@@ -305,22 +353,16 @@ def test_a_weak_battery_and_a_fading_rotor_lose_their_share_of_the_thrust():
     assert 0.80 * whole < found < 0.85 * whole
 
 
-def test_the_rotor_that_fades_is_the_front_right_one():
-    """Its side sinks, and the drag that it lacks leaves the body to turn counter-clockwise, as it
-    turns itself.
-    """
-    plant = smc.plant("quadrotor", fade=0.4, Jr=0.0)
-    u = np.array([0.0, 0.0, P["m"] * G, 0.0, 0.0, 0.0])
-    law = smc.law_function(**FREE_BODY)(lambda y, gains, memory: (u.copy(), np.zeros(6)))
-    trace = smc.run(smc.Scenario(plant=plant, law=law, duration=0.01, x0=QUADROTOR.rest))
-    lost = 0.4 * P["m"] * G / 4 * 0.01
-    expected = np.array([P["a"] / P["Jx"], P["a"] / P["Jy"], P["c"] / P["Jz"]]) * lost
-    np.testing.assert_allclose(trace.v[-1, 3:], expected, rtol=0.01)
-
-
 def test_a_payload_that_is_dropped_is_weight_until_then():
     heavy = falling(
-        plant=smc.plant("quadrotor", lift=0.0, payload=0.006, Dx=0.0, Dy=0.0, Dz=0.0319 + 0.006),
+        plant=smc.plant(
+            "quadrotor",
+            lift=0.0,
+            payload=0.006,
+            Dx=0.0,
+            Dy=0.0,
+            Dz=0.0319 + 0.006,
+        ),
         jump=smc.Jump(time=1.0, factors={"payload": -0.006}),
     )
     k = np.searchsorted(heavy.t, 1.0)
@@ -354,96 +396,14 @@ def test_every_set_of_numbers_hovers_where_its_rotors_carry_it(name):
     if name in HOVERS:
         assert speed(p, p["m"] * G / 4) * 30 / math.pi == pytest.approx(HOVERS[name], rel=2e-3)
     trace = smc.run(
-        smc.Scenario(plant=plant, law="geometric", model="nominal", x0=plant.rest, duration=1.0)
+        smc.Scenario(
+            plant=plant,
+            law="geometric",
+            model="nominal",
+            x0=plant.rest,
+            duration=1.0,
+        )
     )
     assert trace.failure is None
     assert np.abs(trace.e).max() < 1e-9
     assert plant.limits[3] == pytest.approx(4 * p["fmax"] * p["a"])
-
-
-def test_motion_is_the_same_turned_about_the_vertical_and_in_a_mirror():
-    """The mirror y -> -y swaps the rotors of left and right, which turn the other way."""
-    common = {"plant": QUADROTOR, "law": "geometric", "model": "nominal", "duration": 1.0}
-    heading = {"reference": [smc.Constant(v) for v in QUADROTOR.rest]}
-    trace = smc.run(
-        smc.Scenario(
-            **common, **heading, x0=(0.3, 0.1, 1.2, 0.2, -0.1, 0.3), v0=(1, 2, 0, 1, -2, 3)
-        )
-    )
-    mirrored = smc.run(
-        smc.Scenario(
-            **common, **heading, x0=(0.3, -0.1, 1.2, -0.2, -0.1, -0.3), v0=(1, -2, 0, -1, -2, -3)
-        )
-    )
-    np.testing.assert_allclose(mirrored.e, trace.e * [1, -1, 1, -1, 1, -1], atol=1e-9)
-    np.testing.assert_allclose(mirrored.applied[:, :4], trace.applied[:, [3, 2, 1, 0]], atol=1e-9)
-    turn = Rotation.from_rotvec([0.0, 0.0, 0.9])
-    start = Rotation.from_rotvec([0.2, -0.1, 0.3])
-    axis = turn.as_rotvec()
-    place = turn.apply([0.3, 0.1, 1.2])
-    v = turn.apply([1.0, 2.0, 0.0])
-    goal = [*turn.apply(QUADROTOR.rest[:3]), *axis]
-    turned = smc.run(
-        smc.Scenario(
-            **common,
-            reference=[smc.Constant(value) for value in goal],
-            x0=(*place, *(turn * start).as_rotvec()),
-            v0=(*v, 1, -2, 3),
-        )
-    )
-    np.testing.assert_allclose(turned.e[:, :3], turn.apply(trace.e[:, :3]), atol=1e-9)
-    np.testing.assert_allclose(turned.e[:, 3:], trace.e[:, 3:], atol=1e-9)
-
-
-def test_laws_know_neither_drag_nor_what_has_gone_wrong():
-    """The mixer and M are those of the nominal numbers, whatever the truth is."""
-    fields = {"plant": QUADROTOR, "law": "geometric", "model": "nominal", "duration": 0.002}
-    plain = smc.run(smc.Scenario(**fields))
-    wrong = smc.run(
-        smc.Scenario(
-            **fields, mismatch={"a": 1.2, "fade": 0.2, "payload": 0.004, "Dx": 3.0, "m": 1.1}
-        )
-    )
-    np.testing.assert_array_equal(plain.applied[0], wrong.applied[0])
-    other = smc.run(smc.Scenario(**(fields | {"plant": smc.plant("quadrotor", a=0.05)})))
-    assert np.abs(other.applied[0] - plain.applied[0]).max() > 1e-3
-
-
-@pytest.mark.parametrize("wind", [smc.signals.Wind(1e300), smc.signals.Wind(y=1e300)])
-def test_a_wind_beyond_all_numbers_ends_its_own_run_alone(wind):
-    runs = []
-    for d in (wind, ()):
-        runs.append(smc.Scenario(plant=QUADROTOR, law="geometric", duration=0.01, disturbance=d))
-    failed, other = smc.run(runs)
-    assert failed.failure == "the disturbance became NaN or inf, at t = 0 s"
-    assert other.failure is None
-
-
-def refusals():
-    yield lambda: smc.plant("quadrotor", set="parrot"), "unknown set of quadrotor 'parrot'"
-    yield lambda: smc.plant("panda", set="gym"), "unknown set of panda"
-    yield lambda: smc.plant("quadrotor", Jx=0.0), "Jx"
-    yield (
-        lambda: smc.run(smc.Scenario(plant=QUADROTOR, law="none", mismatch={"fade": 1.5})),
-        "fade is 1.5",
-    )
-    yield (
-        lambda: smc.run(smc.Scenario(plant=smc.plant("quadrotor", Dz=-1.0), law="none")),
-        "Dz is -1: give 0 or more",
-    )
-    yield (
-        lambda: smc.Scenario(plant="duffing", law="pid", disturbance=smc.signals.Wind(1.0)),
-        "has no drag",
-    )
-    yield (
-        lambda: smc.Scenario(plant=QUADROTOR, law="geometric", reference=smc.signals.Wind(1.0)),
-        "is a wind",
-    )
-    yield lambda: smc.signals.Dryden(w20=5.0, height=1.0), "height"
-    yield lambda: smc.Scenario(plant=QUADROTOR, law="pid"), "of one channel"
-
-
-@pytest.mark.parametrize(("make", "named"), list(refusals()), ids=[case[1] for case in refusals()])
-def test_what_a_quadrotor_does_not_take_is_refused(make, named):
-    with pytest.raises(ScenarioError, match=named):
-        make()

@@ -18,13 +18,21 @@ from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_0
+from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0
 
 GRAV = 9.81
 STATES = 1000
 # plant -> parameters that have friction and rotors of every kind
 ROUGH = {
-    "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5, "k": 4e-3, "tx": 0.1, "ty": -0.2},
+    "furuta": {
+        "b": 3e-4,
+        "bq": 1e-5,
+        "cf": 2e-3,
+        "cfq": 1e-5,
+        "k": 4e-3,
+        "tx": 0.1,
+        "ty": -0.2,
+    },
     "double_pendulum": MODEL_1_0,
     "pendubot": MODEL_1_0,
     "acrobot": MODEL_1_0,
@@ -36,7 +44,7 @@ ORDER = {"acrobot": [1, 0]}
 
 
 def furuta(p, q, v, u):
-    """(x'', q'') by Lagrange's equations of the arm and of the pendulum as a rod without thickness."""
+    """(x'', q'') by Lagrange's equations of the arm and of the pendulum as a thin rod."""
     Jp = p.Jc + p.m * p.l**2
     s = math.sin(q[1])
     c = math.cos(q[1])
@@ -59,7 +67,7 @@ def furuta(p, q, v, u):
 
 
 def double_pendulum(p, q, v, u):
-    """(q1'', q2''): each link's mass at its centre, by Jacobians, with its inertia and the rotors'."""
+    """(q1'', q2''): each link's mass at its centre, by Jacobians, its inertia and the rotors'."""
     mass = np.zeros((2, 2))
     force = np.array(u, float)
     one = q[0]
@@ -164,9 +172,19 @@ START = {
 def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(name):
     plant = smc.plant(name, **dict.fromkeys(smc.plant(name).dry, 0.0))
     v0 = 1.0 if name == "servo_axis" else 0.0
-    common = {"control_period": 2e-3, "physics_step": 2e-3, "duration": 2.0}
+    common = {
+        "control_period": 2e-3,
+        "physics_step": 2e-3,
+        "duration": 2.0,
+    }
     trace = smc.run(
-        smc.Scenario(plant=plant, law="none", x0=START.get(name, (1.0, 0.5)), v0=v0, **common)
+        smc.Scenario(
+            plant=plant,
+            law="none",
+            x0=START.get(name, (1.0, 0.5)),
+            v0=v0,
+            **common,
+        )
     )
     assert trace.scenario.resolved.integrator == "RK4"
     p = SimpleNamespace(**plant.parameters)
@@ -176,7 +194,15 @@ def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(n
         return np.concatenate([y[n:], acceleration(name, p, y[:n], y[n:], np.zeros(plant.driven))])
 
     start = np.concatenate([trace.x[0], trace.v[0]])
-    found = solve_ivp(slope, (0, 2), start, "DOP853", trace.t, rtol=1e-11, atol=1e-12)
+    found = solve_ivp(
+        slope,
+        (0, 2),
+        start,
+        "DOP853",
+        trace.t,
+        rtol=1e-11,
+        atol=1e-12,
+    )
     assert np.abs(found.y[:n].T - trace.x).max() < 1e-6
     assert np.ptp(trace.x) > 0.2
 
@@ -203,7 +229,10 @@ def runge_kutta(p, x, torque, period=2e-3, seconds=2.0):
 def played(times, torque):
     """A law that gives the torque of a table, held between its times, whatever it measures."""
 
-    @smc.law_function(plants=("pendubot", "acrobot"), memory=1)
+    @smc.law_function(
+        plants=("pendubot", "acrobot"),
+        memory=1,
+    )
     def table(y, gains, memory):
         k = min(int(y.t / times + 0.5), len(torque) - 1)
         return torque[k], 0.0
@@ -259,15 +288,6 @@ def test_the_published_mass_matrix_has_rotors_as_here():
     )
 
 
-def test_the_weight_is_drawn_at_the_end_of_the_lower_link():
-    model = smc.plant("double_pendulum", l1=0.25).load()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    shoulder = data.xanchor[model.joint("shoulder").id]
-    down = shoulder[2] - data.geom_xpos[model.geom("weight").id][2]
-    assert down == pytest.approx(0.25 + L2)
-
-
 def test_dry_friction_holds_the_axis_and_lets_go_at_its_level():
     cf, offset = (smc.plant("servo_axis").parameters[name] for name in ("cf", "offset"))
     pushes = []
@@ -290,47 +310,33 @@ def test_dry_friction_holds_the_axis_and_lets_go_at_its_level():
     assert min(moved[1], moved[3]) > 1e-4
 
 
-def test_friction_of_a_part_is_added_to_that_of_the_plant():
-    """The axis of the plant's friction and a part's is that of both in the plant."""
-    base = smc.plant("servo_axis").parameters
-    common = {"law": "none", "v0": 1.0, "duration": 0.4}
-    both = smc.plant("servo_axis", cf=base["cf"] + 5.0)
-    beside, inside = smc.run(
-        [
-            smc.Scenario(plant="servo_axis", friction=smc.Coulomb(5.0), **common),
-            smc.Scenario(plant=both, **common),
-        ]
-    )
-    np.testing.assert_allclose(beside.x, inside.x, atol=1e-12)
-
-
-@PLANTS
-def test_a_plant_is_smooth_without_any_dry_friction(name):
-    without = dict.fromkeys(smc.plant(name).dry, 0.0)
-    assert smc.plant(name, **without).smooth
-    assert not any(smc.plant(name, **without | {key: 0.1}).smooth for key in without)
-
-
-@PLANTS
-def test_the_motor_limits_the_command(name):
-    limit = {"furuta": 0.05, "servo_axis": 351.507}.get(name, 6.0)
-    assert (
-        smc.Scenario(plant=name, law="none").limits
-        == (pytest.approx(limit),) * smc.plant(name).driven
-    )
-
-
 def test_a_gust_on_the_pole_of_a_turned_arm_is_logged_as_its_torque_about_the_hinge():
     """Against the force times dp/dq of the pole's centre p, by the formula of its place:
 
     F l cos(q) cos(x).
     """
     gust = smc.signals.Gust(0.02, time=-1.0, width=3.0)
-    fields = {"law": "none", "x0": (0.8, 0.5), "v0": (3.0, 0.0), "disturbance": gust}
-    trace = smc.run(smc.Scenario(plant="furuta", duration=0.3, **fields))
+    fields = {
+        "law": "none",
+        "x0": (0.8, 0.5),
+        "v0": (3.0, 0.0),
+        "disturbance": gust,
+    }
+    trace = smc.run(
+        smc.Scenario(
+            plant="furuta",
+            duration=0.3,
+            **fields,
+        )
+    )
     (x, q), force = trace.x.T, np.array([smc.signals.Gust.value(t, gust)[0] for t in trace.t])
     assert np.ptp(np.cos(x)) > 0.5
     lever = trace.scenario.plant.parameters["l"] * np.cos(q) * np.cos(x)
-    np.testing.assert_allclose(trace.d[:, 1], force * lever, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        trace.d[:, 1],
+        force * lever,
+        rtol=1e-9,
+        atol=1e-15,
+    )
     assert not trace.d[:, 0].any()  # the centre of the arm lies on its own axis
     np.testing.assert_array_equal(trace.d, reference.run(trace.scenario).d)

@@ -18,15 +18,14 @@ from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.control.component import GainWarning
-from smc_mujoco.control.laws.hierarchical import hierarchical
-from smc_mujoco.control.surface import surface as surface_of
-from smc_mujoco.mechanisms.hardware.part import joint_ids
 
 NAMES = ("cart_pole", "overhead_crane")
 PLANTS = pytest.mark.parametrize("name", NAMES)
 GRAV = 9.81
-LENGTH = {"cart_pole": 4.0 / 3.0 * 0.5, "overhead_crane": -0.7}  # m, L of the law's docstring
+LENGTH = {
+    "cart_pole": 4.0 / 3.0 * 0.5,
+    "overhead_crane": -0.7,
+}  # m, L of the law's docstring
 LAW = SimpleNamespace(**smc.law("hierarchical").gains)
 
 
@@ -56,7 +55,12 @@ def changed(name, rng):
 
 
 def scenario(name, law="hierarchical", **fields):
-    return smc.Scenario(plant=name, law=law, model=fields.pop("model", "nominal"), **fields)
+    return smc.Scenario(
+        plant=name,
+        law=law,
+        model=fields.pop("model", "nominal"),
+        **fields,
+    )
 
 
 def bound(trace):
@@ -113,26 +117,6 @@ def test_nominal_is_the_equation_of_both_joints_and_compiles_to_it(name):
 
 
 @PLANTS
-def test_fields_alone_carry_a_parameter_change(name):
-    rng = np.random.default_rng(2)
-    p = changed(name, rng)
-    jumped = smc.plant(name).load()
-    made = p.load()
-    for field, at, value, _ in p.fields(jumped, p.values({})):
-        if field.startswith("opt."):
-            owner = jumped.opt
-        else:
-            owner = jumped
-        getattr(owner, field.removeprefix("opt."))[at] = value
-    for model in (jumped, made):
-        data = mujoco.MjData(model)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = (0.4, -1.1), (0.7, 2.0), 3.0
-        mujoco.mj_forward(model, data)
-        expected = acceleration(name, SimpleNamespace(**p.parameters), (0.4, -1.1), (0.7, 2.0), 3.0)
-        np.testing.assert_allclose(data.qacc, expected, rtol=1e-9)
-
-
-@PLANTS
 def test_every_parameter_is_felt_by_both_joints(name):
     base = smc.plant(name)
     before = acceleration(name, SimpleNamespace(**base.parameters), (0.3, 1.2), (1.0, 2.0), 3.0)
@@ -141,30 +125,6 @@ def test_every_parameter_is_felt_by_both_joints(name):
         data.qpos[:], data.qvel[:], data.ctrl[:] = (0.3, 1.2), (1.0, 2.0), 3.0
         mujoco.mj_forward(model, data)
         assert np.all(np.abs(data.qacc - before) > 1e-6), key
-
-
-@PLANTS
-def test_the_file_holds_the_default_parameters(name):
-    p = smc.plant(name)
-    model = p.spec().compile()
-    for field, at, value, _ in p.fields(model, p.values({})):
-        if field.startswith("opt."):
-            owner = model.opt
-        else:
-            owner = model
-        assert np.all(getattr(owner, field.removeprefix("opt."))[at] == np.asarray(value)), field
-    np.testing.assert_array_equal(model.key("home").qpos, p.x0)
-    assert (model.nv, model.nu, model.nsensor) == (2, 1, 4)
-    kinds = {mujoco.mjtJoint.mjJNT_SLIDE: "m", mujoco.mjtJoint.mjJNT_HINGE: "rad"}
-    assert (
-        p.units
-        == tuple(kinds[mujoco.mjtJoint(model.jnt_type[joint])] for joint in joint_ids(model))
-        == ("m", "rad")
-    )
-    assert model.body_mass.sum() == pytest.approx(p.parameters["M"] + p.parameters["m"], rel=1e-15)
-    assert not model.jnt_limited.any()
-    assert not model.dof_armature.any()
-    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
 
 
 def energies(p, trace):
@@ -183,7 +143,16 @@ def energies(p, trace):
 @PLANTS
 def test_a_free_plant_keeps_its_energy_and_its_momentum_along_the_rail(name):
     p = smc.plant(name)
-    trace = smc.run(scenario(p, "none", model="none", x0=(0.0, 1.0), v0=(0.3, 0.5), duration=2.0))
+    trace = smc.run(
+        scenario(
+            p,
+            "none",
+            model="none",
+            x0=(0.0, 1.0),
+            v0=(0.3, 0.5),
+            duration=2.0,
+        )
+    )
     assert np.ptp(energies(p, trace)) < 1e-9
     up = 1.0 if name == "cart_pole" else -1.0
     (v, dq), q, values = trace.v.T, trace.x[:, 1], p.parameters
@@ -200,7 +169,11 @@ def test_only_the_cart_is_driven_and_disturbed(name):
         assert array[:, 0].any()
         assert not array[:, 1].any()
     gust = smc.run(
-        scenario(name, disturbance=smc.signals.Gust(0.5, time=0.1, width=0.2), duration=0.5)
+        scenario(
+            name,
+            disturbance=smc.signals.Gust(0.5, time=0.1, width=0.2),
+            duration=0.5,
+        )
     )
     assert gust.d[:, 1].any()  # the wind meets the pole, too
 
@@ -209,7 +182,15 @@ def test_only_the_cart_is_driven_and_disturbed(name):
 def test_the_stops_end_the_rail(name):
     """A blow at 2 m/s goes about 1 cm deep (contact.DEPTH), and loses energy."""
     p = smc.plant(name)
-    run = scenario(p, "none", model="none", x0=0.0, v0=(2.0, 0.0), contact="stops", duration=2.0)
+    run = scenario(
+        p,
+        "none",
+        model="none",
+        x0=0.0,
+        v0=(2.0, 0.0),
+        contact="stops",
+        duration=2.0,
+    )
     trace = smc.run(run)
     assert 1.69 < trace.x[:, 0].max() < 1.72
     assert trace.v[:, 0].min() < -0.3
@@ -222,14 +203,26 @@ PARTS = {
     "ideal": {},
     "viscous": {"friction": smc.Viscous(0.05)},
     "coulomb": {"friction": smc.Coulomb(0.001)},
-    "lugre": {"friction": smc.hardware.LuGre(coulomb=0.001, static=0.0012, stribeck=0.05)},
+    "lugre": {
+        "friction": smc.hardware.LuGre(
+            coulomb=0.001,
+            static=0.0012,
+            stribeck=0.05,
+        )
+    },
     "lag": {"actuator": smc.Lag(0.01)},
     "motor": {"actuator": smc.DCMotor()},
     "rate": {"actuator": smc.hardware.RateLimit(200.0)},
     "backlash": {"actuator": (smc.Lag(0.005), smc.Backlash(0.002))},
     "encoder": {"sensor": smc.Encoder(counts=20_000)},
     "late": {
-        "sensor": smc.Encoder(counts=20_000, bias=1e-3, dropout=0.05, period=2e-3, delay=2e-3)
+        "sensor": smc.Encoder(
+            counts=20_000,
+            bias=1e-3,
+            dropout=0.05,
+            period=2e-3,
+            delay=2e-3,
+        )
     },
     "stops": {"contact": "stops"},
     "noise": {
@@ -237,7 +230,17 @@ PARTS = {
         "disturbance": smc.signals.OrnsteinUhlenbeck(0.1, tau=0.1),
     },
     "gust": {"disturbance": smc.signals.Gust(0.3, time=0.1, width=0.2)},
-    "jump": {"jump": smc.Jump(time=0.1, factors={"M": 1.2, "m": 0.8, "l": 1.1, "grav": 1.01})},
+    "jump": {
+        "jump": smc.Jump(
+            time=0.1,
+            factors={
+                "M": 1.2,
+                "m": 0.8,
+                "l": 1.1,
+                "grav": 1.01,
+            },
+        )
+    },
     "delay": {"input_delay": 5e-3},
 }
 
@@ -261,7 +264,14 @@ def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_pr
     S is 0 the while.
     """
     levels = np.array([0.001, 0.002, 0.004])
-    runs = [scenario("cart_pole", friction=smc.Coulomb(level), duration=20.0) for level in levels]
+    runs = [
+        scenario(
+            "cart_pole",
+            friction=smc.Coulomb(level),
+            duration=20.0,
+        )
+        for level in levels
+    ]
     traces = smc.run(runs)
     cycles = np.array([np.abs(trace.x[-6000:, 0]).max() for trace in traces])
     assert max(np.abs(surface(trace)[-6000:]).max() for trace in traces) <= 2e-3 * LAW.k
@@ -286,7 +296,13 @@ def test_s_chatters_in_proportion_to_the_control_period(name):
     runs = []
     for h in (8e-3, 2e-3):
         runs.append(
-            scenario(name, u_max=math.inf, control_period=h, physics_step=2e-4, duration=4.0)
+            scenario(
+                name,
+                u_max=math.inf,
+                control_period=h,
+                physics_step=2e-4,
+                duration=4.0,
+            )
         )
     coarse, fine = (np.abs(surface(trace)[trace.t > 3.0]).max() for trace in smc.run(runs))
     assert coarse / fine == pytest.approx(4.0, rel=0.2)
@@ -301,51 +317,6 @@ def test_both_joints_come_to_rest_within_6_newton(name):
     assert np.all(np.abs(trace.v[-1]) < 1e-2)
 
 
-def test_the_load_is_kept_from_swinging_on_the_way_and_at_the_end():
-    """In comparison with a law that only brings the trolley to 0, with the same c1."""
-    ours = smc.run(scenario("overhead_crane"))
-    trolley = smc.run(
-        scenario("overhead_crane", smc.law("classical", c=LAW.c1, k=1.0), model="none")
-    )
-    swing = [np.abs(trace.x[trace.t > 5.0, 1]).max() for trace in (ours, trolley)]
-    assert np.abs(ours.x[:, 1]).max() < 0.07
-    assert swing[0] < 0.01
-    assert swing[1] > 10 * swing[0]
-
-
-@PLANTS
-def test_an_initial_swing_is_stopped_too(name):
-    for x0, v0 in itertools.product([(0.3, -0.2), (-0.2, 0.2)], [(0.2, 0.0), (0.0, 0.3)]):
-        assert bound(smc.run(scenario(name, x0=x0, v0=v0))) <= 0.05
-
-
-as_published = numba.njit(hierarchical.function)
-
-
-@smc.law_function(gains=vars(LAW), memory=1)
-def turned(y, gains, memory):
-    """The law with its control turned round."""
-    u, s = as_published(y, gains, memory)
-    return -u, s
-
-
-@PLANTS
-def test_the_wrong_sign_fails(name):
-    trace = smc.run(scenario(name, turned))
-    assert trace.failure or bound(trace) * max(map(abs, trace.scenario.resolved.x0)) > 1.0
-
-
-@pytest.mark.slow
-@PLANTS
-@pytest.mark.parametrize(
-    "factors", [{"M": 0.8}, {"M": 1.2}, {"m": 0.8}, {"m": 1.2}, {"M": 1.2, "m": 1.2, "l": 1.1}]
-)
-def test_masses_off_by_a_fifth_are_borne(name, factors):
-    trace = smc.run(scenario(name, mismatch=factors))
-    assert bound(trace) <= 0.05
-    assert np.abs(surface(trace)[trace.t > 8.0]).max() <= 2e-3 * LAW.k
-
-
 @PLANTS
 def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_rate(name):
     p = smc.plant(name)
@@ -355,7 +326,14 @@ def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_r
     small = 0.8 * LAW.k / b
     large = 1.5 * LAW.k / b
     held, left = smc.run(
-        [scenario(name, disturbance=smc.Constant(d), duration=15.0) for d in (small, large)]
+        [
+            scenario(
+                name,
+                disturbance=smc.Constant(d),
+                duration=15.0,
+            )
+            for d in (small, large)
+        ]
     )
     assert bound(held) <= 0.05
     assert np.abs(surface(held)[-1000:]).max() <= 3e-3 * LAW.k
@@ -381,11 +359,25 @@ def test_the_motion_on_the_surface_is_stable_exactly_where_its_roots_say(name, g
     stable = roots.real.max() < 0
     assert stable == (0 < c1 < c2 and a * L < 1)
 
-    gains = {"a": a, "c1": c1, "c2": c2, "k": 1e-3, "rate": 5.0}
+    gains = {
+        "a": a,
+        "c1": c1,
+        "c2": c2,
+        "k": 1e-3,
+        "rate": 5.0,
+    }
     law = dataclasses.replace(smc.law("hierarchical"), gains=gains)  # unchecked
     start = np.array([c2, -a * c1]) / math.hypot(c2, a * c1) * 1e-3  # on the surface
     seconds = 5.0 / abs(roots.real.max())
-    trace = smc.run(scenario(name, law, x0=start.tolist(), duration=seconds, u_max=math.inf))
+    trace = smc.run(
+        scenario(
+            name,
+            law,
+            x0=start.tolist(),
+            duration=seconds,
+            u_max=math.inf,
+        )
+    )
     assert trace.failure is None
     sizes = np.linalg.norm(trace.x, axis=1)
     late = sizes[-len(sizes) // 5 :].max() / sizes[0]
@@ -394,82 +386,13 @@ def test_the_motion_on_the_surface_is_stable_exactly_where_its_roots_say(name, g
     assert np.abs(S).max() < 0.01 * max(np.abs(trace.x).max(), np.abs(trace.v).max())
 
 
-def test_without_the_model_it_brings_the_crane_in_and_drops_the_pole():
-    pole, crane = (smc.run(scenario(name, model="none")) for name in NAMES)
-    assert bound(crane) <= 0.05
-    assert np.abs(pole.x[:, 1]).max() > math.pi / 2
-
-
-def test_a_law_that_drops_the_pole_settles_nothing_in_a_study(tmp_path):
-    """It may hold the cart meanwhile, where hierarchical moves it to catch the pole."""
-    laws = "hierarchical", "super_twisting"
-    table = smc.study(
-        [smc.Scenario(plant="cart_pole", law=law, duration=8.0) for law in laws], tmp_path
-    )
-    assert smc.scores(table.trace(1))["driven"]["settling_time"] < 8.0
-    assert table.column("settling_time")[0] < 8.0
-    assert table.column("settling_time")[1] == math.inf
-
-
-def test_a_pole_past_the_singular_angle_is_lost():
-    """At cos q = a L the control changes its direction on S."""
-    limit = math.acos(LAW.a * LENGTH["cart_pole"])
-    assert math.degrees(limit) == pytest.approx(63, abs=1)
-    trace = smc.run(scenario("cart_pole", x0=(0.0, limit + 0.05), u_max=100.0, duration=3.0))
-    assert trace.failure or np.abs(trace.x[:, 1]).max() > math.pi / 2
-
-
 def test_a_reference_moves_the_cart_and_the_joint_that_goes_with_it_stays():
     for name in NAMES:
-        trace = smc.run(scenario(name, x0=0.0, reference=smc.Constant(0.5)))
+        trace = smc.run(
+            scenario(
+                name,
+                x0=0.0,
+                reference=smc.Constant(0.5),
+            )
+        )
         np.testing.assert_allclose(trace.x[-1], (0.5, 0.0), atol=5e-3)
-
-
-@PLANTS
-def test_the_cart_s_surface_may_be_the_scenario_s(name):
-    """The linear one with the same c gives the same run, to the last bit."""
-    own, given = smc.run(
-        [scenario(name, surface=s) for s in (None, surface_of("linear", c=LAW.c1))]
-    )
-    np.testing.assert_array_equal(own.x, given.x)
-    other = smc.run(scenario(name, surface=surface_of("linear", c=0.9 * LAW.c1)))
-    assert bound(other) <= 0.05
-    assert not np.array_equal(own.x, other.x)
-
-
-def test_gains_that_miss_the_condition_warn():
-    with pytest.warns(GainWarning, match="c2 > c1"):
-        smc.law("hierarchical", c1=2.0, c2=1.0)
-
-
-def test_friction_of_the_parameters_is_that_of_the_part():
-    """b and bq are MuJoCo's joint damping, as smc.Viscous is."""
-    for name in NAMES:
-        common = {"integrator": "implicitfast", "physics_step": 2.5e-4, "duration": 1.0}
-        inside = smc.run(scenario(smc.plant(name, b=0.2, bq=0.2), "none", model="none", **common))
-        beside = smc.run(scenario(name, "none", model="none", friction=smc.Viscous(0.2), **common))
-        np.testing.assert_array_equal(inside.x, beside.x)
-
-
-def test_runs_of_one_batch_may_differ_in_every_parameter():
-    for name in NAMES:
-        base = smc.plant(name)
-        plants = []
-        for key, value in base.parameters.items():
-            plants.append(smc.plant(name, **{key: 1.3 * value or 0.2}))
-        runs = [scenario(p, duration=0.1) for p in plants]
-        for run, trace in zip(runs, smc.run(runs), strict=True):
-            other = reference.run(run)
-            np.testing.assert_array_equal(trace.x, other.x)
-            np.testing.assert_array_equal(trace.u, other.u)
-        assert len({dataclasses.replace(run).plant.parameters["l"] for run in runs}) == 2
-
-
-def test_obstacles_on_the_rail_do_not_ask_for_a_length_of_the_pole():
-    plant = smc.plant("cart_pole", l=0.6)
-    assert (
-        smc.run(
-            smc.Scenario(plant=plant, law="hierarchical", contact="stops", duration=0.05)
-        ).failure
-        is None
-    )

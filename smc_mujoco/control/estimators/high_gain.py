@@ -4,8 +4,8 @@ Both poles are at -w. Ramps are tracked exactly once the start has decayed, para
 of 2 / w. White noise of x passes with the gain sqrt(2 (1-b)^3 / (1+b)^3) / h, b = exp(-w h), which
 is w^1.5 sqrt(h) / 2 for small w h. A unit step of x causes a peak of w / e in z2 (e is Euler's
 number). The observer is discretised exactly, with both poles at b, and uses the current sample at
-once, so any w h is stable. It starts from the first reading, at rest, without a peak. Gains: w,
-bandwidth [1/s].
+once, so any w h is stable. It starts from the first reading, at rest, without a peak.
+Gains: w, bandwidth [1/s].
 Sources: H. K. Khalil & L. Praly, "High-gain observers in nonlinear feedback control", Int. J.
 Robust Nonlinear Control 24(6):993, 2014 (observer); N. Morrison, Introduction to Sequential
 Smoothing and Prediction, McGraw-Hill 1969 (the fading-memory filter that its sampled form is, and

@@ -15,8 +15,8 @@ The default L is computed, not tuned: the largest jerk of an actuator with the l
 from -U to U, 2 g U / tau, for U = 6, g = 8 of the study's lightest plants and tau = 20 ms, the lag
 of its realistic conditions. A smaller L fails on rougher signals, a larger one amplifies noise. At
 a control period of 20 ms the error O(L h^2) is several units, so choose a smaller L there. If the
-acceleration is used, L should be little above the plant's own largest jerk. Gains: L, bound on the
-derivative of order n + 1 [m/s^(n+1)]; order, n.
+acceleration is used, L should be little above the plant's own largest jerk.
+Gains: L, bound on the derivative of order n + 1 [m/s^(n+1)]; order, n.
 Sources: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379,
 1998 (n = 1); A. Levant, "Higher-order sliding modes, differentiation and output-feedback control",
 Int. J. Control 76(9):924, 2003; M. Livne & A. Levant, "Proper discretization of homogeneous

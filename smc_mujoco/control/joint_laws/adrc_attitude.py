@@ -11,8 +11,8 @@ does not explain, so that no constant torque leaves an error. No rate is measure
 sample. y'' is |q0| w' near the wanted attitude, or for turns about one axis. With the lag right the
 poles there are -wo, -1 / lag and those of lag p^3 + p^2 + 2 wc p + wc^2, stable for wc lag < 2. The
 defaults, chosen before a run, have a phase margin of 33 degrees, of 10 where the lag is 0.136 s. A
-Crazyflie that tumbles upside down, at 12 rad/s, loses 12 m with them.
-s is e' + (kx / kv) e and z2 + wc z1 / 2: the law slides nowhere.
+Crazyflie that tumbles upside down, at 12 rad/s, loses 12 m with them. s is e' + (kx / kv) e and z2
++ wc z1 / 2: the law slides nowhere.
 Gains: kx [1/s^2] and kv [1/s], of the position; wc [1/s], bandwidth of the loop; wo [1/s], of the
 observer; lag [s], of the rotors.
 Source: Z. Gao, "Scaling and bandwidth-parameterization based controller tuning", American Control

@@ -9,8 +9,8 @@ with e the error of the position, R the attitude, Rd the one that turns the thru
 first axis of the reference's attitude, w the angular velocity, and wd that of Rd, which follows
 from F', in the axes of the body. Of the reference's attitude only the heading counts. s is e' + (kx
 / kv) e and e_W + (kR / kW) e_R: the law slides nowhere. Exponentially stable if the attitude starts
-within 90 degrees of Rd, attractive from almost all others: for exact J,
-no saturation and no lag of the thrust, and |F| above 0.
+within 90 degrees of Rd, attractive from almost all others: for exact J, no saturation and no lag of
+the thrust, and |F| above 0.
 Gains: kx [1/s^2], kv [1/s], of the position; kR [1/s^2], kW [1/s], of the attitude. Those of the
 paper per mass and inertia: 16, 5.6, 107, 31. Defaults: kx and kv of the firmware, kR and kW of the
 Crazyflie in arXiv 2508.06568.

@@ -14,10 +14,10 @@ is taken into account:
 
 with Jr the inertia of a rotor, kf W^2 its force at speed W, c its torque per force, and dMz_ the
 sample before. By default the rotors have no inertia. s is e' + (kx / kv) e and we + (kq / kw) 2
-sgn(q0) qv: the law slides nowhere. Gains: kx [1/s^2] and kv [1/s], of the position; kq [1/s^2] and
-kw [1/s], of the attitude; cutoff [Hz], of the filters; lag [s], of the rotors; spin [s], of their
-inertia. Defaults of the Crazyflie's firmware, which runs at 500 Hz, except kx and kv, which are
-chosen.
+sgn(q0) qv: the law slides nowhere.
+Gains: kx [1/s^2] and kv [1/s], of the position; kq [1/s^2] and kw [1/s], of the attitude; cutoff
+[Hz], of the filters; lag [s], of the rotors; spin [s], of their inertia. Defaults of the
+Crazyflie's firmware, which runs at 500 Hz, except kx and kv, which are chosen.
 Source: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion for
 attitude control of micro air vehicles", J. Guidance, Control, and Dynamics 39(3):450, 2016, doi
 10.2514/1.G001490; without its adaptation.

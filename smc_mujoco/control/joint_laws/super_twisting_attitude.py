@@ -6,14 +6,14 @@ as a quadrotor.
 with the position's loop, the wanted attitude and its rate wd of `quaternion_sliding`. The change of
 wd is part of the disturbance per inertia d. For |d'| <= L on an axis, k1 = 1.5 sqrt(L) and k2 = 1.1
 L bring s to 0 in finite time and z to -d, so that no constant torque leaves an error; sampled, s
-stays within O(dt^2). |z| <= z_max stops its wind-up.
-The theorem has rotors without a lag. 3e-4 N m at 2 Hz on a Crazyflie ask for L = 227, k1 = 22.6 and
-k2 = 250. With these a lag of 62.5 ms leaves a limit cycle, of s near 1.0 rad/s by harmonic balance:
-rotors saturate, and it loses height. So the default k2 is 50, chosen after that run: 0.04 rad/s,
-for |d'| < 30 by k1^2 > 4 L (k2 + L) / (k2 - L). Gains: c [1/s], slope of the position's surface; Kx
-[m/s^2], its switching gain; rhox [s/m], its slope in tanh; lam [rad/s], slope of the attitude's
-surface; k1 [rad^1/2/s^3/2], of the square root; k2 [rad/s^3], of the integral; z_max [rad/s^2],
-bound on z.
+stays within O(dt^2). |z| <= z_max stops its wind-up. The theorem has rotors without a lag. 3e-4 N m
+at 2 Hz on a Crazyflie ask for L = 227, k1 = 22.6 and k2 = 250. With these a lag of 62.5 ms leaves a
+limit cycle, of s near 1.0 rad/s by harmonic balance: rotors saturate, and it loses height. So the
+default k2 is 50, chosen after that run: 0.04 rad/s, for |d'| < 30 by k1^2 > 4 L (k2 + L) / (k2 -
+L).
+Gains: c [1/s], slope of the position's surface; Kx [m/s^2], its switching gain; rhox [s/m], its
+slope in tanh; lam [rad/s], slope of the attitude's surface; k1 [rad^1/2/s^3/2], of the square root;
+k2 [rad/s^3], of the integral; z_max [rad/s^2], bound on z.
 Source: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379,
 1998 (the algorithm and these gains), on the surface of `quaternion_sliding`. Gains for a Crazyflie
 are not published.

@@ -15,8 +15,9 @@ with p = d/dt. On e'' = g u it is stable for 0.245 < g / b < 4.05 if w = 2 wc, a
 saturation, so z3 does not wind up. It is discretised exactly for u constant over the period, with
 all poles at exp(-w dt). It needs no rate but at the first sample. With the model b = g, and f and
 r'' are known to the observer and fed forward. `extended_state` has this observer beside a switching
-term, and feeds back the position by its sign alone. The trace's s is wc^2 z1 + 2 wc z2. Gains: wc,
-bandwidth of the loop [1/s]; w, bandwidth of the observer [1/s]; b, assumed input gain [1/kg].
+term, and feeds back the position by its sign alone. The trace's s is wc^2 z1 + 2 wc z2.
+Gains: wc, bandwidth of the loop [1/s]; w, bandwidth of the observer [1/s]; b, assumed input gain
+[1/kg].
 Sources: J. Han, "From PID to active disturbance rejection control", IEEE Trans. Ind. Electron.
 56(3):900, 2009; Z. Gao, "Scaling and bandwidth-parameterization based controller tuning", American
 Control Conference 2003; R. Miklosovic, A. Radke & Z. Gao, "Discrete implementation and

@@ -7,8 +7,9 @@ For e'' = u + d with |d'| <= L this continuous u brings e, de and e'' to 0 in fi
 and |de| = O(dt^2). w winds up while the actuator saturates. The trace's s is e, of relative degree
 2.
 Gains: L, bound on d' [N/s]; k1, of the position [kg^1/3]; k2, of the velocity [kg^1/2]; k3 and k4,
-of the integral. Source: V. Torres-Gonzalez, T. Sanchez, L. Fridman & J. Moreno, "Design of
-continuous twisting algorithm", Automatica 80:119, 2017.
+of the integral.
+Source: V. Torres-Gonzalez, T. Sanchez, L. Fridman & J. Moreno, "Design of continuous twisting
+algorithm", Automatica 80:119, 2017.
 """
 
 import math

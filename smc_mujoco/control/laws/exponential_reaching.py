@@ -3,8 +3,8 @@
 Gao's "constant plus proportional rate". s' = u reaches s = 0 at ln(1 + q |s0| / k) / q; if q |s0|
 >> k this is much sooner than |s0| / k. Under |d| <= D < k it is reached at ln(1 + q |s0| / (k - D))
 / q at the latest. The residual is that of `classical`, O(dt). The law is explicit and needs g q dt
-< 1. With k = 0 it is linear and never reaches s = 0. Gains: k, switching gain [N]; q, reaching rate
-[N s/m]; c, slope of the surface [1/s].
+< 1. With k = 0 it is linear and never reaches s = 0.
+Gains: k, switching gain [N]; q, reaching rate [N s/m]; c, slope of the surface [1/s].
 Source: W. Gao & J. C. Hung, "Variable structure control of nonlinear systems: a new approach", IEEE
 Trans. Ind. Electron. 40(1):45, 1993 (law); times: integrated here.
 """

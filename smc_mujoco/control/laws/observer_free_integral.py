@@ -10,9 +10,9 @@ Stability: linearised at that equilibrium, J x'' + D x' + K x = u + d gives J p^
 
     m > -D,    ki > 0,    (D + m) (K + m k1) > J m ki,
 
-which for ki -> 0 is the plain law's condition.
-Anti-windup: z stops while |s + ki z| > 2 or the actuator saturates, unless e drives it back. So
-loads up to lam tanh 2 = 0.96 lam are compensated. z is integrated by the explicit Euler method.
+which for ki -> 0 is the plain law's condition. Anti-windup: z stops while |s + ki z| > 2 or the
+actuator saturates, unless e drives it back. So loads up to lam tanh 2 = 0.96 lam are compensated. z
+is integrated by the explicit Euler method.
 Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; ki, integral gain [1/s^2].
 Source: the law of J. Gaber (observer_free) with conditional integration, K. J. Astrom & T.
 Hagglund, PID Controllers, ISA 1995, section 3.5.

@@ -5,8 +5,8 @@ For processors with a 32-bit floating-point unit. tanh is computed at a = s / 4,
 by a convergent of Lambert's continued fraction, tanh a = a / (1 + a^2 / (3 + a^2 / (5 + a^2 / 7))).
 The argument is then doubled twice, tanh 2a = 2 tanh a / (1 + tanh^2 a). The error is at most 1.5e-7
 (measured); rounding alone gives 6e-8. s is exact to 2^-23 of its terms. With the nominal model, f
-and g are added in double precision. Stability is that of `observer_free`. Gains: lam, bound of u
-[N]; k1, slope of the surface [1/s].
+and g are added in double precision. Stability is that of `observer_free`.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s].
 Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the
 law); M. Abramowitz & I. Stegun, Handbook of Mathematical Functions, 1964, 4.5.70 (continued
 fraction).

@@ -7,9 +7,10 @@ and does not delay reaching. T counts from t = 0. The gain m / (T - t) grows wit
 limited to 1 / dt, from m dt before T on; this value gives s+ = 0 in one sample. Noise is amplified
 by the same gain. If u saturates, T is missed, and after T the law is `classical`.
 Gains: T, time of reaching [s]; m, of the growing gain [kg]; k, switching gain [N]; c, slope of the
-surface [1/s]. Source: Y. Song, Y. Wang, J. Holloway & M. Krstic, "Time-varying feedback for
-regulation of normal-form nonlinear systems in prescribed finite time", Automatica 83:243, 2017 (the
-growing gain); with a switching term as in a reaching law.
+surface [1/s].
+Source: Y. Song, Y. Wang, J. Holloway & M. Krstic, "Time-varying feedback for regulation of
+normal-form nonlinear systems in prescribed finite time", Automatica 83:243, 2017 (the growing
+gain); with a switching term as in a reaching law.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding

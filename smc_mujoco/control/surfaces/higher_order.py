@@ -6,7 +6,8 @@ s' contains u. So s has relative degree 1, and first-order laws can use it:
 lag s itself contains u, and a law that switches on s is an algebraic loop through one sample of
 delay. e'' is the estimated acceleration minus r''. If the estimator gives none, s is k2 de + k1 e.
 v_eq is the acceleration on the surface, -k2 de - k1 e. Commanded through the lag, it leaves s' =
--s/tau + O(1). Gains: k1 [1/s^2] and k2 [1/s], of the surface.
+-s/tau + O(1).
+Gains: k1 [1/s^2] and k2 [1/s], of the surface.
 Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", section 3, for
 relative degree 3.
 """

@@ -4,7 +4,6 @@ laws of many joints.
 
 import warnings
 
-import mujoco
 import numpy as np
 import pytest
 from helpers import reference
@@ -21,26 +20,28 @@ def jaco():
         warnings.simplefilter("ignore")  # of a display that is not there
         kinova = pytest.importorskip("dm_control.entities.manipulators.kinova")
     joints = {f"joint_{i}": smc.Channel(motor=True, x0=x) for i, x in enumerate(START, start=1)}
-    return smc.plant_from(kinova.JacoArm().mjcf_model, channels=joints, name="jaco")
+    return smc.plant_from(
+        kinova.JacoArm().mjcf_model,
+        channels=joints,
+        name="jaco",
+    )
 
 
 def moving(jaco, law, **fields):
     """A scenario in which every joint goes 0.3 rad forth and 0.5 back."""
     moves = [smc.signals.Waypoints((0.0, 1.5, 3.0), (x, x + 0.3, x - 0.2)) for x in START]
-    common = {"model": "nominal", "u_max": LIMITS, "duration": 3.0, "physics_step": 1e-3}
-    return smc.Scenario(plant=jaco, law=law, reference=moves, **common | fields)
-
-
-def test_the_arm_has_a_model_and_its_ranges(jaco):
-    assert jaco.n == jaco.driven == 6
-    assert jaco.unmodelled == ""
-    assert [each[0] for each in jaco.ranges] == [f"joint_{i}" for i in range(1, 7)]
-    assert jaco.ranges[1][1:] == pytest.approx((0.820305, 5.462881))
-    model = jaco.load()
-    assert model.nu == 6
-    assert (
-        model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE
-    ).all()  # motors, not the servos of its file
+    common = {
+        "model": "nominal",
+        "u_max": LIMITS,
+        "duration": 3.0,
+        "physics_step": 1e-3,
+    }
+    return smc.Scenario(
+        plant=jaco,
+        law=law,
+        reference=moves,
+        **common | fields,
+    )
 
 
 # law -> largest error on any joint, rad
@@ -66,6 +67,16 @@ def test_its_run_is_that_of_the_reference_loop(jaco):
     scenario = moving(jaco, "computed_torque_sliding", duration=0.1)
     fast = smc.run(scenario)
     slow = reference.run(scenario)
-    np.testing.assert_allclose(fast.x, slow.x, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(fast.u, slow.u, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        fast.x,
+        slow.x,
+        rtol=0,
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        fast.u,
+        slow.u,
+        rtol=0,
+        atol=1e-9,
+    )
     np.testing.assert_array_equal(fast.x, smc.run([scenario] * 3, threads=2)[2].x)

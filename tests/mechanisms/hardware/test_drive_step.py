@@ -11,8 +11,6 @@ from helpers import reference
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.margins import MARGIN_KINDS
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.drives import drive_step
 from smc_mujoco.simulation.state import LOGGED
 
@@ -62,7 +60,12 @@ def test_the_mean_force_of_two_lags_is_exact(first, second, step):
     too.
     """
     trace = smc.run(
-        scenario(smc.Lag(first), smc.Lag(second), physics_step=step, control_period=step)
+        scenario(
+            smc.Lag(first),
+            smc.Lag(second),
+            physics_step=step,
+            control_period=step,
+        )
     )
     np.testing.assert_allclose(
         trace.force[1:, 0], mean_risen(trace.t, first, second), rtol=0.0, atol=1e-10
@@ -72,10 +75,27 @@ def test_the_mean_force_of_two_lags_is_exact(first, second, step):
 
 @pytest.mark.parametrize("tau", [1e-4, 1e-3, 0.01, 0.5])
 def test_a_lag_gives_a_free_mass_its_exact_velocity(tau):
-    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
-    trace = smc.run(scenario(smc.Lag(tau), plant=free, x0=0.0, integrator="RK4"))
+    free = smc.plant(
+        "duffing",
+        alpha=0.0,
+        beta=0.0,
+        delta=0.0,
+    )
+    trace = smc.run(
+        scenario(
+            smc.Lag(tau),
+            plant=free,
+            x0=0.0,
+            integrator="RK4",
+        )
+    )
     expected = trace.t + tau * np.expm1(-trace.t / tau)
-    np.testing.assert_allclose(trace.v[:, 0], expected, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(
+        trace.v[:, 0],
+        expected,
+        rtol=0.0,
+        atol=1e-13,
+    )
 
 
 def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
@@ -87,7 +107,11 @@ def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
 
 @pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network"])
 def test_no_lag_and_no_limit_are_the_plants_own_actuator_to_the_bit(name):
-    common = {"plant": name, "law": "super_twisting", "duration": 0.2}
+    common = {
+        "plant": name,
+        "law": "super_twisting",
+        "duration": 0.2,
+    }
     own, lag, rate = smc.run(
         [
             smc.Scenario(**common, actuator=a)
@@ -107,38 +131,51 @@ def stepping(y, gains, memory):
 
 def test_a_limited_rate_is_exactly_the_rate_starts_at_zero_and_stops_within_a_step():
     """The mean over steps of a ramp of 12/s, which meets u between two samples."""
-    trace = smc.run(scenario(smc.hardware.RateLimit(12.0), law=stepping(late=0.3), duration=0.6))
+    trace = smc.run(
+        scenario(
+            smc.hardware.RateLimit(12.0),
+            law=stepping(late=0.3),
+            duration=0.6,
+        )
+    )
     fine = np.linspace(0.0, 0.6, 600 * 200 + 1)
     force = np.where(
         fine < 0.3, np.minimum(12.0 * fine, 1.0), np.maximum(1.0 - 12.0 * (fine - 0.3), -1.0)
     )
     total = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1])) * (fine[1] - fine[0])))
     means = np.diff(np.interp(trace.t, fine, total)) / H
-    np.testing.assert_allclose(trace.force[1:, 0], means, rtol=0.0, atol=1e-5)
-
-
-def test_a_lag_of_none_leaves_the_other_alone():
-    one, before, after = smc.run(
-        [
-            scenario(smc.Lag(0.01)),
-            scenario(smc.Lag(0.0), smc.Lag(0.01)),
-            scenario(smc.Lag(0.01), smc.Lag(0.0)),
-        ]
+    np.testing.assert_allclose(
+        trace.force[1:, 0],
+        means,
+        rtol=0.0,
+        atol=1e-5,
     )
-    assert before.force == pytest.approx(one.force, abs=1e-12)
-    assert after.force == pytest.approx(one.force, abs=1e-12)
 
 
 def test_a_motors_winding_counts_as_its_lag():
     """A joint that hardly moves: the torque is that of two lags, mu and L/R."""
-    trace = smc.run(scenario(smc.Lag(0.01), MOTOR, mismatch={"mass": 1e9}, x0=0.0))
+    trace = smc.run(
+        scenario(
+            smc.Lag(0.01),
+            MOTOR,
+            mismatch={"mass": 1e9},
+            x0=0.0,
+        )
+    )
     assert trace.force[1:, 0] == pytest.approx(mean_risen(trace.t, 0.01, MOTOR.delay), abs=1e-8)
 
 
 @pytest.mark.parametrize("inductance", [1e-4, 5e-3])
 def test_a_motors_mean_torque_is_exact_for_a_held_voltage(inductance):
     motor = smc.DCMotor(inductance=inductance)
-    trace = smc.run(scenario(motor, law=stepping(late=0.05), mismatch={"mass": 1e9}, x0=0.0))
+    trace = smc.run(
+        scenario(
+            motor,
+            law=stepping(late=0.05),
+            mismatch={"mass": 1e9},
+            x0=0.0,
+        )
+    )
     late = np.count_nonzero(trace.t[1:] > 0.05 + H / 2)
     up = mean_risen(trace.t, motor.delay, INSTANT)
     down = np.concatenate((np.zeros(len(up) - late), up[:late]))
@@ -258,7 +295,12 @@ def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step(
     a step.
     """
     motor = smc.DCMotor(inductance=20e-3)
-    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
+    free = smc.plant(
+        "duffing",
+        alpha=0.0,
+        beta=0.0,
+        delta=0.0,
+    )
     trace = smc.run(
         scenario(
             motor, plant=free, law=asking(u=6.0 / motor.scale), x0=0.0, u_max=99.0, duration=3.0
@@ -288,7 +330,14 @@ def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
     cases = [
         (by_current, 30.0 * by_current.constant),
         (smc.DCMotor(inductance=inductance, voltage=6.0), 6.0 / by_current.scale),
-        (smc.DCMotor(inductance=inductance, voltage=math.inf, current=math.inf), 100.0),
+        (
+            smc.DCMotor(
+                inductance=inductance,
+                voltage=math.inf,
+                current=math.inf,
+            ),
+            100.0,
+        ),
     ]
     for motor, most in cases:
         held = scenario(
@@ -306,11 +355,24 @@ def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
 
 HARD = [
     {"actuator": (smc.Lag(0.01), smc.Lag(0.03))},
-    {"actuator": (smc.Lag(0.01), smc.Lag(0.03)), "input_delay": 3.5e-3, "u_max": 0.5},
-    {"actuator": (smc.Lag(0.01), smc.DCMotor()), "input_delay": 2e-3},
-    {"actuator": (smc.Lag(0.01), smc.DCMotor(), smc.Backlash(0.02)), "friction": smc.Coulomb(0.05)},
+    {
+        "actuator": (smc.Lag(0.01), smc.Lag(0.03)),
+        "input_delay": 3.5e-3,
+        "u_max": 0.5,
+    },
+    {
+        "actuator": (smc.Lag(0.01), smc.DCMotor()),
+        "input_delay": 2e-3,
+    },
+    {
+        "actuator": (smc.Lag(0.01), smc.DCMotor(), smc.Backlash(0.02)),
+        "friction": smc.Coulomb(0.05),
+    },
     {"actuator": (smc.Backlash(0.02), smc.Lag(0.01), smc.hardware.RateLimit(20.0))},
-    {"actuator": (smc.Lag(0.0), smc.Lag(0.0)), "integrator": "Euler"},
+    {
+        "actuator": (smc.Lag(0.0), smc.Lag(0.0)),
+        "integrator": "Euler",
+    },
     {"actuator": smc.Lag(0.03)},
     {},
 ]
@@ -341,7 +403,11 @@ def hard():
         else:
             laws[name] = smc.laws(name)[0]
     return [
-        smc.Scenario(plant=name, law=law, **common | fields)
+        smc.Scenario(
+            plant=name,
+            law=law,
+            **common | fields,
+        )
         for name, law in laws.items()
         for fields in HARD
     ]
@@ -373,12 +439,24 @@ def test_callback_equals_plain_loop_and_company_and_threads_change_no_bit():
 
 def test_u_is_bounded_and_delayed_before_the_drives():
     late = smc.run(
-        scenario(smc.Lag(0.01), smc.DCMotor(), law=asking(u=3.0), u_max=2.0, input_delay=4 * H)
+        scenario(
+            smc.Lag(0.01),
+            smc.DCMotor(),
+            law=asking(u=3.0),
+            u_max=2.0,
+            input_delay=4 * H,
+        )
     )
     assert (late.u == 2.0).all()
     assert late.applied[:, 0].tolist() == [0.0] * 4 + [2.0] * (len(late.t) - 4)
     lags = smc.run(
-        scenario(smc.Lag(0.01), smc.Lag(0.02), law=asking(u=3.0), u_max=2.0, input_delay=4 * H)
+        scenario(
+            smc.Lag(0.01),
+            smc.Lag(0.02),
+            law=asking(u=3.0),
+            u_max=2.0,
+            input_delay=4 * H,
+        )
     )
     assert (lags.force[:5] == 0.0).all()
     assert lags.force[5:, 0] == pytest.approx(2.0 * mean_risen(lags.t[:-4], 0.01, 0.02), abs=1e-10)
@@ -393,32 +471,3 @@ def test_the_users_order_is_kept_and_a_backlash_is_last(tmp_path):
     again = smc.load(tmp_path / "two.npz")
     assert again.scenario == s
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
-
-
-def test_theory_of_delays_knows_no_drive():
-    law = smc.law("observer_free", lam=6.0, k1=3.076)
-    assert MARGIN_KINDS["delay"].expected(scenario(law=law)) is not None
-    assert MARGIN_KINDS["delay"].expected(scenario(smc.Lag(0.01), smc.Lag(0.01), law=law)) is None
-
-
-@pytest.mark.parametrize(
-    ("actuator", "says"),
-    [
-        (
-            (smc.Lag(0.1), smc.Lag(0.2), smc.Lag(0.3)),
-            "actuator has the drives [Lag(tau=0.1), Lag(tau=0.2), Lag(tau=0.3)]: give one drive, or (smc.Lag(0.01), ",
-        ),
-        (
-            (smc.hardware.RateLimit(2.0), smc.Lag(0.2)),
-            "actuator has the drives [RateLimit(rate=2.0), Lag(tau=0.2)]: give one drive, or (smc.Lag(0.01), another)",
-        ),
-        (
-            (smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)),
-            "actuator has a Backlash twice: give one",
-        ),
-    ],
-)
-def test_parts_that_cannot_be_in_series_are_one_sentence(actuator, says):
-    with pytest.raises(ScenarioError) as error:
-        scenario(*actuator)
-    assert str(error.value).startswith(says)

@@ -11,16 +11,14 @@ import pytest
 from helpers.models import build
 
 import smc_mujoco as smc
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit, drive_step, rippled
-from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, drive_step, rippled
+from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
 from smc_mujoco.simulation.python_controller import Controller
 
 H = 2.5e-4  # s
-IMPLICIT = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 RK4 = mujoco.mjtIntegrator.mjINT_RK4
 NAMES = pytest.mark.parametrize(
     "name", ["duffing", "inverted_pendulum", "pendulum_network", "panda"]
@@ -88,18 +86,6 @@ def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
     )
 
 
-def test_the_defaults_are_the_datasheets_motor():
-    stall_current = 24.0 / MOTOR.resistance
-    no_load_speed = 24.0 / MOTOR.torque_constant
-    assert stall_current == pytest.approx(80.2, rel=0.01)  # A
-    assert no_load_speed == pytest.approx(7580 * 2 * math.pi / 60, rel=0.01)  # rad/s
-    mechanical = MOTOR.resistance * MOTOR.rotor_inertia / MOTOR.torque_constant**2
-    assert mechanical == pytest.approx(4.67e-3, rel=0.01)  # s
-    assert (
-        min(MOTOR.constant * MOTOR.current, MOTOR.voltage / MOTOR.scale) > 1.5 * 6.0
-    )  # N m, the laws' usual limit
-
-
 def test_cogging_is_a_sine_of_the_rotors_angle():
     motor = DCMotor(cogging=5e-3, poles=14.0)
     model = locked(motor)
@@ -140,18 +126,6 @@ def test_a_commutator_raises_the_torque_where_a_brush_bridges_two_bars():
     assert rippled(step, 100.0, 0.125, 0.0) == pytest.approx(motor.voltage, rel=1e-6)
 
 
-def test_a_ripple_needs_a_motor_alone_whose_current_follows_at_once():
-    with pytest.raises(ScenarioError, match="DCMotor has ripple 0"):
-        DCMotor(ripple=0.1)
-    uneven = DCMotor(inductance=0.0, ripple=0.1)
-    with pytest.raises(ScenarioError, match="DCMotor has a ripple beside another part"):
-        smc.run(
-            smc.Scenario(
-                plant="duffing", law="none", actuator=(uneven, Backlash(0.02)), duration=0.01
-            )
-        )
-
-
 @NAMES
 def test_the_rotors_inertia_is_reflected_to_the_joint(name):
     with_motor = build(plant(name), MOTOR)
@@ -167,7 +141,15 @@ def test_a_motor_of_vanishing_constant_is_the_ideal_actuator():
     own = driven(bare(), sine, 1.0)
     errors = []
     for constant in (1e-1, 1e-2, 1e-3):
-        motor = DCMotor(0.3, 0.0, constant, 1.0, 0.0, voltage=math.inf, current=math.inf)
+        motor = DCMotor(
+            0.3,
+            0.0,
+            constant,
+            1.0,
+            0.0,
+            voltage=math.inf,
+            current=math.inf,
+        )
         rows = driven(bare(motor), lambda t, motor=motor: motor.scale * sine(t), 1.0)
         errors.append(np.abs(rows[:, 1] - own[:, 1]).max())
     assert errors[1] / errors[0] == pytest.approx(1e-2, rel=0.1)  # back-EMF: (gear k)^2 / R
@@ -258,14 +240,6 @@ def test_play_comes_after_any_drive(name, order):
         assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.0105
 
 
-def test_only_a_motor_takes_anything_but_newton_metres():
-    assert [part.scale for part in (Lag(0.1), RateLimit(1.0), Backlash(0.1))] == [1.0, 1.0, 1.0]
-    assert MOTOR.scale == pytest.approx(0.299 / (0.0302 * 12.25))
-    assert build(plant("duffing"), Viscous(0.1), Backlash(0.1)).dof_damping == pytest.approx(
-        [0.3, 0.0]
-    )
-
-
 @smc.law_function
 def saturated(y, gains, memory):
     """A law that does not compile and asks for more than there is."""
@@ -278,11 +252,27 @@ def saturated(y, gains, memory):
 def test_the_command_of_a_motor_is_within_the_bound_to_the_last_bit(law):
     """With this gear a command of 6 N becomes volts and comes back an ulp larger."""
     motor = smc.DCMotor(gear=0.32761186154670086)
-    trace = smc.run(smc.Scenario(plant="duffing", law=law, duration=0.005, x0=0.8, actuator=motor))
+    trace = smc.run(
+        smc.Scenario(
+            plant="duffing",
+            law=law,
+            duration=0.005,
+            x0=0.8,
+            actuator=motor,
+        )
+    )
     assert np.abs(trace.applied).max() == trace.scenario.resolved.u_max
 
 
-VOLTAGE = DCMotor(0.5, 0.0, 0.05, 2.0, 1e-5, voltage=10.0, command="voltage")
+VOLTAGE = DCMotor(
+    0.5,
+    0.0,
+    0.05,
+    2.0,
+    1e-5,
+    voltage=10.0,
+    command="voltage",
+)
 
 
 def test_a_voltage_is_what_the_winding_gets():
@@ -297,8 +287,20 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
     inductance.
     """
     kind = plant(name)
-    motor = DCMotor(0.5, 0.0, 0.05, 2.0, 0.0, voltage=10.0, command="voltage")
-    scenario = smc.Scenario(plant=kind, law="none", actuator=motor)
+    motor = DCMotor(
+        0.5,
+        0.0,
+        0.05,
+        2.0,
+        0.0,
+        voltage=10.0,
+        command="voltage",
+    )
+    scenario = smc.Scenario(
+        plant=kind,
+        law="none",
+        actuator=motor,
+    )
     model = build(kind, motor)
     rng = np.random.default_rng(1)
     data = mujoco.MjData(model)
@@ -317,7 +319,15 @@ def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
     """A carriage on a constant voltage, in closed form: implicitfast leads by half a step times its
     speed.
     """
-    motor = DCMotor(0.5, 0.0, 0.05, 20.0, 0.0, voltage=10.0, command="voltage")
+    motor = DCMotor(
+        0.5,
+        0.0,
+        0.05,
+        20.0,
+        0.0,
+        voltage=10.0,
+        command="voltage",
+    )
     mass = 2.0
     drag = motor.constant**2 / motor.resistance
     fields = {
@@ -327,7 +337,13 @@ def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
         "control_period": 1e-3,
         "x0": 0.0,
     }
-    axis = smc.plant("servo_axis", M=mass, b=0.0, cf=0.0, offset=0.0)
+    axis = smc.plant(
+        "servo_axis",
+        M=mass,
+        b=0.0,
+        cf=0.0,
+        offset=0.0,
+    )
     trace = smc.run(
         smc.Scenario(
             plant=axis, law="none", integrator="RK4", physics_step=1e-3, sensor=None, **fields
@@ -337,12 +353,3 @@ def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
     lag = mass / drag
     exact = speed * (trace.t - lag * (1.0 - np.exp(-trace.t / lag)))
     np.testing.assert_allclose(trace.x[:, 0], exact, atol=1e-8)
-
-
-def test_a_voltage_is_bounded_by_the_supply_whatever_u_max_is():
-    s = smc.Scenario(
-        plant="furuta", law="none", actuator=VOLTAGE, feedforward=smc.Constant(50.0), duration=0.01
-    )
-    assert (s.resolved.u_max, s.limits, s.efforts) == (10.0, (10.0,), ("V", "V"))
-    assert smc.run(s).u[:, 0] == pytest.approx(10.0)
-    assert smc.Scenario(plant="furuta", law="none", actuator=VOLTAGE, u_max=4.0).limits == (4.0,)

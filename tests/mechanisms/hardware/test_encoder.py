@@ -32,7 +32,12 @@ def speed(y, gains, memory):
 
 
 def scenario(sensor, **changes):
-    fields = {"plant": "duffing", "law": position(), "duration": 1.0, "v0": 0.7}
+    fields = {
+        "plant": "duffing",
+        "law": position(),
+        "duration": 1.0,
+        "v0": 0.7,
+    }
     return smc.Scenario(**(fields | {"sensor": sensor} | changes))
 
 
@@ -104,21 +109,26 @@ def test_a_bias_moves_where_the_law_settles():
 def test_noise_comes_before_the_rounding():
     """Noise of more than a count dithers: the mean of the error then is far below a count."""
     noise = smc.Noise(position=0.2)
-    trace, x, _ = read(smc.Encoder(counts=5), noise=noise, duration=10.0, seed=5)
+    trace, x, _ = read(
+        smc.Encoder(counts=5),
+        noise=noise,
+        duration=10.0,
+        seed=5,
+    )
     assert set(np.unique(np.round(x * 5, 9)) % 1) == {0.0}
     error = (x - trace.x)[:, 0]
     assert error.std() == pytest.approx(math.hypot(0.2, 0.2 / math.sqrt(12)), rel=0.03)
     assert abs(error.mean()) < 4 * error.std() / 100
-    _, exact, _ = read(PERFECT, noise=noise, duration=10.0, seed=5)
+    _, exact, _ = read(
+        PERFECT,
+        noise=noise,
+        duration=10.0,
+        seed=5,
+    )
     np.testing.assert_allclose(x, np.round(exact * 5) / 5, atol=1e-9)
 
 
 # the velocity
-
-
-def test_an_encoder_measures_no_velocity():
-    assert scenario(PERFECT).resolved.velocity.name == "filtered_difference"
-    assert scenario(None).resolved.velocity.name == "measured"
 
 
 def test_the_velocity_is_the_filtered_difference_of_the_readings():
@@ -131,34 +141,17 @@ def test_the_velocity_is_the_filtered_difference_of_the_readings():
     for before, now in zip(x[:-1, 0], x[1:, 0], strict=True):
         estimate = a * estimate + (1 - a) * (now - before) / dt
         expected.append(estimate)
-    np.testing.assert_allclose(v[:, 0], expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        v[:, 0],
+        expected,
+        rtol=1e-12,
+        atol=1e-12,
+    )
 
 
 def test_a_tachometer_beside_the_encoder_is_not_rounded():
     trace, _, v = read(smc.Encoder(counts=10, bias=0.3), velocity="measured")
     np.testing.assert_array_equal(v, trace.v)
-
-
-def test_replacing_the_sensor_replaces_the_velocity_that_was_left_out():
-    with_encoder = scenario(PERFECT)
-    without = scenario(None)
-    assert dataclasses.replace(with_encoder, sensor=None) == without
-    assert dataclasses.replace(without, sensor=PERFECT) == with_encoder
-    assert (
-        dataclasses.replace(with_encoder, duration=2.0).resolved.velocity.name
-        == "filtered_difference"
-    )
-
-
-def test_replacing_the_sensor_keeps_a_velocity_that_was_asked_for():
-    lagged = smc.estimator("filtered_difference", tau=0.02)
-    for velocity in (lagged, "measured", "filtered_difference"):
-        asked = scenario(None, velocity=velocity)
-        assert (
-            dataclasses.replace(asked, sensor=PERFECT).resolved.velocity == asked.resolved.velocity
-        )
-        asked = scenario(PERFECT, velocity=velocity)
-        assert dataclasses.replace(asked, sensor=None).resolved.velocity == asked.resolved.velocity
 
 
 # loss
@@ -177,47 +170,29 @@ def test_readings_get_lost_at_their_rate(rate):
     assert abs(again.mean() - rate) < 4 * math.sqrt(rate * (1 - rate) / len(again))
 
 
-def test_a_lost_reading_leaves_the_one_before_in_place():
-    trace, x, v = read(smc.Encoder(math.inf, dropout=0.6), velocity="measured", seed=3)
-    lost = x != trace.x
-    assert not lost[0, 0]
-    np.testing.assert_array_equal(x[1:][lost[1:]], x[:-1][lost[1:]])
-    np.testing.assert_array_equal(v[1:][lost[1:]], v[:-1][lost[1:]])  # the tachometer's with it
-    np.testing.assert_array_equal(v[~lost], trace.v[~lost])
-
-
 def test_a_lost_reading_holds_the_last_one_with_its_noise_and_rounding():
-    _, x, _ = read(smc.Encoder(50, dropout=0.5, bias=0.1), noise=smc.Noise(position=0.1), seed=3)
-    _, all_of_them, _ = read(smc.Encoder(50, bias=0.1), noise=smc.Noise(position=0.1), seed=3)
+    _, x, _ = read(
+        smc.Encoder(50, dropout=0.5, bias=0.1),
+        noise=smc.Noise(position=0.1),
+        seed=3,
+    )
+    _, all_of_them, _ = read(
+        smc.Encoder(50, bias=0.1),
+        noise=smc.Noise(position=0.1),
+        seed=3,
+    )
     arrived = x == all_of_them
     held = x[1:] == x[:-1]
     assert (arrived[1:] | held).all()
     assert 0.4 < (~arrived).mean() < 0.55
 
 
-def test_when_every_reading_gets_lost_the_first_stays():
-    trace, x, v = read(smc.Encoder(math.inf, dropout=1.0), velocity="measured")
-    np.testing.assert_array_equal(x, trace.x[0, 0])
-    np.testing.assert_array_equal(v, 0.7)
-
-
-def test_channels_lose_their_readings_on_their_own():
-    plant = smc.plant("pendulum_network", n=4)
-    trace, x, _ = read(smc.Encoder(math.inf, dropout=0.5), plant=plant, duration=4.0, v0=0.1)
-    lost = (x != trace.x)[1:]
-    correlation = np.corrcoef(lost.T)
-    assert np.abs(correlation - np.eye(4)).max() < 4 / math.sqrt(len(lost))
-
-
-def test_seeds_lose_other_readings_and_one_seed_the_same():
-    runs = [read(smc.Encoder(math.inf, dropout=0.5), seed=seed)[1] for seed in (1, 1, 2)]
-    np.testing.assert_array_equal(runs[0], runs[1])
-    assert (runs[0] != runs[2]).mean() > 0.3
-
-
 def test_losses_are_independent_of_the_noise():
     sensor = smc.Encoder(math.inf, dropout=0.5)
-    noisy = {"noise": smc.Noise(position=0.1), "duration": 10.0}
+    noisy = {
+        "noise": smc.Noise(position=0.1),
+        "duration": 10.0,
+    }
     trace, x, _ = read(sensor, **noisy)
     _, full, _ = read(PERFECT, **noisy)
     arrived = (x == full)[1:, 0]
@@ -263,7 +238,6 @@ TIMES = [
     {"period": 3e-3, "delay": 0.01175},
     {"period": 0.0125, "delay": 2.5e-4},
 ]
-SOLVERS = pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 
 
 @pytest.mark.parametrize(
@@ -282,22 +256,6 @@ def test_late_readings_are_those_of_their_instants(times, integrator):
     np.testing.assert_array_equal(v, expected(sensor, changes, "v"))
 
 
-@pytest.mark.parametrize(
-    ("times", "step"),
-    [
-        ({"period": 0.007}, 1e-3),
-        ({"delay": 0.003}, 1e-3 / 3),
-        ({"period": 0.003, "delay": 0.001}, 1e-3 / 3),
-    ],
-)
-def test_ten_seconds_do_not_shift_the_instants(times, step):
-    """1e-3 / 3 is no binary number, and its sum over 30 000 steps is not 10."""
-    sensor = smc.Encoder(math.inf, **times)
-    changes = {"physics_step": step, "velocity": "measured", "duration": 10.0}
-    _, x, _ = read(sensor, **changes)
-    np.testing.assert_array_equal(x, expected(sensor, changes, "x"))
-
-
 def test_a_late_encoder_shows_no_speed_at_the_start_that_is_not_there():
     """From 0 to x0 in one reading would be a thousand metres a second."""
     _, _, v = read(smc.Encoder(math.inf, delay=0.01), v0=0.0)
@@ -308,7 +266,11 @@ def test_a_late_encoder_shows_no_speed_at_the_start_that_is_not_there():
 def test_readings_are_held_between_periods_with_their_noise_and_losses():
     """One draw a reading, not a sample."""
     sensor = smc.Encoder(math.inf, period=0.01, dropout=0.3)
-    trace, x, _ = read(sensor, noise=smc.Noise(position=0.1), duration=5.0)
+    trace, x, _ = read(
+        sensor,
+        noise=smc.Noise(position=0.1),
+        duration=5.0,
+    )
     blocks = x[:-1, 0].reshape(-1, 10)
     assert (blocks == blocks[:, :1]).all()
     changed = np.diff(blocks[:, 0]) != 0
@@ -394,39 +356,6 @@ def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
         same(trace, reference.run(s) if i % 4 else smc.run(s, threads=1))
 
 
-@SOLVERS
-def test_a_perfect_encoder_with_a_tachometer_is_no_encoder(integrator):
-    changes = {
-        "integrator": integrator,
-        "velocity": "measured",
-        "law": "observer_free",
-        "noise": smc.Noise(0.1, 0.1),
-    }
-    for plant in ("duffing", "cart_pole", "pendulum_network"):
-        with_encoder, without = (
-            smc.run(scenario(s, plant=plant, **changes)) for s in (PERFECT, None)
-        )
-        same(with_encoder, without)
-
-
-def test_an_ideal_plant_with_an_encoder_stays_ideal():
-    seen = scenario(smc.Encoder(4096, delay=2e-3))
-    assert (seen.resolved.integrator, seen.resolved.physics_step, seen.realistic) == (
-        "RK4",
-        1e-3,
-        False,
-    )
-
-
-def test_every_channel_of_a_network_has_its_encoder():
-    plant = smc.plant("pendulum_network", n=3)
-    sensor = smc.Encoder(100, delay=5e-3)
-    trace, x, _ = read(sensor, plant=plant, v0=(0.5, -0.5, 1.0))
-    q = 2 * math.pi / 100
-    held = np.vstack([trace.x[:1].repeat(5, axis=0), trace.x[:-5]])
-    np.testing.assert_array_equal(x, q * np.floor(held / q + 0.5))
-
-
 def test_a_skew_reads_each_channel_earlier_than_the_channel_before():
     plant = smc.plant("pendulum_network", n=3)
     trace, x, _ = read(
@@ -439,55 +368,4 @@ def test_a_skew_reads_each_channel_earlier_than_the_channel_before():
         smc.Encoder(period=0.01, skew=3e-3)
 
 
-def test_a_sensor_keeps_as_many_readings_as_are_under_way_in_parts_of_64():
-    for times, count in (
-        ({}, 0),
-        ({"period": 0.02}, 64),
-        ({"delay": 0.062}, 64),
-        ({"delay": 0.063}, 128),
-    ):
-        assert smc.Encoder(**times).readings(1e-3) == count
-    assert smc.Encoder(delay=0.1265, period=1e-3).readings(5e-4) == 192
-    assert smc.Encoder(delay=0.04, skew=0.011).readings(1e-3, 3) == 64
-    assert smc.Encoder(delay=0.04, skew=0.012).readings(1e-3, 3) == 128
-
-
 # bad values
-
-
-@pytest.mark.parametrize("field", ["period", "delay"])
-def test_times_that_are_no_whole_number_of_steps_are_refused(field):
-    with pytest.raises(
-        smc.ScenarioError,
-        match=rf"Encoder's {field} 0.0015 s .*: give a physics_step that divides it$",
-    ):
-        scenario(smc.Encoder(**{field: 0.0015}))
-    scenario(smc.Encoder(**{field: 0.0015}), physics_step=5e-4)
-
-
-def test_a_period_beyond_all_steps_is_refused():
-    with pytest.raises(
-        smc.ScenarioError, match=r"period 1e\+306 s is not a whole number of physics steps"
-    ):
-        scenario(smc.Encoder(period=1e306))
-
-
-@pytest.mark.parametrize("times", [{"delay": 2.0}, {"period": 1e9}])
-def test_a_delay_or_a_period_beyond_the_run_leaves_the_initial_state(times):
-    _, x, _ = read(smc.Encoder(math.inf, **times))
-    assert (x == 1.5).all()
-
-
-@pytest.mark.parametrize("times", [{"delay": 1e9}, {"delay": 1e6, "period": 1e-3}])
-def test_a_delay_that_no_buffer_holds_is_refused_in_one_sentence(times):
-    smc.Encoder(math.inf, delay=100.0).check(1e-3)  # as many readings as a buffer holds
-    with pytest.raises(smc.ScenarioError, match=r"^Encoder's delay .* give"):
-        smc.run(scenario(smc.Encoder(math.inf, **times), duration=0.01))
-
-
-def test_only_an_encoder_is_a_sensor():
-    for value in (4096, "encoder", smc.Noise(0.1), [smc.Encoder()], smc.Encoder):
-        with pytest.raises(
-            smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"
-        ):
-            scenario(value)

@@ -48,7 +48,12 @@ def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default
 def test_the_mean_of_its_force_over_a_control_period_is_in_the_trace():
     tau = 5e-3
     trace = smc.run(
-        smc.Scenario(plant="duffing", law="classical", duration=0.05, actuator=smc.Lag(5e-3))
+        smc.Scenario(
+            plant="duffing",
+            law="classical",
+            duration=0.05,
+            actuator=smc.Lag(5e-3),
+        )
     )
     force = 0.0
     means = [0.0]

@@ -1,4 +1,4 @@
-"""The flanks of a Backlash do not bounce, and limit cycles in it are those between plastic stops."""
+"""The flanks of a Backlash do not bounce; limit cycles in it are those between plastic stops."""
 
 import dataclasses
 import math
@@ -17,7 +17,11 @@ GAP = 0.01
 @pytest.mark.parametrize("divisor", [1, 16])
 @pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
 def test_a_flank_rebounds_at_less_than_one_percent_of_its_speed(plant, divisor):
-    scenario = smc.Scenario(plant=plant, law="none", actuator=smc.Backlash(GAP))
+    scenario = smc.Scenario(
+        plant=plant,
+        law="none",
+        actuator=smc.Backlash(GAP),
+    )
     step = scenario.resolved.physics_step / divisor
     scenario = dataclasses.replace(scenario, physics_step=step)
     model = models.with_values(models.compile_model(scenario), scenario)

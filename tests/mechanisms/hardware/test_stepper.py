@@ -11,16 +11,20 @@ import pytest
 from helpers import reference
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.chattering import chattering
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.envs.episode import Setting
 from smc_mujoco.hardware import Stepper
 from smc_mujoco.simulation import model
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.prepare import motors_at_start
 
 PERIOD = 5e-3  # s, of the control
-MOTOR = Stepper(steps=1600, torque=0.3, damping=4e-3, speed=60.0, ramp=80.0, stop_band=0.2)
+MOTOR = Stepper(
+    steps=1600,
+    torque=0.3,
+    damping=4e-3,
+    speed=60.0,
+    ramp=80.0,
+    stop_band=0.2,
+)
 # accelerations that turn, and stop; rates below and above sqrt(2 ramp)
 SLOW = smc.Sine(6.0, 17.0, phase=math.pi / 2)
 FAST = smc.Sine(40.0, 25.0, phase=math.pi / 2)
@@ -29,8 +33,23 @@ KINDS = {
     "fast": (MOTOR, FAST),
     "without queue": (dataclasses.replace(MOTOR, queue=0.0), SLOW),
     "each step when it is due": (dataclasses.replace(MOTOR, refill=0.0), FAST),
-    "jumps": (dataclasses.replace(MOTOR, spread=0.0, stop_band=0.0), FAST),
-    "half spread": (dataclasses.replace(MOTOR, spread=0.5, queue=0.05, longest_spread=0.004), SLOW),
+    "jumps": (
+        dataclasses.replace(
+            MOTOR,
+            spread=0.0,
+            stop_band=0.0,
+        ),
+        FAST,
+    ),
+    "half spread": (
+        dataclasses.replace(
+            MOTOR,
+            spread=0.5,
+            queue=0.05,
+            longest_spread=0.004,
+        ),
+        SLOW,
+    ),
     "slips": (dataclasses.replace(MOTOR, torque=0.02), FAST),
     "turns at once": (dataclasses.replace(MOTOR, stop_band=0.05), smc.Sine(60.0, 120.0, phase=1.5)),
     "geared": (dataclasses.replace(MOTOR, gear=3.0, torque=0.05), SLOW),
@@ -48,7 +67,12 @@ def scenario(motor, push, plant=PLANT, **fields):
         "control_period": PERIOD,
         "law": "none",
     } | fields
-    return smc.Scenario(plant=plant, actuator=motor, feedforward=push, **fields)
+    return smc.Scenario(
+        plant=plant,
+        actuator=motor,
+        feedforward=push,
+        **fields,
+    )
 
 
 def steps_by_events(motor, commands, phase, duration):
@@ -245,7 +269,12 @@ def test_the_steps_are_those_of_an_event_integration(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_joint_moves_as_behind_these_steps(kind):
     motor, push = KINDS[kind]
-    one = scenario(motor, push, duration=0.8, physics_step=1.25e-4)
+    one = scenario(
+        motor,
+        push,
+        duration=0.8,
+        physics_step=1.25e-4,
+    )
     trace, steps = by_events(one)
     x, v, force = moved(motor, steps, one.plant, 0.3, trace.t, motor.gear**2 * motor.rotor_inertia)
     rough = (
@@ -258,7 +287,10 @@ def test_the_joint_moves_as_behind_these_steps(kind):
 
 
 CONDITIONS = {
-    "late and missed samples": {"clock": smc.Clock(jitter=2e-3, missed=0.2), "input_delay": 3e-3},
+    "late and missed samples": {
+        "clock": smc.Clock(jitter=2e-3, missed=0.2),
+        "input_delay": 3e-3,
+    },
     "friction": {"friction": smc.Coulomb(0.01)},
     "play": {"actuator": (MOTOR, smc.Backlash(0.05))},
     "several motors": {
@@ -267,7 +299,11 @@ CONDITIONS = {
         "law": "pid",
         "actuator": Stepper(torque=20.0),
     },
-    "a free joint": {"plant": "cart_pole", "x0": (0.0, 0.05), "law": "hierarchical"},
+    "a free joint": {
+        "plant": "cart_pole",
+        "x0": (0.0, 0.05),
+        "law": "hierarchical",
+    },
 }
 
 
@@ -280,7 +316,12 @@ def test_the_callback_is_the_reference_loop_to_the_last_bit(name):
         "feedforward": SLOW,
         "x0": 0.3,
     } | CONDITIONS[name]
-    one = smc.Scenario(**fields, duration=0.4, control_period=PERIOD, seed=2)
+    one = smc.Scenario(
+        **fields,
+        duration=0.4,
+        control_period=PERIOD,
+        seed=2,
+    )
     compiled = smc.run(one)
     looped = reference.run(one)
     for column, values in compiled.arrays().items():
@@ -304,8 +345,20 @@ def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
 
 def test_a_strong_motor_without_a_generator_has_the_wanted_acceleration():
     """The plain twin of a stepper: x'' = u, a sample late."""
-    ideal = Stepper(steps=math.inf, torque=1e3, damping=0.0, ramp=100.0)
-    trace = smc.run(scenario(ideal, SLOW, control_period=1e-3, physics_step=1.25e-4))
+    ideal = Stepper(
+        steps=math.inf,
+        torque=1e3,
+        damping=0.0,
+        ramp=100.0,
+    )
+    trace = smc.run(
+        scenario(
+            ideal,
+            SLOW,
+            control_period=1e-3,
+            physics_step=1.25e-4,
+        )
+    )
     speed = np.cumsum(np.append(0.0, 1e-3 * trace.u[1:, 0]))
     assert trace.v[:, 0] == pytest.approx(speed, abs=0.02)
     assert np.ptp(speed) > 0.6
@@ -321,7 +374,16 @@ def test_the_nominal_model_has_the_acceleration_as_its_input():
     x = (0.3, 0.2)
     v = (1.0, 2.0)
     trace = smc.run(
-        scenario(MOTOR, None, plant, law=pushed(), model="nominal", x0=x, v0=v, duration=0.01)
+        scenario(
+            MOTOR,
+            None,
+            plant,
+            law=pushed(),
+            model="nominal",
+            x0=x,
+            v0=v,
+            duration=0.01,
+        )
     )
     p = plant.values({})
     Jp = p.Jc + p.m * p.l**2
@@ -334,17 +396,15 @@ def test_the_nominal_model_has_the_acceleration_as_its_input():
     assert trace.units()["u0"] == "rad/s^2"
 
 
-def test_the_default_bound_is_the_ramp_and_a_weak_motor_warns():
-    assert scenario(MOTOR, None).limits == (80.0,)
-    with pytest.warns(
-        smc.errors.ScenarioWarning, match=r"Stepper gives at most 0\.01 .* more torque"
-    ):
-        scenario(dataclasses.replace(MOTOR, torque=0.01), None)
-
-
 def test_the_condition_has_the_rates_of_the_machine_s_firmware_and_a_motor_that_loses_no_step():
     law = smc.law("observer_free", lam=7.5, k1=6.0)
-    (held,) = smc.grid(["duffing"], [law], ["stepper"], seeds=1, duration=4.0)
+    (held,) = smc.grid(
+        ["duffing"],
+        [law],
+        ["stepper"],
+        seeds=1,
+        duration=4.0,
+    )
     (motor,), machine = held.actuator, smc.rig("stepper_furuta").scenario("none").actuator[0]
     for name in ("steps", "teeth", "speed", "ramp", "stop_band", "queue", "refill"):
         assert getattr(motor, name) == pytest.approx(getattr(machine, name)), name
@@ -354,90 +414,8 @@ def test_the_condition_has_the_rates_of_the_machine_s_firmware_and_a_motor_that_
     assert np.abs(smc.run(dataclasses.replace(held, actuator=weak)).e[-1000:]).max() > 0.5
 
 
-REFUSED = {
-    "lagged": (lambda: scenario((smc.Lag(0.01), MOTOR), SLOW), "leave that out"),
-    "long": (lambda: Stepper(queue=1e3), "queue 1000 s"),
-    "fast": (lambda: Stepper(queue=0.0, refill=0.0, speed=1e9), "speed 1e.09 is 2.5.*e.11 steps/s"),
-    "often": (lambda: Stepper(refill=9e-6), "refill is 9e-06 s: give 0, or 1e-05 or more"),
-    "joint": (
-        lambda: scenario(MOTOR, None, "pendulum_network", law="computed_torque_sliding", x0=0.1),
-        "computed_torque_sliding.*model='none'",
-    ),
-    "environment": (lambda: Setting(PLANT, "regulate", {"actuator": MOTOR}), "no Stepper"),
-    "FMU": (
-        lambda: smc.exchange.law_to_fmu(scenario(MOTOR, None, law="pid"), "never.fmu"),
-        "a Stepper.*u_max",
-    ),
-    "prediction": (lambda: chattering(scenario(MOTOR, None, law="pid")), "measure it in a run"),
-    "certificate": (
-        lambda: smc.audits.certify(scenario(MOTOR, None, law="classical")),
-        "no theorem for an acceleration",
-    ),
-    "both drives": (
-        lambda: smc.tune(
-            "inverted_pendulum", "pid", conditions=("nominal", "stepper"), budget=1, searches=1
-        ),
-        "commands in N m and rad/s.2: tune for each drive alone",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_a_stepper_cannot_have_is_refused_in_a_sentence(name):
-    made, words = REFUSED[name]
-    with pytest.raises(ScenarioError, match=words) as refusal:
-        made()
-    assert "\n" not in str(refusal.value)
-
-
 HELD, ON = smc.law("pid", kp=100.0, kd=20.0), "inverted_pendulum"  # a law of an acceleration
 
 
 def held():
     return smc.grid([ON], [HELD], ["stepper"], duration=1.0)[0]
-
-
-TAKEN = {  # an analysis -> what it finds
-    "margins": lambda out: (
-        smc.margins("duffing", HELD, ["noise"], quick=True, condition="stepper")[0].value > 0.0
-    ),
-    "basin": lambda out: (
-        smc.design.basin(ON, HELD, (3, 3), duration=1.0, condition="stepper").outcome[1, 1] == 1
-    ),
-    "worst case": lambda out: (
-        smc.worst_case(held(), within=smc.Uncertainty(disturbance=1.0), budget=8).value > 0.0
-    ),
-    "sensitivity": lambda out: "share" in str(smc.sensitivity(held(), points=8)),
-    "order of accuracy": lambda out: (
-        smc.audits.accuracy(HELD, ON, (2e-3, 1e-3), "stepper", 1, duration=0.5)[0].law == "pid"
-    ),
-    "tuning": lambda out: (
-        smc.tune(ON, "pid", conditions=["stepper"], budget=1, searches=1).objective > 0.0
-    ),
-    "identification": lambda out: (
-        abs(smc.identify(smc.plant(ON), smc.run(held()), ["m"], starts=1).values["m"] - 0.5) < 0.01
-    ),
-    "comparison": lambda out: (
-        smc.compare(HELD, ON, ["stepper"], 2, False, out=out, duration=1.0, progress=False).verdicts
-    ),
-    "advice": lambda out: (
-        smc.which(ON, "stepper", (), [HELD, "lqr"], 3, 1.0, None, out, True).choices
-    ),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", TAKEN)
-def test_an_analysis_takes_a_stepper(name, tmp_path):
-    assert TAKEN[name](tmp_path / "out")
-
-
-@pytest.mark.slow
-def test_no_theory_of_a_force_is_told_of_an_acceleration():
-    """Linear theory knows the torque that a law of forces bears, and not the motor that holds the
-    joint itself.
-    """
-    for condition, told in (("nominal", True), ("stepper", False)):
-        (one,) = smc.margins(ON, "observer_free", ["disturbance"], quick=True, condition=condition)
-        assert (one.theory is not None) == told
