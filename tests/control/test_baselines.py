@@ -132,6 +132,21 @@ def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceede
     )  # no bound: it winds up as ki t
 
 
+@pytest.mark.parametrize(
+    ("name", "gains"),
+    [
+        ("pid", {"ki": 0.0, "tau": 0.0}),
+        ("lqi", {"q0": 0.0, "a1": 0.0, "a2": 0.0, "b": 1.0}),
+    ],
+)
+def test_a_law_whose_integral_has_no_gain_remembers_no_saturation(name, gains):
+    """Back-calculation would leave a bias that no integral takes back."""
+    law = smc.law(name, **gains)
+    memory = np.zeros(law.memory)
+    called(law, 1000, memory, e=50.0, limit=1.0)
+    assert called(law, 1, memory, e=0.1) == called(law, e=0.1)
+
+
 # LQR
 
 

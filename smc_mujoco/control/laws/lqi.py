@@ -11,9 +11,9 @@ loop s^3 + alpha s^2 + beta s + gamma has
 (spectral factorisation, worked out here), with ki = gamma / b, k1 = (beta + a1) / b and k2 = (alpha
 + a2) / b. A constant disturbance leaves no error, and q0 = 0 gives the gains of `lqr`.
 Back-calculation prevents wind-up: while u is beyond the bound, w tends with the time constant tt to
-the value that brings u back to it. As a PID controller it overshoots after saturation. With the
-nominal model f and g are cancelled and the law regulates e'' = v, so a1, a2, b are 0, 0, 1. The
-trace's s is k1 e + k2 de.
+the value that brings u back to it; with q0 = 0, w = 0. As a PID controller it overshoots after
+saturation. With the nominal model f and g are cancelled and the law regulates e'' = v, so a1, a2, b
+are 0, 0, 1. The trace's s is k1 e + k2 de.
 Gains: q0 [N^2/(m^2 s^2)], q1 [N^2/m^2] and q2 [N^2 s^2/m^2], weights of the integral, the error and
 the rate; tt, of the anti-windup [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the
 plant at its origin.
@@ -79,6 +79,7 @@ def lqi(y, gains, memory):
         memory[2], memory[3], memory[4] = feedback(a1, a2, b, gains.q0, gains.q1, gains.q2)
     s = memory[2] * y.e + memory[3] * y.de
     u = command(y, -s - memory[1])
-    lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
-    memory[1] += y.dt * (memory[4] * y.e - lost / gains.tt)
+    if memory[4] != 0.0:  # else nothing would take w back
+        lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
+        memory[1] += y.dt * (memory[4] * y.e - lost / gains.tt)
     return u, s

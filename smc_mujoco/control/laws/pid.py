@@ -2,10 +2,10 @@
 
 A baseline without a sliding mode. The filter tau limits the amplification of noise by the
 derivative. Back-calculation prevents wind-up: while u is beyond the bound +-u_max, w tends with the
-time constant tt to the value that brings u back to its bound. On x'' = u the loop is stable if and
-only if kp kd > ki (Routh, tau = 0), and a constant disturbance leaves no error. D is computed by
-the implicit (backward) Euler method, starting at the first de, and w by the explicit one. The
-trace's s is kp e + kd D.
+time constant tt to the value that brings u back to its bound; with ki = 0, w = 0. On x'' = u the
+loop is stable if and only if kp kd > ki (Routh, tau = 0), and a constant disturbance leaves no
+error. D is computed by the implicit (backward) Euler method, starting at the first de, and w by the
+explicit one. The trace's s is kp e + kd D.
 Gains: kp, proportional [N/m]; ki, integral [N/(m s)]; kd, derivative [N s/m]; tau, of the filter
 [s]; tt, of the anti-windup [s].
 Source: K. J. Astrom & T. Hagglund, PID Controllers: Theory, Design, and Tuning, 2nd ed., ISA 1995,
@@ -38,6 +38,10 @@ def pid(y, gains, memory):
     D = (gains.tau * D + y.dt * y.de) / (gains.tau + y.dt) if started else y.de
     s = gains.kp * y.e + gains.kd * D
     u = command(y, w - s)
-    lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
-    memory[0], memory[1], memory[2] = 1.0, w + y.dt * (lost / gains.tt - gains.ki * y.e), D
+    if gains.ki != 0.0:  # else nothing would take w back
+        lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
+        w += y.dt * (lost / gains.tt - gains.ki * y.e)
+    memory[0] = 1.0
+    memory[1] = w
+    memory[2] = D
     return u, s
