@@ -911,13 +911,15 @@ def _apply_friction(address, sim, data):
         f = outputs.f
         low = outputs.low
         high = outputs.high
+        bristle = pointer(function.memory)
         if state.stuck == 0.0:
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(state.speed)
             if slows or v * state.speed < 0.0:
                 state.stuck = 1.0
                 state.stuck_at = x
+                if state.speed != 0.0:  # it stops, else it is at rest from the start
+                    state.stuck_at -= min(max(inputs.motor + inputs.load, low), high) / bristle[0]
         if state.stuck != 0.0:
-            bristle = pointer(function.memory)
             spring = bristle[0] * (x - state.stuck_at)
             if low <= spring <= high and low < high:
                 f = min(max(spring + bristle[1] * v, low), high)

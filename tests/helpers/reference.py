@@ -403,10 +403,13 @@ class Loop:
             stuck = not math.isnan(self.stuck_at[i])
             before = self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
+            stiffness, damping = self.bristles[i]
             if not stuck and (slows or v * before < 0.0):
-                stuck, self.stuck_at[i] = True, x
+                stuck = True
+                self.stuck_at[i] = x
+                if before != 0.0:
+                    self.stuck_at[i] -= min(max(motor + load, low), high) / stiffness
             if stuck:
-                stiffness, damping = self.bristles[i]
                 spring = stiffness * (x - self.stuck_at[i])
                 if low < high and low <= spring <= high:
                     friction = min(max(spring + damping * v, low), high)

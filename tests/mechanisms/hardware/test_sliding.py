@@ -5,6 +5,7 @@ servos under load.
 import dataclasses
 import functools
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -449,6 +450,32 @@ def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
         np.testing.assert_allclose(
             trace.reaction[k + 1], -(np.sign(trace.v[k]) * loss + damping * trace.v[k]), atol=1e-12
         )
+
+
+@pytest.mark.parametrize("model", ["m1", "m2", "m4", "m6"])
+@pytest.mark.parametrize("name", ["mx106", "mx64"])
+def test_a_loop_that_comes_to_rest_on_a_servo_leaves_what_its_friction_can_hold(name, model):
+    """Motor and weight together are at the bound of the friction at rest; bristles that stick
+    unbent would give way before they hold, and rest 3 % nearer to the target.
+    """
+    servo = smc.hardware.servo(name, model)
+    trace = smc.run(
+        smc.Scenario(
+            plant=smc.plant("inverted_pendulum", m=0.4, l=0.3),
+            law=smc.law("computed_torque", kp=20.0, kd=2.0),
+            actuator=servo.motor,
+            friction=servo.friction,
+            x0=0.5,
+            duration=3.0,
+        )
+    )
+    motor = trace.u[-1, 0]
+    load = 0.4 * 9.81 * 0.3 * math.sin(trace.x[-1, 0])
+    numbers = dict(zip(servo.friction.names, servo.friction.parameters(0), strict=True))
+    low, high = servo.friction.value(0.0, motor, load, SimpleNamespace(**numbers))[1:]
+    assert trace.x[-1, 0] > 0.003
+    assert motor + load == pytest.approx(low, rel=1e-4)
+    assert high == -low
 
 
 def ends(model, weight):
