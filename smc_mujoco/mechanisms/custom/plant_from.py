@@ -10,8 +10,9 @@ the scenario's u_max and by what the motor's ranges and the joint's actuatorfrcr
 directions; a law reads the bound in y.limit. The model's sensors are replaced by a position and a
 velocity sensor per channel. Other actuators stay at ctrl = 0, and joints without a channel move as
 the model says. Integrator, step and initial state are the scenario's. Disturbances act on the
-joints themselves. The parameters are m in kg, the mass of all that moves, which scales all masses
-and inertias, and grav in m/s^2.
+joints themselves. Dry friction of the file's joints and tendons is as hard as `Coulomb`, unless the
+file gives its solreffriction. The parameters are m in kg, the mass of all that moves, which scales
+all masses and inertias, and grav in m/s^2.
 """
 
 import base64
@@ -33,13 +34,14 @@ from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.hardware.part import ROTOR, START
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue, check_ranges
 
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
+SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"
 DCMOTOR = (
@@ -85,6 +87,11 @@ class UserModel:
                     objtype=mujoco.mjtObj.mjOBJ_JOINT,
                     objname=joint,
                 )
+        # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
+        for part in (*spec.joints, *spec.tendons):
+            if part.frictionloss > 0.0 and np.array_equal(part.solref_friction, SOFT_SOLREF):
+                part.solref_friction = HARD_SOLREF
+                part.solimp_friction = HARD_SOLIMP
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
                 spec.delete(key)
