@@ -3,7 +3,6 @@ servos under load.
 """
 
 import dataclasses
-import functools
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -390,8 +389,8 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
                 "m6": 11,
             }[model]
             friction = smc.hardware.servo(name, model).friction
-            numbers = functools.partial(
-                reference.sliding_friction, friction, reference.friction_numbers(friction, 0)
+            numbers = SimpleNamespace(
+                **dict(zip(friction.names, friction.parameters(0), strict=True))
             )
             speeds = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0]
             torques = np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]
@@ -400,13 +399,13 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
                     for load in torques:
                         loss, damping = published(model, fitted, motor, load, v)
                         held, _ = published(model, fitted, motor, load, 0.0 * v)
-                        f, _, _ = numbers(v, motor, load)
+                        f, _, _ = friction.value(v, motor, load, numbers)
                         assert f == pytest.approx(
                             np.sign(v) * loss + damping * v,
                             rel=0,
                             abs=1e-12,
                         )
-                        assert numbers(0.0, motor, load)[1:] == pytest.approx(
+                        assert friction.value(0.0, motor, load, numbers)[1:] == pytest.approx(
                             [-held, held], rel=0, abs=1e-12
                         )
 
