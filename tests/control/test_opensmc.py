@@ -54,6 +54,7 @@ def controlled(controller, **more):
     return lambda e, de: float(controller.compute(0.0, np.array([e, de]), np.zeros(2), **more)[0])
 
 
+@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
 def test_their_controller_is_a_law_in_one_line():
     theirs = smc.law_from(
         controllers.LQR(

@@ -246,6 +246,7 @@ def saturated(y, gains, memory):
     return float(str(-100.0)), y.e
 
 
+@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
 @pytest.mark.parametrize(
     "law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"]
 )
