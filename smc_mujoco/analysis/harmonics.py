@@ -511,10 +511,9 @@ def play(amplitude: float, gap: float) -> complex:
     Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor
     leaves its flank when u changes its sign. It moves alone until the angle c with c - sin c = play
     m1 omega^2 / |u|. There it hits the other flank and passes on to the joint the impulse 1 - cos c
-    that it has from u. As x has the amplitude
-    |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone. `gap` is that of the
-      play, times
-    m1 / (m1 + m2): how far the joint moves while the rotor crosses, rad or m.
+    that it has from u. The amplitude of x is |play(...) u| / ((m1 + m2) omega^2), so c depends on
+    amplitude over gap alone. `gap` is that of the play, times m1 / (m1 + m2): how far the joint
+    moves while the rotor crosses, rad or m.
     """
     if gap == 0.0:
         return 1.0 + 0.0j

@@ -142,8 +142,7 @@ def tune(
 
     Warns:
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's
-      original gains are better
-        than any that were tried; or all chatter more than is wanted.
+        original gains are better than any that were tried; or all chatter more than is wanted.
     """
     changes = {"conditions": conditions, "starts": starts, "chattering": chattering}
     if isinstance(objective, Objective):
