@@ -2,7 +2,7 @@
 
     table = accuracy(["classical", "twisting", "super_twisting"], "duffing", conditions="coulomb")
     print(table)                                  # the most accurate law first
-    table[0].e.order, table[0].e.theory           # exponent of the control period, measured and promised
+    table[0].e.order, table[0].e.theory           # exponent of the period, measured and promised
 
 Runs have no noise. The error of a run is the largest |e|, or |s|, at the control samples of its
 last 20 %, over all driven channels. That is an ultimate bound, as the theorems on accuracy state
@@ -12,22 +12,20 @@ promises no order if there is a drive, a delay, a sensor or an estimate of the v
 and mechanism.
 
 A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control
-period, so that the error of the first-order integrator does not count. The run of the shortest
-period is repeated with half the step. RK4, for plain equations and exact friction, keeps the
-scenario's step.
+period, so that the error of the first-order integrator does not count. RK4, for plain equations and
+exact friction, keeps the scenario's step.
 """
 
 import dataclasses
 import itertools
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.apart import apart
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
@@ -57,21 +55,16 @@ PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
 # chosen: a disturbance that every law can bear, and that leaves smooth laws an error
 DEFAULT_CONDITION = "constant"
 DEFAULT_SEEDS = 3  # initial states of each law at each period; chosen
-MIN_STEPS = (
-    16  # physics steps in a control period of a mechanism with friction, contacts or other parts
-)
+# physics steps in a control period of a mechanism with friction, contacts or other parts
+MIN_STEPS = 16
 RESOLUTION = 1e-11  # of the initial error; chosen, above rounding and the creep of stuck joints
-MIN_SATURATED = (
-    0.05  # share of the last samples at the bound on u; it is remarked from there on; chosen
-)
 PARTS = 3  # of a run, each as long as its last part, in which errors are compared
 MAX_SEEDS = 10_000
-FULL_SHARE = 1.0 - 1e-9  # of the bound on u: a larger |u| is saturated
 RELATIVE_DEGREE = 2  # of a mechanism without a drive
 KEY = (
-    "|e| is the largest at the samples of the last 20 % of all runs, without noise, at the longest and the shortest "
-    "control period. Orders are exponents of the control period, with 95 % intervals. Theory promises at least "
-    "the order in the last column, for e and s if they differ."
+    "|e| is the largest at the samples of the last 20 % of all runs, without noise, at the longest "
+    "and the shortest control period. Orders are exponents of the control period, with 95 % "
+    "intervals. Theory promises at least the order in the last column, for e and s if they differ."
 )
 
 
@@ -252,7 +245,6 @@ class Run(NamedTuple):
     parts: Mapping[
         str, Sequence[float]
     ]  # "e" and "s" -> largest magnitude in each of its last parts; inf if it failed
-    saturated: float = 0.0  # share of the samples of the last part at which u is at its bound
     failure: str | None = None  # how it failed
 
 
@@ -273,20 +265,13 @@ def _measured(trace: Trace) -> Run:
     parts = {}
     for name, size in sizes.items():
         parts[name] = [float(part.max()) for part in np.array_split(size, PARTS)]
-    return Run(
-        parts,
-        float(
-            (np.abs(trace.u[end, driven]) >= FULL_SHARE * np.array(trace.scenario.limits)).mean()
-        ),
-    )
+    return Run(parts)
 
 
 class Setup(NamedTuple):
     """A law on a plant in a condition."""
 
-    # For each start one for each period; then the first start at the shortest period, with half the
-    # physics step.
-    scenarios: list[Scenario]
+    scenarios: list[Scenario]  # for each start one for each period
     periods: tuple[float, ...]  # s, longest first
     starts: int  # their number
 
@@ -312,58 +297,49 @@ def _setup(
         )
     if len(units := set(plant.units[: plant.driven])) > 1:
         raise ScenarioError(
-            f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit"
+            f"{plant.name} has driven channels in {joined(sorted(units))}: "
+            "give a plant with one unit"
         )
     if not isinstance(law, str) or sets.in_set(plant, law, gains):
         gain_set = gains
     else:
         gain_set = "default"
 
-    def scenario(seed: int, h: float, divisor: int = 1) -> Scenario:
+    def scenario(seed: int, h: float) -> Scenario:
         made = case(plant, law, condition, duration, gain_set, seed, starts, {"control_period": h})
         if made.resolved.integrator == "RK4":
             steps = made.steps
         else:
             steps = max(made.steps, MIN_STEPS)
         if "physics_step" in fields:
-            step = fields["physics_step"] / divisor
+            step = fields["physics_step"]
         else:
-            step = h / (steps * divisor)
+            step = h / steps
         return dataclasses.replace(made, physics_step=step).named(made.condition)
 
     runs = [scenario(seed, h) for seed in seeds for h in periods]
-    return Setup([*runs, scenario(seeds[0], periods[-1], divisor=2)], periods, len(seeds))
+    return Setup(runs, periods, len(seeds))
 
 
 def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
     base = setup.scenarios[0]
-    counted = runs[:-1]
-    halved = runs[-1]
-    failures = [run.failure for run in counted if run.failure]
+    failures = [run.failure for run in runs if run.failure]
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     no_promise = _why_no_promise(base)
+    remarks = [no_promise]
     if failures:
-        failed = (
-            f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}"
-        )
-    else:
-        failed = ""
-    reasons = dict(_reasons(setup, counted)) | {
-        "always": "; ".join(filter(None, [failed, no_promise]))
-    }
+        first = one_line(failures[0])
+        remarks.insert(0, f"{len(failures)} of {len(runs)} runs failed, the first: {first}")
     law = base.law
     scalings = {}
     for name in QUANTITIES:
-        parts = np.reshape([run.parts[name] for run in counted], shape)
-        change = {"step": _step_change(parts[0, -1, -1], halved.parts[name][-1], floor)}
-        if no_promise or law.template is None:
-            theory = None
-        else:
+        parts = np.reshape([run.parts[name] for run in runs], shape)
+        theory = None
+        if law.template and not no_promise:
             theory = law.template.order(name, law.gains)
-        given = {reason: words for reason, words in (reasons | change).items() if words}
-        scalings[name] = scaling(parts, setup.periods, theory, floor, given)
+        scalings[name] = scaling(parts, setup.periods, theory, floor, remarks)
     return Accuracy(
         plant=base.plant.name,
         condition=base.condition or "",
@@ -371,7 +347,7 @@ def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
         gains=kinds(scenario.law.source for scenario in setup.scenarios),
         unit=base.plant.units[0],
         periods=setup.periods,
-        runs=len(counted),
+        runs=len(runs),
         failed=len(failures),
         floor=floor,
         **scalings,
@@ -389,30 +365,5 @@ def _why_no_promise(scenario: Scenario) -> str:
     if scenario.resolved.velocity.name != "measured":
         return "no promise with an estimated velocity"
     if scenario.law.relative_degree > RELATIVE_DEGREE:
-        return f"no promise on a plant of relative degree {RELATIVE_DEGREE}, because the law is for a higher one"
-    return ""
-
-
-def _reasons(setup: Setup, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
-    """Yield name and words of what may keep a law from the order that theory promises."""
-    laws = [scenario.law for scenario in setup.scenarios]
-    unmet = set()
-    for law in laws:
-        if law.template:
-            for words in law.template.unmet(law.gains):
-                unmet.add(words)
-    if unmet:
-        yield "conditions", f"the gains violate {joined(sorted(unmet))}"
-    saturated = max((run.saturated for run in runs), default=0.0)
-    if saturated >= MIN_SATURATED:
-        yield "saturated", f"u is at its bound in up to {100 * saturated:.0f} % of the last samples"
-
-
-def _step_change(error: float, halved: float, floor: float) -> str:
-    """Return how an error changes with half the physics step, in words; "" for a small change."""
-    if not (math.isfinite(error) and math.isfinite(halved)) or max(error, halved) <= floor:
-        return ""
-    change = halved / max(error, floor) - 1.0
-    if apart((error, halved), floor):
-        return f"with half the physics step it is {100 * change:+.0f} %"
+        return f"no promise for a law of a relative degree above {RELATIVE_DEGREE}"
     return ""

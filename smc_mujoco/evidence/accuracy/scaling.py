@@ -12,16 +12,13 @@ of the last three parts to the next.
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
 TREND = 1.5
 ORDER_BAND = 0.2  # difference of two orders up to which they agree
-# how far the local order at the shortest periods lies below theory's where an error levels off;
-# chosen
-LEVEL = 0.5
 CONFIDENCE = 0.95  # of intervals
 QUANTITIES = ("e", "s")
 UNTOLD = "the order cannot be told"
@@ -121,7 +118,7 @@ def scaling(
     periods: Sequence[float],
     theory: float | None,
     floor: float,
-    reasons: Mapping[str, str],
+    remarks: Sequence[str] = (),
 ) -> Scaling:
     """Return how errors depend on the control period; periods (s, longest first), theory and floor
     as of the classes.
@@ -129,8 +126,7 @@ def scaling(
     Args:
       parts: largest magnitudes in the last three parts of each run, (starts, periods, 3), in order
         of time; inf for a failed run. The last one is the error.
-      reasons: what may keep the order from theory's, known without the errors: "always" is said in
-        any case, all others only where the order is lower than promised, or there is none.
+      remarks: what is known without the errors, such as how many runs failed.
     """
     errors = parts[..., -1]
     failed = ~np.isfinite(errors).all(axis=0)
@@ -142,10 +138,7 @@ def scaling(
     used = ~(failed | rounded | falling | growing)
     h = np.array(periods)[used]
     order, low, high = fit(h, errors[:, used])
-    if "always" in reasons:
-        said = [reasons["always"]]
-    else:
-        said = []
+    said = list(remarks)
     for mask, words in (
         (rounded, f"up to {floor:.0e}, which is rounding"),
         (falling, "still falling at the end of the run"),
@@ -153,17 +146,15 @@ def scaling(
     ):
         if mask.any():
             said.append(f"{_periods(periods, mask)} {words}")
-    said += _difference(errors[:, used], h, order, (low, high), theory, reasons)
-    every = tuple(map(tuple, errors.tolist()))
-    counted = tuple(h.tolist())
+    said.append(_difference(order, low, high, theory))
     return Scaling(
-        errors=every,
-        used=counted,
+        errors=tuple(map(tuple, errors.tolist())),
+        used=tuple(h.tolist()),
         order=order,
         low=low,
         high=high,
         theory=theory,
-        why="; ".join(said),
+        why="; ".join(filter(None, said)),
     )
 
 
@@ -193,47 +184,24 @@ def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
     return order, order - half, order + half
 
 
-def _difference(
-    errors: np.ndarray,
-    periods: np.ndarray,
-    order: float,
-    interval: tuple[float, float],
-    theory: float | None,
-    reasons: Mapping[str, str],
-) -> list[str]:
-    """Return why the order is not the promised one, as far as is seen; [] where it is, or nothing
-    was promised.
-    """
-    if theory is None:
-        return []
-    told = not interval[0] <= 0.0 < theory <= interval[1]
-    contained = "its interval contains " + (
-        "the promised order" if told else f"0 and {theory:.2g}: {UNTOLD}"
-    )
+def _difference(order: float, low: float, high: float, theory: float | None) -> str:
+    """Return how an order differs from theory's, in words; "" if it does not."""
+    if theory is None or math.isnan(order):
+        return ""
+    if low <= 0.0 < theory <= high:
+        return f"its interval contains 0 and {theory:.2g}: {UNTOLD}"
+    if order > theory + ORDER_BAND:
+        return "falls faster than promised"
     if order >= theory - ORDER_BAND:
-        if told and order <= theory + ORDER_BAND:
-            return []
-        return ["falls faster than promised" if told else contained]
-    seen = [text for name, text in reasons.items() if name != "always"]
-    if interval[0] <= theory <= interval[1]:
-        seen.append(contained)
-    elif len(periods) > 1 and theory > 0.0:
-        fine = np.log(errors[:, -2:]).mean(axis=0)
-        local = float((fine[1] - fine[0]) / math.log(periods[-1] / periods[-2]))
-        if local < theory - LEVEL:
-            seen.insert(
-                0,
-                f"levels off (order {local:.2g} at the shortest periods): these gains, not sampling, limit it",
-            )
-    return seen or ([] if math.isnan(order) else ["no reason seen"])
+        return ""
+    if low <= theory <= high:
+        return "its interval contains the promised order"
+    return "falls slower than promised: these gains, not sampling, limit it"
 
 
 def _periods(periods: Sequence[float], mask: np.ndarray) -> str:
     """Return the marked periods in words."""
     if mask.all():
         return "all periods:"
-    return (
-        "at "
-        + ", ".join(f"{1e3 * h:g}" for h, marked in zip(periods, mask, strict=True) if marked)
-        + " ms"
-    )
+    marked = ", ".join(f"{1e3 * h:g}" for h in np.array(periods)[mask])
+    return f"at {marked} ms"

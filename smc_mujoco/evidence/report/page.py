@@ -63,6 +63,12 @@ def tables(shown: Iterable[Tabular]) -> list[Markup]:
     return [Markup(f'<div class="wide">{table._repr_html_()}</div>') for table in shown]
 
 
+def folded(words: str, parts: Iterable[Markup]) -> Markup:
+    """Return parts that a click on some words shows."""
+    shown = Markup("\n").join(parts)
+    return Markup("<details><summary>{}</summary>{}</details>").format(words, shown)
+
+
 def picture(draw: Callable[[Path], object], about: str) -> Markup:
     """Return the SVG file that a function draws, with its meaning in words."""
     with scratch() as folder:

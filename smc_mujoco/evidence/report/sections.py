@@ -200,7 +200,8 @@ def comparison(compared: Compared) -> Section:
         ),
         f"The median of each law in condition {first}, with its 95 % interval.",
     )
-    parts = [*tables(matrices), medians, *tables(compared.tables)]
+    every = page.folded("All medians, intervals, verdicts and gains", tables(compared.tables))
+    parts = [*tables(matrices), medians, every]
     return Section("laws", "Laws compared", parts)
 
 

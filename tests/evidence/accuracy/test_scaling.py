@@ -22,8 +22,8 @@ def steady(errors):
     return np.repeat(np.atleast_2d(errors)[..., None], 3, axis=2)
 
 
-def measured(errors, theory=2.0, **reasons):
-    return scaling(steady(errors), PERIODS, theory, 1e-12, reasons)
+def measured(errors, theory=2.0):
+    return scaling(steady(errors), PERIODS, theory, 1e-12)
 
 
 def test_a_power_law_has_its_exponent_whatever_the_factors_of_its_starts():
@@ -60,40 +60,40 @@ def test_rounding_failed_and_unsettled_periods_are_left_out_and_said():
     parts[1, 0] = math.inf
     parts[0, 1] = 9.5e-6, 6e-6, 3.9e-6
     parts[0, 4, 2] = 1e-13
-    found = scaling(parts, PERIODS, 2.0, 1e-12, {"always": "1 of 10 runs failed"})
+    found = scaling(parts, PERIODS, 2.0, 1e-12, ["1 of 10 runs failed"])
     assert found.used == PERIODS[2:4]
     assert found.order == pytest.approx(2.0)
-    assert found.why == (
-        "1 of 10 runs failed; at 0.25 ms up to 1e-12, which is rounding; at 2 ms still falling at the end of the run"
-    )
-    growing = scaling(steady([H]) * np.array([1.0, 1.6, 2.6]), PERIODS, 1.0, 1e-12, {})
+    assert found.why.split("; ") == [
+        "1 of 10 runs failed",
+        "at 0.25 ms up to 1e-12, which is rounding",
+        "at 2 ms still falling at the end of the run",
+    ]
+    growing = scaling(steady([H]) * np.array([1.0, 1.6, 2.6]), PERIODS, 1.0, 1e-12)
     assert math.isnan(growing.order)
     assert growing.why == "all periods: still growing at the end of the run"
-    wavering = scaling(steady([H]) * np.array([9.0, 1.0, 1.2]), PERIODS, 1.0, 1e-12, {})
+    wavering = scaling(steady([H]) * np.array([9.0, 1.0, 1.2]), PERIODS, 1.0, 1e-12)
     assert wavering.used == PERIODS, "a transient that has ended"
 
 
-def test_an_order_below_the_promised_one_has_a_reason():
-    assert "levels off (order 0.0" in measured(H**2 + 1e-5).why
-    assert measured(H, theory=2.0, saturated="u is at its bound").why == (
-        "levels off (order 1 at the shortest periods): these gains, not sampling, limit it; u is at its bound"
-    )
-    assert (
-        measured(np.array([H**2, 0.0 * H + 1e-4])).why
-        == "its interval contains 0 and 2: the order cannot be told"
-    )
-    assert measured(np.array([H**3, 0.0 * H + 1e-4]), theory=1.5).why.endswith(
-        "contains 0 and 1.5: the order cannot be told"
-    )
-    assert measured(H**1.7, theory=2.0).why == "no reason seen"
-    assert (
-        measured(H**2, theory=1.0, saturated="u is at its bound").why
-        == "falls faster than promised"
-    )
-    assert measured(H, theory=None, saturated="u is at its bound").why == ""
+@pytest.mark.parametrize(
+    ("errors", "theory", "why"),
+    [
+        (H**2, 2.0, ""),
+        (H**2 + 1e-5, 2.0, "falls slower than promised"),
+        (H**1.7, 2.0, "falls slower than promised"),
+        (H**2, 1.0, "falls faster than promised"),
+        (np.array([H**2, 0.0 * H + 1e-4]), 2.0, "contains 0 and 2: the order cannot be told"),
+        (np.array([H**3, 0.0 * H + 1e-4]), 1.5, "contains 0 and 1.5: the order cannot be told"),
+        (H, None, ""),
+    ],
+)
+def test_an_order_that_is_not_the_promised_one_has_a_remark(errors, theory, why):
+    found = measured(errors, theory=theory).why
+    assert why in found
+    assert bool(why) == bool(found)
 
 
-def test_a_picture_writes_orders_at_the_ends_of_lines_and_draws_none_that_tells_nothing():
+def test_a_picture_has_no_line_for_an_order_that_tells_nothing():
     """Super-twisting's e had the order 1.14 +- 1.35 here, and a legend with the order of its s."""
     h = (4e-3, 2e-3, 1e-3, 5e-4)
 
@@ -119,17 +119,3 @@ def test_a_picture_writes_orders_at_the_ends_of_lines_and_draws_none_that_tells_
     for ax in page.axes:
         fits = [line for line in ax.lines if np.unique(np.asarray(line.get_xdata())).size > 1]
         assert {line.get_color() for line in fits} == {style.law_colour("twisting")}
-        written = {text.get_text(): text.xy for text in ax.texts}
-        assert written == {
-            "1.75 ±0.50 (2)": pytest.approx((4.0, 8.0**1.75)),
-            "untold (2)": pytest.approx((4.0, 8.0**1.14)),
-        }
-    (legend,) = page.legends
-    assert not [text for text in legend.get_texts() if any(map(str.isdigit, text.get_text()))]
-
-
-@pytest.mark.parametrize("theory", [1.0, 2.0, 3.0])
-@pytest.mark.parametrize("floor", [1e-5, 1e-3])
-def test_errors_that_stop_falling_are_said_to_level_off_whatever_order_was_promised(theory, floor):
-    assert "levels off" in measured((H / H[0]) ** theory + floor + 0.3, theory=theory).why
-    assert measured((H / H[0]) ** theory, theory=theory).why == ""
