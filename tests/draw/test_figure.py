@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco.draw import decimate, panels, style
+from smc_mujoco.draw import decimate, panels
 from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.metrics.conventions import groups
@@ -56,11 +56,6 @@ def words(page) -> str:
     return " ".join(re.findall(r"<!-- (.*?) -->", page.read_text()))
 
 
-def test_a_figure_that_was_written_is_laid_out_again_when_it_is_shown(pair, tmp_path):
-    page = draw_figure.figure(pair, tmp_path / "a", format="svg")
-    assert page.get_layout_engine() is not None
-
-
 def test_a_file_does_not_say_when_it_was_written(tmp_path, monkeypatch):
     written = []
     for second in ("0", "86400"):
@@ -82,50 +77,6 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(tmp_path):
     assert np.isnan(cut.u).all()
     low, high = panels.limits([cut], "x")
     assert low < min(gone.scenario.resolved.x0) <= max(gone.scenario.resolved.x0) < high
-
-
-def test_a_jump_is_marked_with_what_has_changed(tmp_path):
-    factors = {"jump": smc.Jump(0.5, {"mass": 25.9, "delta": 2.0})}
-    jumping = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0, **factors))
-    assert "mass × 25.9, delta × 2" in words(draw_figure.figure([jumping]))
-    still = dataclasses.replace(jumping, scenario=dataclasses.replace(jumping.scenario, jump=None))
-    assert style.marks([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
-
-
-def cart_and_pole(**fields) -> smc.Trace:
-    return smc.run(
-        smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields)
-    )
-
-
-def test_the_band_around_each_joint_is_that_of_its_own_scale():
-    trace = cart_and_pole()
-    shown = []
-    for name in ("x", "spread", "u", "force", "s"):
-        for panel in panels.over_groups([trace], name):
-            shown.append(panel)
-    widths = []
-    for row in shown[:2]:
-        ax = Figure().subplots()
-        panels.target(ax, row)
-        (band,) = ax.collections
-        widths.append(band.get_datalim(ax.transData).height)
-    assert [row.quantity for row in shown] == ["x", "x", "u", "s"]
-    assert widths == pytest.approx(
-        [2 * 0.02, 2 * 0.02 * 0.3]
-    )  # the cart starts at 0: 1 m; the pole at 0.3 rad
-
-
-def test_a_film_has_a_chart_of_each_joint():
-    trace = cart_and_pole()
-    parts = panels.strip([trace])
-    assert [(name, group.unit) for name, group, *_ in parts] == [
-        ("x", "m"),
-        ("x", "rad"),
-        ("settling", "m"),
-        ("u", "m"),
-    ]
-    np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
 
 
 def test_commands_in_volts_and_in_newton_metres_share_no_axes(tmp_path):
@@ -160,50 +111,6 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
             marks.append((line.get_color(), line.get_marker(), *line.get_xydata().tolist()))
         sides = [("r", 2, [first.t[100], 5.8]), ("r", 3, [first.t[200], -5.8]), ("b", 2), ("b", 3)]
         assert (ax.get_title(loc="right"), marks) == (title, sides if title else [])
-
-
-@pytest.mark.slow
-def test_chattering_that_cannot_be_seen_has_no_words(pair, tmp_path):
-    """A ripple of a thousandth of the largest |u|, on a run that is long enough to be averaged."""
-    (trace,) = runs(duration=1.0)[:1]
-    for ripple, told in ((1e-3, False), (0.1, True)):
-        u = (
-            trace.u
-            + ripple
-            * np.abs(trace.u).max()
-            * np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0)[:, None]
-        )
-        text = words(draw_figure.figure([dataclasses.replace(trace, u=u)]))
-        assert ("where it chatters" in text) == told
-
-
-def test_labels_are_the_laws_names_unless_given(pair):
-    assert style.labels([*pair, pair[0]], None) == [
-        "Observer-free 1",
-        "Classical",
-        "Observer-free 2",
-    ]
-    assert style.labels(pair, ["observer_free", "heavy"]) == [
-        "observer_free",
-        "heavy",
-    ]  # as they are given
-
-    @smc.law_function
-    def my_law(y, gains, memory):
-        return 0.0, y.e
-
-    own = smc.run(smc.Scenario(plant="duffing", law=my_law, duration=0.01))
-    assert style.labels([own], None) == style.labels([own], ["my_law"]) == ["my_law"]
-
-
-def test_long_and_odd_labels_stay_inside(pair, tmp_path):
-    labels = ["_lambda $6: " + "the law that the paper proposes, " * 3, "x" * 80]
-    text = words(draw_figure.figure(pair, labels=labels, title="A long title " * 20))
-    assert "_lambda $6" in text
-    assert labels[0] not in text
-    assert text.count("…") == 3
-    assert style.cropped("short", 100.0, 11) == "short"
-    assert style.width(style.cropped("x" * 80, 100.0, 11), 11) <= 100.0
 
 
 def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
@@ -268,22 +175,6 @@ def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests
     assert parts(high, rest, switching(20, 0.9e-3)) == []
 
 
-def test_what_does_not_chatter_is_drawn_as_it_is():
-    t = np.arange(10_001) * 1e-3
-    bang = np.where(
-        t < 1.2, -6.0, np.where(t < 2.0, 6.0, np.where(np.arange(10_001) % 2, 6.0, -6.0))
-    )
-    mean = decimate.smooth(bang, 100)
-    assert (mean[:2000] == bang[:2000]).all()
-    assert np.abs(mean[2002:]).max() < 0.15
-    slow = 6 * np.sign(np.sin(2 * np.pi * 10 * t))  # ten times a second
-    assert (decimate.smooth(slow, 100) == slow).all()
-    x, y = decimate.line(t, slow, 100)
-    assert len(x) <= 2 * decimate.LINE_PARTS + 2
-    assert (x[0], x[-1]) == (t[0], t[-1])
-    assert np.abs(np.diff(np.sign(y))).sum() == np.abs(np.diff(np.sign(slow))).sum()
-
-
 def triangle(y: np.ndarray, half: int) -> np.ndarray:
     """Each mean of y that is whole, with weights 1, 2, ... half, ... 2, 1."""
     weights = np.convolve(np.ones(half), np.ones(half))
@@ -314,13 +205,6 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
 
 
-def test_chattering_to_the_end_of_a_run_ends_in_a_whole_mean():
-    u = switching([400, *[1, 2, 2, 1] * 100, 39])
-    line = decimate.smooth(u, 40)
-    assert (line[:400] == -6.0).all()
-    np.testing.assert_allclose(line[-20:], triangle(u, 20)[-1])
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_the_line_is_the_same_read_backwards(seed):
     rng = np.random.default_rng(seed)
@@ -347,18 +231,6 @@ def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
         assert np.abs(line - truth).mean() < 0.02
     u = switching([45, *[1, 2, 2, 1] * 200])
     assert (decimate.smooth(u, 100)[:45] == -6.0).all()
-
-
-def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
-    chattering = runs(duration=1.5)
-    text = words(draw_figure.figure(chattering))
-    alone = words(draw_figure.figure(chattering, panels=["u"]))
-    assert "band: range of u, s" in text
-    assert "band: range of u" in alone
-    assert "band: range of u, s" not in alone
-    assert "line: mean over 40 ms where it chatters" in text
-    assert "line: mean over 40 ms where it chatters" in alone
-    assert "band:" not in words(draw_figure.figure(pair))
 
 
 @pytest.mark.slow
@@ -396,14 +268,3 @@ def test_the_close_up_shows_no_round_off(pair, level):
     switching = dataclasses.replace(pair[0], u=np.sign(held - level))
     panels.last_samples(full, shown._replace(traces=[switching]), ["#000000"], pair[:1])
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
-
-
-def test_where_a_joint_is_is_drawn_as_it_is(pair):
-    """x that chatters has no mean for a line: the legend speaks of none."""
-    t = pair[0].t
-    ripple = 0.01 * np.where(np.arange(len(pair[0].t)) % 2, 1.0, -1.0)
-    x = np.exp(-t / 0.02) + ripple
-    for name in ("x", "spread"):
-        _, y = panels.curve(pair[0], x, name)
-        assert (y[0], y.max(), y.min()) == (x[0], x.max(), x.min())
-    assert panels.curve(pair[0], ripple, "u")[1].max() < 1e-9

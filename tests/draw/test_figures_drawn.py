@@ -407,17 +407,6 @@ def test_the_settling_band_is_two_percent_around_the_reference():
     assert (low, high) == pytest.approx((traces[0].r.min() - half, traces[0].r.max() + half))
 
 
-def test_the_slowest_channel_of_a_network_is_thick_and_none_is_left_out():
-    traces = network()
-    for trace, row in zip(traces, shown(figure(traces), "angle x (rad)").child_axes, strict=True):
-        lines = [line for line in row.lines if line.get_gid() is None]
-        assert len(lines) == 11
-        thick = max(lines, key=lambda line: line.get_linewidth())
-        np.testing.assert_allclose(
-            thick.get_ydata(), trace.x[:, np.abs(trace.x - trace.r).sum(axis=0).argmax()]
-        )
-
-
 def test_the_worst_joint_of_an_arm_is_large_and_others_are_sparklines_beside_their_largest_values():
     """The run that is far off counts. The page is no higher than 1,100 px."""
     traces = arm()
@@ -527,23 +516,6 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
         assert ax.get_title(loc="left") == style.law_name(its.law)
     assert page.legends[0].get_title().get_text() == "Region of attraction: Van der Pol"
     assert "gains: tuned here" in [text.get_text() for text in page.texts + page.artists]
-
-
-def test_equal_blues_of_maps_side_by_side_are_equal_times():
-    names = {
-        "law": "classical",
-        "plant": "van_der_pol",
-        "unit": "m",
-        "duration": 8.0,
-        "x": np.ones(2),
-        "v": np.ones(2),
-    }
-    outcome = np.full((2, 2), CONVERGES, np.int8)
-    maps = []
-    for time in (2.0, 8.0):
-        maps.append(Basin(**names, outcome=outcome, decided_at=np.full((2, 2), time)))
-    shades = [ax.collections[0].get_array() for ax in region.draw(maps).axes]
-    assert [np.unique(shade).tolist() for shade in shades] == [[0], [1]]
 
 
 ONE, OTHER = (

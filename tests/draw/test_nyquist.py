@@ -40,15 +40,3 @@ def test_a_calm_law_has_no_empty_panel_and_no_band(page):
     assert not page.axes[2].patches
     assert page.axes[2].get_position().width > 1.3 * page.axes[1].get_position().width
     assert "do not cross" in page.legends[0].get_texts()[1].get_text()
-
-
-def test_axes_of_small_values_have_a_unit_with_a_prefix_in_place_of_an_exponent(page):
-    assert [ax.get_ylabel() for ax in page.axes[1:]] == ["s (µm/s)", "s (m/s)"]
-    page.draw_without_rendering()
-    assert not [ax for ax in page.axes if ax.yaxis.get_offset_text().get_text()]
-
-
-def test_a_run_that_half_the_step_changes_says_so(page):
-    titles = [page.axes[i].get_title(loc="left") for i in (1, 2)]
-    assert "more than 5 %" in " ".join(titles[0].split())
-    assert titles[1] == ""

@@ -9,7 +9,6 @@ from matplotlib.text import Text
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page, style
 
 
@@ -38,14 +37,6 @@ def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_long
         assert all(wide(labels, more, size) >= room for more in range(columns + 1, count + 1))
         longest = max(wide([label], 1, size) for label in labels)
         assert longest <= 72 * width * (0.55 if columns > 1 else 0.95) + 1.0
-
-
-@pytest.mark.parametrize("side", page.SIDE_RANGE)
-def test_the_ends_of_the_range_of_a_side_are_sizes_and_what_lies_beyond_is_none(side):
-    assert page.measure((side, 5.0)) == (side, 5.0)
-    beyond = np.nextafter(side, 0.0 if side < 5.0 else np.inf)
-    with pytest.raises(ScenarioError, match="inches"):
-        page.measure((5.0, float(beyond)))
 
 
 def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letters_of_16_points(

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import pytest
 from matplotlib.figure import Figure
 
-import smc_mujoco as smc
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Evaluation, Objective
+from smc_mujoco.analysis.tuning.objective import Evaluation, Objective
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.draw import page as pages
@@ -100,34 +99,3 @@ def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pa
         assert place[0] + 1e-3 * place[1] == pytest.approx(tuned.objective, rel=1e-3)
     assert stairs[0].get_marker() != stairs[1].get_marker()
     assert stairs[0].get_color() != stairs[1].get_color()
-
-
-@pytest.mark.parametrize(("largest", "scale"), [(1.2, "linear"), (30.0, "log")])
-def test_an_axis_is_logarithmic_where_values_differ_much(pair, page, tmp_path, largest, scale):
-    gains = pair[0].history[0].gains
-    front = tuple(Evaluation(gains, x, x, y) for x, y in ((1.0, 100.0 * largest), (largest, 100.0)))
-    pareto([with_history(pair[0], front)], tmp_path / "fronts")
-    assert {page[0].axes[0].get_xscale(), page[0].axes[0].get_yscale()} == {scale}
-
-
-def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(
-    pair, page, tmp_path
-):
-    first = pair[0]
-    failed = []
-    for one in first.history:
-        failed.append(one._replace(tracking=1.5 * FAILURE_COST, objective=1.5 * FAILURE_COST))
-    resting = [one._replace(variation=0.0) for one in pair[1].history]
-    both = [with_history(first, failed), with_history(pair[1], resting)]
-    svg, _ = pareto(both, tmp_path / "fronts")
-    assert "Observer-free: every run failed" in svg.read_text()
-    assert page[0].axes[0].lines[0].get_ydata()[0] == MIN_VARIATION
-
-
-def test_unfair_comparisons_and_no_tunings_are_refused(pair, tmp_path):
-    for unlike in ([], [pair[0], dataclasses.replace(pair[1], seed=1)]):
-        with pytest.raises(smc.ScenarioError):
-            pareto(unlike, tmp_path / "fronts")
-    with pytest.raises(smc.ScenarioError, match="svg"):
-        pareto(pair, tmp_path / "fronts.gif")
-    assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,6 @@ import sys
 import types
 
 import imageio_ffmpeg
-import matplotlib.figure
 import numpy as np
 import pytest
 from helpers.films import without_charts
@@ -16,7 +15,6 @@ from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, html
-from smc_mujoco.draw.film import film
 
 SIZE = (320, 180)
 FILM = {"size": SIZE, "fps": 20.0, "speed": 1.0}
@@ -59,15 +57,6 @@ def test_a_notebook_shows_a_figure_that_pyplot_does_not_know_of(trace):
     told, about = formatters.DisplayFormatter().format(figure)
     assert told["image/png"] == picture
     assert about["image/png"] == metadata
-
-
-def test_show_takes_any_figure(cell, trace):
-    smc.show(matplotlib.figure.Figure(figsize=(2.0, 1.0)))
-    smc.show(smc.figure(trace, size=(6.0, 4.0)))
-    sizes = [Image.open(io.BytesIO(content(shown))).size for shown in cell]
-    assert sizes == [(400, 200), (1200, 800)]
-    assert 'width="192"' in cell[0]
-    assert all(shown.startswith("<img ") and "max-width:100%" in shown for shown in cell)
 
 
 # films
@@ -119,17 +108,3 @@ def probe(film: bytes) -> tuple[int, int, float, int]:
 
 
 # mistakes
-
-
-def test_where_nothing_renders_show_says_so_before_it_films(cell, trace, monkeypatch):
-    monkeypatch.setattr(film, "missing", lambda: "no film: no OpenGL here")
-    monkeypatch.setattr(film, "film", lambda *_: pytest.fail("it filmed"))
-    with pytest.raises(smc.ScenarioError, match=r"^no film: no OpenGL here$"):
-        smc.show(trace)
-
-
-def test_outside_of_a_notebook_show_names_what_to_call(trace):
-    with pytest.raises(
-        smc.ScenarioError, match=r"needs a notebook: .* smc.film\(traces, 'film.mp4'\)"
-    ):
-        smc.show(trace)
