@@ -4,9 +4,8 @@ Everything comes from the templates and their docstrings, see `smc_mujoco.contro
 """
 
 import inspect
-import itertools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Console
 from rich.padding import Padding
@@ -53,17 +52,19 @@ def print_pages(name: str, console: Console) -> None:
     """
     if name in plants():
         return print_plant(plants()[name], console)
-    known = [templates() for templates in CATALOGUES.values()]
-    pages = [(templates[name], templates.package(name)) for templates in known if name in templates]
+    pages = []
+    known: dict[str, None] = {}
+    for catalogue_of in CATALOGUES.values():
+        templates = catalogue_of()
+        known |= dict.fromkeys(templates)
+        if name in templates:
+            pages.append((templates[name], templates.package(name)))
     if not pages and "." in name:
-        pages = []
         for law in from_text.laws(name):
             if isinstance(law, Law) and law.template:
                 pages.append((law.template, ""))
     if not pages:
-        raise unknown(
-            "law, surface or velocity estimator", name, dict.fromkeys(itertools.chain(*known))
-        )
+        raise unknown("law, surface or velocity estimator", name, known)
     for template, package in pages:
         print_page(template, console, package, name)
     return None
@@ -74,20 +75,25 @@ def print_plant(plant: Plant, console: Console) -> None:
     console.print(Text.assemble((plant.name, "bold cyan"), ("  plant", "dim")))
     said = LINES.sub(" ", inspect.getdoc(inspect.getmodule(plant.build)) or "")
     console.print(Padding(Text(said), (1, 0, 1, 2)))
-    table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
-    table.add_row(
-        "parameters", Text(", ".join(f"{key}={value:g}" for key, value in plant.parameters.items()))
-    )
+    rows = {"parameters": _values(plant.parameters)}
     for name, values in plant.sets.items():
         changed = {key: value for key, value in values.items() if value != plant.parameters[key]}
-        table.add_row(
-            f"set {name}",
-            Text(", ".join(f"{k}={v:g}" for k, v in changed.items()) or "the default"),
-        )
-    table.add_row(
-        "use",
-        Text(f'smc.plant("{plant.name}")' + ', or smc.plant(..., set="NAME")' * bool(plant.sets)),
-    )
+        rows[f"set {name}"] = _values(changed) or "the default"
+    rows["use"] = f'smc.plant("{plant.name}")'
+    _print_rows(rows, console)
+
+
+def _values(values: Mapping[str, float]) -> str:
+    """Return numbers by name as text."""
+    return ", ".join(f"{name}={value:g}" for name, value in values.items())
+
+
+def _print_rows(rows: Mapping[str, str], console: Console) -> None:
+    """Print the rows of a page that have words."""
+    table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
+    for label, words in rows.items():
+        if words:
+            table.add_row(label, Text(words))
     console.print(table)
 
 
@@ -104,16 +110,12 @@ def lists() -> dict[str, list[tuple[str, str]]]:
 def print_suitable(needs: Sequence[str], plant: str | None, console: Console) -> None:
     """Print a line about each law that has all these PROPERTIES and suits a plant."""
     names = [law.name for law in suitable(needs, plant)]
-    filters = " and ".join(PROPERTIES[need].words for need in needs)
-    title = f"{len(names)} of {len(laws())} laws" + f" that {filters}" * bool(filters)
-    title += f" for {plant}" * (plant is not None)
-    if "no-velocity" in needs:
-        text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
-        console.print(text, highlight=False)
-    if names:
-        console.print(catalogue(title, [row for row in lists()["Laws"] if row[0] in names]))
-    else:
-        console.print(f"{title}: leave out a need, or --plant", highlight=False)
+    title = f"{len(names)} of {len(laws())} laws"
+    if needs:
+        title += f" that {' and '.join(PROPERTIES[need].words for need in needs)}"
+    if plant is not None:
+        title += f" for {plant}"
+    console.print(catalogue(title, [row for row in lists()["Laws"] if row[0] in names]))
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:
@@ -121,43 +123,39 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     its name or file.
     """
     parts = entry(template)
-    is_law = template.kind == "law"
     console.print(
         Text.assemble(
             (template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")
         )
     )
     console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))
-    call = ", ".join([f'"{text}"', *(f"{k}={v:g}" for k, v in list(template.defaults.items())[:2])])
+    some = _values(dict(list(template.defaults.items())[:2]))
+    call = f'"{text}", {some}' if some else f'"{text}"'
     rows = {
-        "gains": "\n".join([*_gains(template), *filter(None, [parts.gains])]),
+        "gains": "\n".join([*_gains(template), parts.gains]).strip(),
         "conditions": "\n".join(template.conditions) or "none on the gains alone",
         "degree": _degree(template),
         "family": template.family,
         "promises": _promises(template),
-        "reads": ", ".join(f for f in Measurement._fields if f in reads(template)) * is_law,
-        "plants": (", ".join(template.plants) or "all with an actuator at each joint") * is_law,
         "discretisation": parts.discretisation,
         "known": parts.known,
         "source": parts.source,
         "package": package,
         "use": CALL_TEMPLATES[template.kind].format(call),
     }
-    table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
-    for label, words in rows.items():
-        if words:
-            table.add_row(label, Text(words))
-    console.print(table)
+    if template.kind == "law":
+        rows["reads"] = ", ".join(name for name in Measurement._fields if name in reads(template))
+        rows["plants"] = ", ".join(template.plants) or "all with an actuator at each joint"
+    _print_rows(rows, console)
 
 
 def _gains(template: Template) -> Iterable[str]:
     """Yield a line for each gain: its default and its range."""
     width = max(map(len, template.gains), default=0)
     for name, gain in template.gains.items():
+        allowed = "  >= 0" if gain.nonnegative else ""
         if gain.positive:
             allowed = "  > 0"
-        else:
-            allowed = "  >= 0" if gain.nonnegative else ""
         yield f"{name:{width}} = {gain.default:<8g}{allowed}".rstrip()
     if not template.gains:
         yield "none"
@@ -169,15 +167,15 @@ def _promises(template: Template) -> str:
     """
     if template.kind != "law":
         return ""
-    u = "a continuous u" * template.continuous
-    orders = []
+    promises = []
+    if template.continuous:
+        promises.append("a continuous u")
+    if template.finite_time in ARRIVALS:
+        promises.append(ARRIVALS[template.finite_time])
     for name in template.accuracy:
-        orders.append(f"|{name}| of order {template.order(name, template.defaults):.3g}")
-    if orders:
-        accuracy = f"{' and '.join(orders)} in the control period"
-    else:
-        accuracy = ""
-    return ", ".join(filter(None, [u, ARRIVALS.get(template.finite_time), accuracy]))
+        order = template.order(name, template.defaults)
+        promises.append(f"|{name}| of order {order:.3g} in the control period")
+    return ", ".join(promises)
 
 
 def _degree(template: Template) -> str:

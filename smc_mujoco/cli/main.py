@@ -36,9 +36,8 @@ GROUPS: dict[str, list[Callable[..., None]]] = {
     ],
 }
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
-    for group, commands in annexes.module(
-        f"smc_mujoco.{annex}.commands", "the command line"
-    ).GROUPS.items():
+    more = annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS
+    for group, commands in more.items():
         GROUPS.setdefault(group, []).extend(commands)
 for group, commands in GROUPS.items():
     for command in commands:
@@ -51,21 +50,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     An error that the user can correct ends in one sentence and exit code 2.
     """
-    for name in (
-        "stdin",
-        "stdout",
-        "stderr",
-    ):  # a closed stream; in this order each gets its own descriptor again
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         # a character that the terminal lacks is shown as ?
         stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue] Python made it a TextIOWrapper
-    if not os.environ.get("COLUMNS", "80").strip("0"):
-        del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
-    if (
-        threading.current_thread() is threading.main_thread()
-    ):  # ends as Ctrl-C does, and leaves no half-written files
+    if threading.current_thread() is threading.main_thread():
+        # ends as Ctrl-C does, and leaves no half-written files
         signal.signal(signal.SIGTERM, _end)
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = _showing_once()

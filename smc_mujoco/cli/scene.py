@@ -1,9 +1,7 @@
 """Running a scene: from its declaration to printed scores, traces, figures and a film."""
 
-import contextlib
 import re
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.analysis.apart import apart
@@ -15,7 +13,6 @@ from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import slug
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.camera import Camera
-from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -23,7 +20,6 @@ from smc_mujoco.studies.scene import Scene
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
-Timer = Callable[[str], AbstractContextManager[None]]
 
 
 def perform(
@@ -31,7 +27,6 @@ def perform(
     out: Path,
     filming: bool,
     threads: int | None,
-    clock: Timer,
     terminal: Terminal,
     export: Sequence[str],
     question: str,
@@ -46,9 +41,8 @@ def perform(
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
     out.mkdir(parents=True, exist_ok=True)
-    traces = simulate(scene, threads, clock)
-    with clock("repeating"):
-        again = repeat(scene, threads) if repeated else {}
+    traces = simulate(scene, threads)
+    again = repeat(scene, threads) if repeated else {}
     for condition, runs in traces.items():
         title = _title(scene, condition)
         others = again.get(condition)
@@ -60,23 +54,20 @@ def perform(
         terminal.print()
     for table in tables.answers(scene.answers, traces, again) if scene.answers else ():
         terminal.print(table, "")
-    with clock("traces"):  # first, so that runs are kept if the scene's own answer fails
-        written = save(traces, out, export)
+    written = save(traces, out, export)  # first, so that runs are kept if the scene's answer fails
     answer = scene.sentence(traces)
     terminal.note(answer, "bold", wrap=True)
     for words in other_answers(scene, traces, again, answer) if again else ():
         terminal.note(words, "yellow", wrap=True)
     terminal.print()
-    with clock("figures"):
-        written += figures(scene, traces, out)
+    written += figures(scene, traces, out)
     try:
         if filming:
-            with clock("film"):
-                path = out / f"{slug(scene.film)}.mp4"
-                title = _title(scene, scene.film)
-                runs = [*traces[scene.film].values()]
-                names = [*map(style.label, traces[scene.film])]
-                written += filmed(runs, path, names, title, terminal, scene.camera)
+            path = out / f"{slug(scene.film)}.mp4"
+            title = _title(scene, scene.film)
+            runs = [*traces[scene.film].values()]
+            names = [*map(style.label, traces[scene.film])]
+            written += filmed(runs, path, names, title, terminal, scene.camera)
     finally:  # also if the film fails or is stopped
         terminal.print("wrote", style="dim")
         for file in written:
@@ -89,14 +80,10 @@ def _title(scene: Scene, condition: str) -> str:
     return scene.title
 
 
-def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullcontext) -> Traces:
+def simulate(scene: Scene, threads: int | None) -> Traces:
     """Run all scenarios of the scene at once, with a progress bar."""
-    with clock("compiling"):
-        runs = [
-            (condition, label, prepare(scenario)) for condition, label, scenario in scene.runs()
-        ]
-    with clock("simulating"):
-        made = run([prepared for _, _, prepared in runs], threads, progress=True)
+    runs = list(scene.runs())
+    made = run([scenario for _, _, scenario in runs], threads, progress=True)
     traces: dict[str, dict[str, Trace]] = {}
     for (condition, label, _), trace in zip(runs, made, strict=True):
         traces.setdefault(condition, {})[label] = trace
@@ -125,18 +112,17 @@ def other_answers(
     """Return the scene's answer at half the physics step and from nudged starts, where it says
     something else.
     """
+    order = any(first_order(scenario) for _, _, scenario in scene.runs())
+    changes = ("At half the physics step", order), (f"From starts moved by {NUDGE:g} of it", False)
     said = []
-    for k, words in enumerate(
-        ("At half the physics step", f"From starts moved by {NUDGE:g} of themselves")
-    ):
-        runs = {}
-        for c, its in traces.items():
-            runs[c] = {label: again.get(c, {}).get(label, [t, t])[k] for label, t in its.items()}
+    for k, (words, halved_first_order) in enumerate(changes):
+        runs: dict[str, dict[str, Trace]] = {}
+        for condition, of_condition in traces.items():
+            runs[condition] = dict(of_condition)
+            for label, others in again.get(condition, {}).items():
+                runs[condition][label] = others[k]
         other = scene.sentence(runs)
-        order = k == 0 and any(
-            first_order(trace.scenario) for its in runs.values() for trace in its.values()
-        )
-        if not same_answer(answer, other, order):
+        if not same_answer(answer, other, halved_first_order):
             said.append(f"{words}: {other}")
     return said
 
@@ -145,8 +131,8 @@ def same_answer(one: str, other: str, first_order: bool = False) -> bool:
     """Return whether two answers say the same: equal words, and numbers that are not `apart`."""
     if NUMBER.sub("#", one) != NUMBER.sub("#", other):
         return False
-    pairs = zip(map(float, NUMBER.findall(one)), map(float, NUMBER.findall(other)), strict=True)
-    return not any(apart(pair, first_order=first_order) for pair in pairs)
+    pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    return not any(apart([float(a), float(b)], first_order=first_order) for a, b in pairs)
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:

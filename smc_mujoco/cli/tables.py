@@ -31,9 +31,8 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.step_halving import StepChange
 
 T = TypeVar("T")
-Again = Mapping[
-    str, Sequence[Trace]
-]  # label -> the same run at half the physics step, and from a nudged start
+# label -> the same run at half the physics step, and from a nudged start
+Again = Mapping[str, Sequence[Trace]]
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
@@ -55,12 +54,11 @@ SCORE_COLUMNS = {
     "spread\nsettles": "spread_settling_time",
 }
 FAILED = Text("failed", style="red")
-MAX_PRINTED_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 
 
 def titled(title: str, *columns: Column | str, **options: Any) -> Table:
-    """Return an empty table with a title at its left, and a rule below the headings of its columns."""
+    """Return an empty table with a title at its left, and a rule below its headings."""
     options = {"box": box.SIMPLE_HEAD, "title_justify": "left", "title_style": "bold"} | options
     return Table(*columns, title=title or None, **options)
 
@@ -89,21 +87,18 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     tables = []
     for group, heading in headings(scenario).items():
         units = {}
-        for m in metrics():
-            if m.applies_to(group):
-                units[m.name] = m.unit_for(group.unit, group.effort)
+        for metric in metrics():
+            if metric.applies_to(group):
+                units[metric.name] = metric.unit_for(group.unit, group.effort)
         shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
-        rows = {}
-        for label, its in values.items():
-            rows[label] = [
-                _score(
-                    [None if one is None else one[group.name][name] for one in its],
-                    name,
-                    traces[label].scenario,
-                )
-                for name in shown.values()
-            ]
+        rows: dict[str, list[Text]] = {}
+        for label, runs in values.items():
+            least = {name: floor(traces[label].scenario, name) for name in units}
+            rows[label] = []
+            for name in shown.values():
+                of_runs = [run and run[group.name][name] for run in runs]
+                rows[label].append(_marked(of_runs, traces[label].scenario, least[name]))
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
     return _noted(tables, in_words(gains))
@@ -111,11 +106,14 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
 
 def _noted(tables: list[Table], *words: str) -> list[Table]:
     """Return tables with words below the last one, and with what a mark means, if a cell has one."""
-    cells = (cell for table in tables for column in table.columns for cell in column.cells)
-    marked = any(MARK in cell.plain for cell in cells if isinstance(cell, Text))
-    for table in tables[-1:]:
-        table.caption = "; ".join(filter(None, (*words, SCORE_NOTE * marked))) or None
-        table.caption_justify = "left"
+    notes = [word for word in words if word]
+    for table in tables:
+        for column in table.columns:
+            if SCORE_NOTE not in notes and any(MARK in str(cell) for cell in column.cells):
+                notes.append(SCORE_NOTE)
+    if tables and notes:
+        tables[-1].caption = "; ".join(notes)
+        tables[-1].caption_justify = "left"
     return tables
 
 
@@ -125,34 +123,14 @@ def _several(
     """Return label -> scores of a run and of its repetitions, None for one that failed; no label of
     which all did.
     """
-    runs = {label: (trace, *(again or {}).get(label, ())) for label, trace in traces.items()}
     values = {}
-    for label, its in runs.items():
-        values[label] = [None if one.diverged_at is not None else scored(one) for one in its]
-    return {label: its for label, its in values.items() if its != [None] * len(its)}
+    for label, trace in traces.items():
+        runs = (trace, *(again or {}).get(label, ()))
+        values[label] = [None if run.diverged_at is not None else scored(run) for run in runs]
+    return {label: scores for label, scores in values.items() if any(scores)}
 
 
-def _score(values: Sequence[float | None], metric: str, scenario: Scenario) -> Text:
-    """Return a metric of the same run several times as text, see `_marked`.
-
-    Overshoot of a run that goes far away has no digits that matter.
-    """
-
-    def text(value: float) -> str:
-        large = metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
-        if large:
-            return f"> {MAX_PRINTED_OVERSHOOT}"
-        return number(value)
-
-    return _marked(values, text, scenario, floor(scenario, metric))
-
-
-def _marked(
-    values: Sequence[float | None],
-    text: Callable[[float], str],
-    scenario: Scenario,
-    least: float = 0.0,
-) -> Text:
+def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0.0) -> Text:
     """Return a number as text; with its range, marked, if its values in the same run again are
     apart.
 
@@ -164,39 +142,34 @@ def _marked(
             return math.inf
         return -math.inf if math.isnan(value) else value
 
-    texts = {value: FAILED.plain if value is None else text(value) for value in values}
-    low, high = (texts[end(values, key=size)] for end in (min, max))
+    texts = {value: FAILED.plain if value is None else number(value) for value in values}
+    low = texts[min(values, key=size)]
+    high = texts[max(values, key=size)]
     numbers = [math.inf if value is None else value for value in values]
-    if low == high or not apart(numbers, least, first_order(scenario)):
-        if values[0] is None:
-            return FAILED
-        return Text(texts[values[0]])
-    return Text(f"{low}{MARK}").append(f"\nto {high}", "dim")
+    if low != high and apart(numbers, least, first_order(scenario)):
+        return Text(f"{low}{MARK} to {high}")
+    return FAILED if values[0] is None else Text(texts[values[0]])
 
 
 def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
-    """Return a table of the tips of arms, with scores marked as in `scores`; [] for other plants."""
+    """Return a table of the tips of arms, with scores marked as in `scores`; [] elsewhere."""
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = _several(tip_scores, traces, again)
-    known = {name for its in values.values() for one in its if one for name in one}
+    known = set().union(*(run or () for runs in values.values() for run in runs))
     shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
-    rows = {}
-    for label, its in values.items():
-        rows[label] = [
-            _marked(
-                [None if one is None else factor * one.get(name, math.nan) for one in its],
-                number,
-                traces[label].scenario,
-            )
-            for name, _, factor in shown.values()
-        ]
+    rows: dict[str, list[Text]] = {}
+    for label, runs in values.items():
+        rows[label] = []
+        for name, _, factor in shown.values():
+            of_runs = [run and factor * run.get(name, math.nan) for run in runs]
+            rows[label].append(_marked(of_runs, traces[label].scenario))
     return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
 
 
 def headings(scenario: Scenario) -> dict[Group, str]:
-    """Return group of channels -> heading that names its joints; "" for the only group of a plant."""
+    """Return group of channels -> heading that names its joints; "" for an only group."""
     of_plant = groups(scenario)
     if len(of_plant) == 1:
         return {of_plant[0]: ""}
@@ -220,19 +193,18 @@ def answers(
     """Return a table for each metric that applies, or one table of them all if there is only one
     condition.
     """
-    scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())
-    plants = dict.fromkeys((scenario.plant, scenario.efforts[0]) for scenario in scenarios)
-    shown = {}
-    for name in names:
-        if not all(CATALOGUE[name].refusal(plant) for plant, _ in plants):
-            units = dict.fromkeys(
-                CATALOGUE[name].unit_for(plant.unit, effort) for plant, effort in plants
-            )
-            shown[f"{name} ({' or '.join(units)})"] = CATALOGUE[name]
-    every = [(name, runs, (again or {}).get(name, {})) for name, runs in traces.items()]
+    plants = {}
+    for runs in traces.values():
+        for trace in runs.values():
+            plants[trace.scenario.plant, trace.scenario.efforts[0]] = None
     columns = {}
-    for head, metric in shown.items():
-        columns[head] = [(name, metric, runs, others) for name, runs, others in every]
+    for metric in map(CATALOGUE.__getitem__, names):
+        if not all(metric.refusal(plant) for plant, _ in plants):
+            units = dict.fromkeys(metric.unit_for(plant.unit, effort) for plant, effort in plants)
+            columns[f"{metric.name} ({' or '.join(units)})"] = [
+                (condition, metric, runs, (again or {}).get(condition, {}))
+                for condition, runs in traces.items()
+            ]
     if len(traces) == 1:
         columns = {"": [(head, *column[1:]) for head, (column,) in columns.items()]}
     return _noted([_answer(head, of_metric) for head, of_metric in columns.items()])
@@ -242,7 +214,9 @@ def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]
     """Return a table with a line for every label; each column has a heading, a metric and labelled
     runs, also again.
     """
-    traces = {label: trace for _, _, runs, _ in columns for label, trace in runs.items()}
+    traces: dict[str, Trace] = {}
+    for _, _, runs, _ in columns:
+        traces |= runs
     rows = {}
     for label in traces:
         rows[label] = [
@@ -260,8 +234,9 @@ def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> T
     """
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    values = [None if one.diverged_at is not None else metric.of(one) for one in (trace, *again)]
-    return _score(values, metric.name, trace.scenario)
+    runs = (trace, *again)
+    values = [None if run.diverged_at is not None else metric.of(run) for run in runs]
+    return _marked(values, trace.scenario, floor(trace.scenario, metric.name))
 
 
 def _by_label(
@@ -274,12 +249,9 @@ def _by_label(
     """Return a table with a row of cells for each labelled run, or "failed"; labels have up to
     `width` letters.
     """
-    laws = [trace.scenario.law.name for trace in traces.values()]
+    laws = {trace.scenario.law.name for trace in traces.values()}
     # labels of runs of one law say what differs
-    if len(set(laws)) == 1 < len(laws):
-        head = "run"
-    else:
-        head = "law"
+    head = "run" if len(laws) == 1 < len(traces) else "law"
     label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
     table = titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
@@ -327,11 +299,12 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
 
 def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[str, str]]:
     """Return the name of every entry, with the first line of its docstring, and its package."""
-    lines = {name: (doc(entry) or "").strip().partition("\n")[0] for name, entry in known.items()}
-    # some lines end with a colon, because a formula follows
-    return [
-        (name, with_package(line.rstrip(":"), known.package(name))) for name, line in lines.items()
-    ]
+    rows = []
+    for name, entry in known.items():
+        line = (doc(entry) or "").strip().partition("\n")[0]
+        # some lines end with a colon, because a formula follows
+        rows.append((name, with_package(line.rstrip(":"), known.package(name))))
+    return rows
 
 
 def with_package(line: str, package: str) -> str:
@@ -352,19 +325,15 @@ def margins(kind: str, results: Sequence[Margin]) -> Table:
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
     for margin in results:
-        value = f"{'>= ' * margin.open}{number(margin.value)}"
-        if margin.theory is None:
-            theory = ""
-        elif margin.theory == math.inf:
-            theory = "any"
-        else:
-            theory = number(margin.theory)
+        value = number(margin.value)
+        if margin.open:
+            value = f">= {value}"
+        theory = ""
+        if margin.theory is not None:
+            theory = "any" if margin.theory == math.inf else number(margin.theory)
         plant = "" if margin.plant == last else margin.plant
         law = Text(margin.law, style=style.law_colour(margin.law))
-        if margin.resolution:
-            within = number(margin.resolution)
-        else:
-            within = ""
+        within = number(margin.resolution) if margin.resolution else ""
         table.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
     return table
@@ -389,12 +358,10 @@ def chattering(
         scenarios, cycles, measured, changes, strict=True
     ):
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
-        sizes = number(cycle.amplitude), number(amplitude) + MARK * change.marked
-        rates = number(cycle.frequency), number(frequency) + MARK * change.marked
-        if plant.driven > 1:
-            share = cycle.coupling
-        else:
-            share = cycle.third_harmonic
+        mark = MARK if change.marked else ""
+        sizes = number(cycle.amplitude), number(amplitude) + mark
+        rates = number(cycle.frequency), number(frequency) + mark
+        share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
         table.add_row(law, *sizes, *rates, _share(cycle.uncertainty), _share(share))
     if any(change.marked for change in changes):
         table.caption = NOTE
@@ -405,6 +372,4 @@ def _share(share: float) -> str:
     """Return a share in percent; "" for NaN."""
     if math.isnan(share):
         return ""
-    if share <= 1.0:
-        return f"{100 * share:.0f} %"
-    return "> 100 %"
+    return f"{100 * share:.0f} %" if share <= 1.0 else "> 100 %"

@@ -68,20 +68,3 @@ class Terminal(Console):
         """Print the names of files that were written."""
         for file in files:
             self.note(f"wrote {printable(str(file))}")
-
-
-class Clock:
-    """Seconds spent in named parts of a command."""
-
-    def __init__(self):
-        self.spent: dict[str, float] = {}
-
-    @contextlib.contextmanager
-    def __call__(self, part: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.spent[part] = self.spent.get(part, 0.0) + time.perf_counter() - start
-
-    def __str__(self) -> str:
-        parts = [f"{part} {seconds:.2f} s" for part, seconds in self.spent.items()]
-        return ", ".join([*parts, f"in all {sum(self.spent.values()):.2f} s"])

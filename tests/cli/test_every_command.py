@@ -27,9 +27,6 @@ CALLS = {
     "list --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
     "list law.c": ["exchange.c.load.check"],
-    "list law.c --gains a=1 --memory 3 --symbol f --flag=-Ia --flag=-Ib --timeout 4": [
-        "exchange.c.load.check"
-    ],
     "run duffing": ["cli.scene.perform"],
     "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat": [
         "cli.scene.perform"
@@ -131,7 +128,6 @@ ALIASES = {  # option -> arguments that it may change, besides the one of its na
     "--gains": "law scenario",
     "--disturbance": "within over",
     "--bound": "within over",
-    "--flag": "flags",
     "--label": "scenario",
     "--no-film": "filming",
     "--no-browser": "open_browser",
@@ -237,7 +233,7 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
         assert len(mine) == 1, (option, changed)
         assert option == "--quick" or len(changed) == 1, (option, changed)
         value = whole.get(mine[0], "").replace("_", "-")
-        for piece in re.split(r"[,=:()]|--flag", " ".join(words[start + 1 : stop])):
+        for piece in re.split(r"[,=:()]", " ".join(words[start + 1 : stop])):
             plain = piece.removesuffix(".json").replace("_", "-")
             assert plain in value or mine[0] in UNTOLD or plain == "all", (option, piece, value)
 
@@ -291,7 +287,6 @@ def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
-    beside = {"--timing"}  # for what is done after the work, or instead of it
     for name, (_, command) in COMMANDS.items():
         words = set()
         for line in CALLS:
@@ -305,7 +300,7 @@ def test_the_calls_above_have_every_option_of_their_commands():
                     options.append({*names.split("/")})
         else:
             options = []
-        assert [one for one in options if not one & (words | beside)] == [], name
+        assert [one for one in options if not one & words] == [], name
 
 
 def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_takes():

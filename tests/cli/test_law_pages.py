@@ -12,7 +12,7 @@ from helpers.commands import python
 import smc_mujoco as smc
 from smc_mujoco.cli import law_pages, main
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import law_function, laws
+from smc_mujoco.control.law import laws
 
 pytestmark = pytest.mark.quick
 
@@ -68,14 +68,6 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert f"{len(lines)} of {len(laws())} {words}" in flat(out)
 
 
-def test_where_no_law_suits_it_says_so(call):
-    out = flat(call("list", "--needs", "one-gain")[1])
-    assert (
-        out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, or --plant"
-    )
-    assert 'velocity="levant"' in flat(call("list", "--needs", "no-velocity")[1])
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -88,15 +80,6 @@ def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
     code, out, err = call("list", *words)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert sentence in err
-
-
-def test_a_page_has_what_theory_promises_and_what_the_law_reads(call):
-    out = flat(call("list", "twisting")[1])
-    assert "family higher-order" in out
-    assert "promises e = 0 after a finite time" in out
-    assert "reads e, de, ddr, f, g, model" in out
-    assert "promises a continuous u" in flat(call("list", "pid")[1])
-    assert "promises" not in call("list", "filtered_difference")[1]
 
 
 # one of them
@@ -134,18 +117,6 @@ def test_a_page_loses_no_word_of_the_docstring():
         assert set(re.findall(r"\w+", template.doc)) - words == set(), name
 
 
-def test_a_formula_is_an_equation():
-    """The first sentence of the docstring is `Name: formula`; of the velocity sensor there is no
-    formula.
-    """
-    for name, template in EVERY:
-        said = law_pages.entry(template)
-        if name != "measured":
-            assert "=" in said.formula or said.formula.startswith("derivatives"), said.formula
-            assert said.title, name
-            assert "=" not in said.title or name in ("kalman", "levant"), said.title
-
-
 def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
     out = flat(call("list", "pid")[1])
     assert "kp kd > ki" in out
@@ -158,14 +129,6 @@ def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
     assert 'velocity=smc.estimator("filtered_difference", tau=0.005)' in flat(
         call("list", "filtered_difference")[1]
     )
-
-
-def test_a_name_of_a_law_and_a_surface_shows_both(call):
-    shared = sorted(set(laws()) & set(laws(kind="surface")))
-    assert shared
-    out = call("list", shared[0])[1]
-    for kind in ("law", "surface"):
-        assert re.search(rf"^{shared[0]} .*{kind}$", out, re.MULTILINE)
 
 
 def test_a_plant_has_a_page_with_its_parameters_and_its_sets(call):
@@ -191,28 +154,6 @@ def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
         err
         == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
     )
-
-
-def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
-    @law_function(gains={"k": 2.0}, conditions={"k > 1": lambda g: g.k > 1})
-    def own(y, gains, memory):
-        """Own law: u = -k e.
-
-        It is odd. Sampled, it is late.
-        Source: A. Author, "Title", J. Things 1(2):3, 1999.
-        """
-        return -gains.k * y.e, y.e
-
-    said = law_pages.entry(own)
-    assert said == (
-        "Own law",
-        "u = -k e",
-        "",
-        "Sampled, it is late.",
-        "It is odd.",
-        'A. Author, "Title", J. Things 1(2):3, 1999.',
-    )
-    assert law_pages.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
 
 
 def test_a_law_of_a_file_has_a_page_that_says_how_to_make_it(call, tmp_path, monkeypatch):

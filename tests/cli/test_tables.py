@@ -9,14 +9,12 @@ from typing import Any
 import arms
 import pytest
 from rich.console import Console
-from rich.table import Column
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.cli import tables
 from smc_mujoco.common.text import number
-from smc_mujoco.draw.film import arrows, caption
 from smc_mujoco.metrics.tip import tip_scores
 
 VOLTS = smc.run(
@@ -49,11 +47,6 @@ def test_a_summary_has_commands_in_volts_and_reactions_in_newton_metres():
 def test_a_table_of_scores_has_commands_in_volts():
     assert "V/s" in printed(tables.scores("runs", {"none": VOLTS}))
     assert "V/s" in printed(tables.answers(["tv_rate"], {"nominal": {"none": VOLTS}}))
-
-
-def test_a_film_tells_the_arrow_of_the_control_in_volts():
-    scales = arrows.scales([VOLTS])
-    assert any("2 V" in line for line in caption.key([VOLTS], scales))
 
 
 def test_a_table_of_tips_has_the_scores_in_its_units():
@@ -130,25 +123,6 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
     assert ["s (m/s)" in tables_of[1], "s (rad/s)" in tables_of[2]] == [True, True]
 
 
-def columns() -> list[Column]:
-    return [Column(no_wrap=True), Column(justify="right", no_wrap=True), Column(no_wrap=True)]
-
-
-@pytest.mark.parametrize(
-    ("make", "gap"),
-    [
-        (lambda: tables.plain(*columns()), 2),
-        (lambda: tables.titled("", *columns(), padding=0, show_edge=False, pad_edge=False), 1),
-    ],
-)
-def test_columns_are_apart_by_as_much_as_a_table_says_and_begin_at_its_edge(make, gap):
-    table = make()
-    for row in (["x" * 5, "1.000", "y"], ["x", "2", "yy"]):
-        table.add_row(*row)
-    first, *_ = [line for line in printed([table]).splitlines() if "xxxxx" in line]
-    assert first.startswith("xxxxx" + " " * gap + "1.000" + " " * gap + "y")
-
-
 @pytest.mark.parametrize(
     "make",
     [
@@ -170,14 +144,3 @@ def test_no_two_cells_of_a_row_touch(make):
             assert any(
                 re.search(r"\s+".join(re.escape(word) for word in words), line) for line in lines
             ), row
-
-
-def test_an_overshoot_beyond_a_thousand_percent_has_no_digits():
-    for metric, value, words in (
-        ("overshoot", 1000.0, "1000"),
-        ("overshoot", 1000.1, "> 1000"),
-        ("itae", 1000.1, "1000"),
-        ("overshoot", math.inf, "never"),
-    ):
-        assert tables._score([value], metric, VOLTS.scenario).plain == words
-    assert tables.with_package("a line", "other") == "a line [other]"

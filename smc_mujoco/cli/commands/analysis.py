@@ -1,5 +1,6 @@
 """Commands that ask one question about laws on a plant, and answer it by many runs."""
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,12 +30,6 @@ Bound = Annotated[
 Metric = Annotated[
     str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")
 ]
-BOUNDS = {  # what sentences about a class say in Python -> on the command line
-    r"\bUncertainty's ": "--bound ",
-    r"\bUncertainty\b": "--bound",
-    r"=\(([^ ,]+), ([^ ,]+)\)": r"=\1:\2",
-    r"\bsmc\.| of within\b": "",
-}
 QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
     "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
@@ -221,10 +216,9 @@ def worst(
     within = _within(disturbance, bound)
     options.check_files(json, *files(out))
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
-    with options.as_options(BOUNDS):
-        results = WorstCases(
-            worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases
-        )
+    results = WorstCases(
+        worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases
+    )
     terminal.print(results)
     terminal.note(
         f"{sum(case.tried for case in results)} runs, {options.gains_used(chosen, gains)}",
@@ -284,8 +278,7 @@ def sensitivity(
     options.check_files(json, *files(out))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
-    with options.as_options(BOUNDS):
-        found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
+    found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
     terminal.print(found)
     terminal.note(
         f"{found.runs} runs, {len(found.values)} of them independent, {options.gains_used([chosen], gains)}",
@@ -304,42 +297,21 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     neither is given.
     """
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-    from smc_mujoco.common import constraints
 
-    known = constraints.of_fields(Uncertainty)
-    fields: dict[str, Any]
-    if disturbance is None:
-        fields = {}
-    else:
-        fields = {"disturbance": disturbance}
+    fields: dict[str, Any] = {} if disturbance is None else {"disturbance": disturbance}
+    known = {field.name for field in dataclasses.fields(Uncertainty)}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
             values = tuple(map(float, text.split(":")))
         except ValueError:
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
-        if name in fields:
-            raise ScenarioError(
-                f"--bound {name}={text} bounds what --disturbance does: leave out one of them"
-            )
-        constraint = known.get(name)
-        ranged = constraint is None or isinstance(
-            getattr(constraint, "one", constraint), constraints.Range
-        )
-        if len(values) != 1 + ranged:
-            if ranged:
-                cure = f"the lowest and the highest, as {name}=LOW:HIGH"
-            else:
-                cure = f"one number, as {name}=HIGH"
-            raise ScenarioError(
-                f"--bound {name}={text} is no {'range' if ranged else 'number'}: give {cure}"
-            )
-        if constraint:
-            fields[name] = values if ranged else values[0]
+        value = values if len(values) > 1 else values[0]
+        if name in known:
+            fields[name] = value
         else:
-            fields.setdefault("parameters", {})[name] = values
-    with options.as_options(BOUNDS):
-        return Uncertainty(**fields) if fields else None
+            fields.setdefault("parameters", {})[name] = value
+    return Uncertainty(**fields) if fields else None
 
 
 def _attacked_cases(
@@ -353,12 +325,11 @@ def _attacked_cases(
     from smc_mujoco.mechanisms.named import as_plant
     from smc_mujoco.simulation.grid import case
 
+    rigs = ()
     if annexes.installed("evidence"):
-        rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig")
-    else:
-        rigs = None
-    if rigs and plant in rigs.rigs():
-        rig = rigs.rig(plant)
+        rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig").rigs()
+    if plant in rigs:
+        rig = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig").rig(plant)
         ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
@@ -418,10 +389,7 @@ def chatter(
     pictures = files(out)
     chosen = options.laws(law, gain_sets.LAWS)
     options.check_files(json, *pictures)
-    if actuator is None:
-        fields = {}
-    else:
-        fields = {"actuator": options.actuator(actuator)}
+    fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
     cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
     with bar("chattering") as progress:

@@ -1,7 +1,6 @@
 """smc-mujoco list: what there is to choose from, and a page about one of it."""
 
 import inspect
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -11,12 +10,9 @@ from rich.text import Text
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import annexes
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-ARGUMENT_AT_END = re.compile(
-    r"\b(gains|memory|timeout|flag)s?=$"
-)  # of law_from_c, at the end of its error sentences
+C_TIME = 10.0  # s, that compiler and trial of a law in C may take, each; chosen
 
 
 def list_(
@@ -42,29 +38,6 @@ def list_(
             metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant."
         ),
     ] = None,
-    gains: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME=VALUE,...",
-            help="Of a law in C: its gains, in order, if the file has none.",
-        ),
-    ] = "",
-    memory: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Of a law in C: numbers of its memory; default as the file says, or 8."
-        ),
-    ] = None,
-    symbol: Annotated[
-        str, typer.Option(help="Of a law in C: the name of its function.")
-    ] = "smc_law",
-    flag: Annotated[
-        list[str] | None,
-        typer.Option(help="Of a law in C: a compiler flag, as --flag=-Iinclude; may be repeated."),
-    ] = None,
-    timeout: Annotated[
-        float, typer.Option(help="Of a law in C: s that compiler, set-up and trial may take, each.")
-    ] = 10.0,
 ) -> None:
     """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in
     full.
@@ -74,25 +47,21 @@ def list_(
     that suit a plant, and advises one.
 
     FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong
-    with it. The trial runs the law on a double integrator under noise, with and without model and
-    surface. It finds crashes, endless loops, NaN, writes beyond the law's memory, and state kept
-    elsewhere, such as static data. Any finding ends in exit code 2. smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export`
-    writes. The process is not a sandbox: the law can open files and connections, like any program
-    that you start.
+    with it (docs/c.md). That process is not a sandbox: the law can open files and connections, like
+    any program that you start.
 
     Example: smc-mujoco list super_twisting
 
     Example: smc-mujoco list --needs continuous,two-gains
 
-    Example: smc-mujoco list my_law.c --gains lam=6,k1=3
+    Example: smc-mujoco list my_law.c
     """
-    in_c = name is not None and Path(name).suffix in (".c", ".so")
-    options.only_for(
-        ctx, ("gains", "memory", "symbol", "flag", "timeout"), in_c, "a law in C, FILE.c"
-    )
     options.only_for(ctx, ("needs", "plant"), name is None, "lists: leave out NAME")
-    if in_c:
-        _check_c(Path(str(name)), gains, memory, symbol, flag or [], timeout)
+    if name is not None and Path(name).suffix in (".c", ".so"):
+        with delay_ctrl_c():
+            loader = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {name},")
+        for line in loader.check(Path(name), None, None, "smc_law", (), C_TIME):
+            print(line)
     elif name is not None:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages
@@ -132,22 +101,3 @@ def _print_all(terminal: Terminal) -> None:
     terminal.print(
         Text.assemble(page, " shows a law or a plant in full, ", some, " the laws that have both")
     )
-
-
-def _check_c(
-    file: Path, gains: str, memory: int | None, symbol: str, flags: list[str], timeout: float
-) -> None:
-    """Try a law in C, and print what was found out about it."""
-    with delay_ctrl_c():
-        from smc_mujoco.control.from_text import parsed_gains
-
-        check = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {file.name},").check
-    if gains:
-        values = parsed_gains(gains, "--gains")
-    else:
-        values = None
-    try:
-        for line in check(file, values, memory, symbol, flags, timeout):
-            print(line)
-    except ScenarioError as error:
-        raise ScenarioError(ARGUMENT_AT_END.sub(r"--\1", str(error))) from None

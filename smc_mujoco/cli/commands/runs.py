@@ -7,7 +7,7 @@ import typer
 from rich.text import Text
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, Terminal
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
@@ -37,9 +37,6 @@ def run(
             help="Whether to repeat runs at half the physics step, to mark what depends on it."
         ),
     ] = True,
-    timing: Annotated[
-        bool, typer.Option("--timing", help="Print how long each part took.")
-    ] = False,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
@@ -51,8 +48,7 @@ def run(
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
-    clock = Clock()
-    with clock("loading"), delay_ctrl_c():
+    with delay_ctrl_c():
         from smc_mujoco.cli.scene import perform
         from smc_mujoco.simulation.trace import formats
         from smc_mujoco.studies import scene as scenes
@@ -64,9 +60,7 @@ def run(
         scene = scene.seeded(seed)
     terminal = Terminal()
     folder = out / path.stem
-    perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path), repeat)
-    if timing:
-        terminal.note(str(clock), "dim")
+    perform(scene, folder, film, threads, terminal, endings, scenes.question(path), repeat)
 
 
 def show(
