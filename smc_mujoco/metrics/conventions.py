@@ -58,9 +58,8 @@ if TYPE_CHECKING:
 SETTLING_BAND = 0.02  # of the scale
 LAST_PART = 0.2  # of the run's duration
 ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
-UNIT_OF_S = (
-    "unit of s"  # the law's; it follows from that of x, so that metres and radians do not mix
-)
+# the law's; it follows from that of x, so that metres and radians do not mix
+UNIT_OF_S = "unit of s"
 REST_SHARE = 1e-3  # of the run's largest |v|
 REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
 
@@ -83,24 +82,21 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
 
     A scenario's u may be a voltage.
     """
-    if isinstance(machine, Plant):
-        plant = machine
-    else:
-        plant = machine.plant
+    plant = machine if isinstance(machine, Plant) else machine.plant
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
     kinds = [driven for driven, _ in members]
-    return tuple(
-        Group(
-            name=("driven" if driven else "free") + (f" {unit}" if kinds.count(driven) > 1 else ""),
-            unit=unit,
-            effort=machine.efforts[channels[0]],
-            driven=driven,
-            channels=tuple(channels),
+    found = []
+    for (driven, unit), channels in members.items():
+        name = "driven" if driven else "free"
+        if kinds.count(driven) > 1:
+            name += f" {unit}"
+        effort = machine.efforts[channels[0]]
+        found.append(
+            Group(name=name, unit=unit, effort=effort, driven=driven, channels=tuple(channels))
         )
-        for (driven, unit), channels in members.items()
-    )
+    return tuple(found)
 
 
 def group_trace(trace: Trace, group: Group) -> Trace:
@@ -137,9 +133,8 @@ class Metric:
     # what somebody asks for who wants this number small, such as "fast"; "" if there is none
     need: str = ""
     network: bool = False  # whether it compares channels, and so needs several of a kind
-    realistic: bool = (
-        False  # whether it is meaningful only for mechanisms with friction, contacts or other parts
-    )
+    # whether it is meaningful only for mechanisms with friction, contacts or other parts
+    realistic: bool = False
     command: bool = False  # whether it is computed from u or s, which free joints do not have
     late: bool = False  # whether it is of the last part alone, so that it has a trend, see `trends`
     # Value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN
@@ -178,16 +173,11 @@ class Metric:
         for group, trace in traces.items():
             if self.applies_to(group) and (group.driven or self.shared):
                 counted.append(trace)
-        # of a pose the position
-        if "{" in self.unit or self.unit == UNIT_OF_S:
+        if "{" in self.unit or self.unit == UNIT_OF_S:  # of a pose the position
             counted = counted[:1]
-        values = []
-        for value in (float(self.formula(trace)) for trace in counted):
-            if not math.isnan(value):
-                values.append(value)
-        return max(
-            values, default=math.nan
-        )  # a group without the value, such as a limit cycle, hides no other
+        values = [float(self.formula(trace)) for trace in counted]
+        # a group without the value, such as a limit cycle, hides no other
+        return max((value for value in values if not math.isnan(value)), default=math.nan)
 
     def applies_to(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""
@@ -209,11 +199,12 @@ class Metric:
 
     def heading(self, x: str) -> str:
         """Return the label with the unit where positions are in x; x="" where that is not known."""
+        unit = self.unit
         if x:
             unit = self.unit_for(x)
-        else:
-            unit = "" if "{" in self.unit else self.unit
-        return self.label + f" ({unit})" * (unit not in ("", "1"))
+        if unit in ("", "1") or "{" in unit:
+            return self.label
+        return f"{self.label} ({unit})"
 
     def unit_in(self, machine: Plant | Scenario, group: str = "") -> str:
         """Return the unit in the group of that name, such as "free"; without a name, that of the
@@ -235,14 +226,15 @@ def metric(
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name = formula.__name__
-        summary = (inspect.getdoc(formula) or "").partition("\n")[0]
-        fields = {
-            "summary": summary,
-            "formula": formula,
-            "label": label or name.replace("_", " "),
-            "need": need,
-        }
-        entry = CATALOGUE[name] = Metric(name=name, unit=unit, **fields, **flags)
+        entry = CATALOGUE[name] = Metric(
+            name=name,
+            unit=unit,
+            summary=(inspect.getdoc(formula) or "").partition("\n")[0],
+            formula=formula,
+            label=label or name.replace("_", " "),
+            need=need,
+            **flags,
+        )
 
         @functools.wraps(formula)
         def checked(trace: Trace) -> float:
@@ -260,24 +252,21 @@ def refuse(trace: Trace) -> None:
     """Raise ScenarioError for anything but a trace of finite signals whose run did not fail."""
     if not hasattr(trace, "scenario"):
         raise ScenarioError(f"cannot score {shown(trace)}: give one Trace")
-    signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r, trace.reaction)
-    whole = np.isfinite(trace.t).all() and all(np.isfinite(signal).all() for signal in signals)
+    names = ("x", "v", "u", "applied", "s", "d", "r", "reaction")
+    finite = np.isfinite(trace.t)
+    for name in names:
+        finite = finite & np.isfinite(getattr(trace, name)).all(axis=1)
     if trace.failure is not None:
         why = trace.failure  # names its time
     elif trace.diverged_at is not None:
         why = f"it diverged at t = {trace.diverged_at:g} s"
-    elif not whole:
-        finite = np.all(
-            [np.isfinite(trace.t), *(np.isfinite(signal).all(axis=1) for signal in signals)], axis=0
-        )
+    elif not finite.all():
         why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
     else:
         return
-    fault = trace.failure is not None and not trace.plant_diverged
-    if fault:
+    cure = "change the gains or u_max, or end the run earlier"
+    if trace.failure is not None and not trace.plant_diverged:
         cure = "correct the law or signal"
-    else:
-        cure = "change the gains or u_max, or end the run earlier"
     run = f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
     raise ScenarioError(f"{run} has no score, {why}: {cure}")
 
@@ -342,7 +331,7 @@ def row_max(a: np.ndarray) -> np.ndarray:
 
 
 def turns(y: np.ndarray, threshold: float) -> int:
-    """Return how often y (K,) turns back by half its range or more; 0 for a range <= `threshold`."""
+    """Return how often y (K,) turns back by half its range; 0 for a range <= `threshold`."""
     count = 0
     direction = 0
     low = y[0]
@@ -350,10 +339,19 @@ def turns(y: np.ndarray, threshold: float) -> int:
     swing = float(np.ptp(y)) / 2
     slopes = np.diff(y)
     peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # y is monotonic between them
-    for value in y[[0, *peaks, -1]].tolist() if 2 * swing > threshold else ():
-        low, high = min(low, value), max(high, value)
+    if 2 * swing <= threshold:
+        return 0
+    for value in y[[0, *peaks, -1]].tolist():
+        low = min(low, value)
+        high = max(high, value)
+        turned = 0
         if direction >= 0 and value <= high - swing:
-            count, direction, low, high = count + (direction > 0), -1, value, value
+            turned = -1
         elif direction <= 0 and value >= low + swing:
-            count, direction, low, high = count + (direction < 0), 1, value, value
+            turned = 1
+        if turned:
+            count += direction != 0
+            direction = turned
+            low = value
+            high = value
     return count

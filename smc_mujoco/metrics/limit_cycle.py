@@ -1,7 +1,7 @@
 """Chattering of a run: amplitude and frequency of the limit cycle of the sliding variable, if there
 is one.
 
-    amplitude, frequency = limit_cycle(t, s)      # half the range within a period, Hz; NaN, NaN where there is none
+    amplitude, frequency = limit_cycle(t, s)  # half the range within a period, Hz; else NaN, NaN
 
 The frequency follows from the largest peak in the spectrum of s', among those that have at least
 five periods in the samples, refined by its phase in the two halves. If s jumps, that peak may be a
@@ -81,9 +81,8 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
     )
     ranges = np.ptp(sliding_window_view(fast, window + 1), axis=1)
     early, late = (float(np.median(part)) for part in np.array_split(ranges, 2))
-    if max(early, late) <= 2.0 * ROUNDING * np.abs(s).max() or abs(late - early) > MAX_CHANGE * max(
-        early, late
-    ):
+    largest = max(early, late)
+    if largest <= 2.0 * ROUNDING * np.abs(s).max() or abs(late - early) > MAX_CHANGE * largest:
         return NO_CYCLE
     return float(np.median(ranges)) / 2.0, frequency
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
@@ -13,19 +13,16 @@ if TYPE_CHECKING:
 V = TypeVar("V")
 
 
-class once_per_trace(Generic[V]):
-    """Decorator for a function of a trace: a result is computed once, and kept as long as its trace
+def once_per_trace(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
+    """Decorate a function of a trace: a result is computed once, and kept as long as its trace
     exists.
     """
+    results: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
 
-    def __init__(self, function: Callable[[Trace], V]):
-        functools.update_wrapper(
-            self, function
-        )  # hashes of code follow __wrapped__ and do not see the results
-        self._function = function
-        self._results: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
+    @functools.wraps(function)  # hashes of code follow __wrapped__ and do not see the results
+    def kept(trace: Trace) -> V:
+        if trace not in results:
+            results[trace] = function(trace)
+        return results[trace]
 
-    def __call__(self, trace: Trace) -> V:
-        if trace not in self._results:
-            self._results[trace] = self._function(trace)
-        return self._results[trace]
+    return kept

@@ -106,12 +106,11 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
-    hidden = (
-        part.in_callback or part.delay or isinstance(part, Stepper) for part in scenario.actuator
-    )
-    return [
-        part for part, has in zip(scenario.actuator, hidden, strict=True) if has or not part.drives
-    ]
+    found = []
+    for part in scenario.actuator:
+        if part.in_callback or part.delay or isinstance(part, Stepper) or not part.drives:
+            found.append(part)
+    return found
 
 
 @once_per_trace
@@ -150,17 +149,14 @@ def contacts(trace: Trace) -> Contacts:
         if k == jump:
             models.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
-        data.qpos[positions], data.qvel[rates], data.qfrc_applied[rates] = (
-            trace.x[k],
-            trace.v[k],
-            trace.d[k],
-        )
+        data.qpos[positions] = trace.x[k]
+        data.qvel[rates] = trace.v[k]
+        data.qfrc_applied[rates] = trace.d[k]
         data.ctrl[drives] = scale * trace.applied[k, :n]
         data.xfrc_applied[:] = 0.0
         for body, push in pushes:
-            data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * np.array(
-                [push.x, push.y, push.z]
-            )
+            force = np.array([push.x, push.y, push.z])
+            data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * force
         mujoco.mj_forward(model, data)
         _add_contacts(model, data, contacts, k)
     for values in contacts:
@@ -176,9 +172,8 @@ def _add_contacts(model: mujoco.MjModel, data: mujoco.MjData, contacts: Contacts
         contacts.force[k] += wrench[0]
         contacts.depth[k] = max(contacts.depth[k], -data.contact.dist[i])
         # 1 for a geom that moves, 0 for a fixed one; the normal points from the first to the second
-        first, second = (model.body_weldid[model.geom_bodyid[data.contact.geom[i]]] != 0).astype(
-            float
-        )
+        moves = model.body_weldid[model.geom_bodyid[data.contact.geom[i]]] != 0
+        first, second = moves.astype(float)
         contacts.push[k] += (second - first) * wrench[0] * data.contact.frame[i, :3]
 
 
@@ -219,24 +214,15 @@ def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
         "last_error": error[-1],
     }
     if knows_contacts(trace.scenario):
-        if force is None:
-            wanted = trace.scenario.law.gains.get("force")
-        else:
-            wanted = force
         pressed = contacts(trace)
-        late = pressed.force[
-            trace.t >= trace.t[0] + FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)
-        ]
+        start = FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)
+        late = pressed.force[trace.t >= trace.t[0] + start]
         values["mean_force"] = late.mean()
-        if wanted:
-            values |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)}
-        else:
-            values |= {}
-        values |= {
-            "force_ripple": late.std(),
-            "touching": 100.0 * (late > 0.0).mean(),
-            "depth": pressed.depth.max(),
-        }
+        if wanted := force or trace.scenario.law.gains.get("force"):
+            values["force_error"] = 100.0 * (late.mean() / wanted - 1.0)
+        values["force_ripple"] = late.std()
+        values["touching"] = 100.0 * (late > 0.0).mean()
+        values["depth"] = pressed.depth.max()
     return {name: float(value) for name, value in values.items()}
 
 
@@ -256,11 +242,8 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
             joint = dataclasses.replace(group, channels=(i,))
             part = group_trace(trace, joint)
             power = np.abs(trace.force[:, i] * trace.v[:, i])
-            values[names[i]] = {
-                m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)
-            }
-            values[names[i]] |= {
-                "peak_power": float(power.max()),
-                "work": float(np.trapezoid(power, trace.t)),
-            }
+            found = {m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)}
+            found["peak_power"] = float(power.max())
+            found["work"] = float(np.trapezoid(power, trace.t))
+            values[names[i]] = found
     return {name: values[name] for name in names}

@@ -33,20 +33,17 @@ def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str
     """
     tolerances = _checked(response, tolerances)
     entry = {}
-    for name in tolerances or [name for name in response.values if response.applies(name)]:
+    for name in tolerances or filter(response.applies, response.values):
         value, unit = response.value(name)
+        tolerance = 0.0
         if math.isfinite(value):
-            share = float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}")
-        else:
-            share = 0.0
-        entry[name] = {"value": value, "tolerance": tolerances.get(name, share), "unit": unit}
+            tolerance = float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}")
+        tolerance = tolerances.get(name, tolerance)
+        entry[name] = {"value": value, "tolerance": tolerance, "unit": unit}
     try:
         with locked(file.parent):
-            text = json.dumps(
-                plain(dict(sorted((read(file) | {key: entry}).items()))),
-                indent=2,
-                ensure_ascii=False,
-            )
+            entries = dict(sorted((read(file) | {key: entry}).items()))
+            text = json.dumps(plain(entries), indent=2, ensure_ascii=False)
             with replacing(file) as part:
                 part.write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
@@ -63,9 +60,10 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
     """
     tolerances = _checked(response, tolerances)
     known = read(file).get(key, {})
-    if missing := [name for name in tolerances if name not in known] or (
-        [] if known else ["metrics"]
-    ):
+    missing = [name for name in tolerances if name not in known]
+    if not known:
+        missing = missing or ["metrics"]
+    if missing:
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
     names = tolerances or known
     try:
@@ -74,21 +72,13 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
         raise ScenarioError(f"{file.name}, {key}: {error}; or {UPDATE}") from None
     limits = []
     for name in names:
-        (value, unit), golden = response.value(name), known[name]["value"]
-        if tolerances:
-            tolerance = tolerances[name]
-        else:
-            tolerance = known[name]["tolerance"]
-        within = (
-            value == golden
-            or abs(value - golden) <= tolerance
-            or (math.isnan(value) and math.isnan(golden))
-        )
-        limits.append(
-            Limit(
-                name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within
-            )
-        )
+        value, unit = response.value(name)
+        golden = known[name]["value"]
+        tolerance = tolerances.get(name, known[name]["tolerance"])
+        alike = value == golden or (math.isnan(value) and math.isnan(golden))
+        within = alike or abs(value - golden) <= tolerance
+        asked = f"{quantity(golden)} ± {quantity(tolerance)}"
+        limits.append(Limit(name, quantity(value, unit), asked, within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
@@ -110,8 +100,9 @@ def read(file: Path) -> dict[str, dict[str, dict[str, Any]]]:
     """
     try:
         stored = read_json(file)
-        for golden in (golden for entry in stored.values() for golden in entry.values()):
-            golden.update(value=float(golden["value"]), tolerance=float(golden["tolerance"]))
+        for entry in stored.values():
+            for golden in entry.values():
+                golden.update(value=float(golden["value"]), tolerance=float(golden["tolerance"]))
         return stored
     except FileNotFoundError:
         return {}

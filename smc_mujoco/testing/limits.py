@@ -32,40 +32,36 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     A metric of a limit cycle is NaN in a run without one. `Metric.absent` is then compared with the
     limit.
     """
+    compared = value
     if math.isnan(value):
         compared = CATALOGUE[metric.rpartition(" ")[2]].absent
-    else:
-        compared = value
+    what = f"limit of {metric}"
+    given = quantity(value, unit)
     if not isinstance(limit, tuple | list):
-        high = number(f"limit of {metric}", limit, infinite=True)
-        return Limit(metric, quantity(value, unit), f"<= {quantity(high)}", compared <= high)
+        high = number(what, limit, infinite=True)
+        return Limit(metric, given, f"<= {quantity(high)}", compared <= high)
     if len(limit) != 2:
         raise ScenarioError(
-            f"limit of {metric} is {shown(limit)}: give the highest value, or (lowest, highest)"
+            f"{what} is {shown(limit)}: give the highest value, or (lowest, highest)"
         )
-    low, high = (number(f"limit of {metric}", end, infinite=True) for end in limit)
+    low, high = (number(what, end, infinite=True) for end in limit)
     if low > high:
-        raise ScenarioError(f"limits of {metric} are {shown(limit)}: give the lower one first")
-    return Limit(
-        metric,
-        quantity(value, unit),
-        f"{quantity(low)} .. {quantity(high)}",
-        low <= compared <= high,
-    )
+        raise ScenarioError(f"{what} is {shown(limit)}: give the lower one first")
+    words = f"{quantity(low)} .. {quantity(high)}"
+    return Limit(metric, given, words, low <= compared <= high)
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
     """Raise an AssertionError with a table of all limits if one is violated."""
-    if missed := [
-        f"{metric} is {value}, {word} {limit}"
-        for metric, value, limit, within in limits
-        if not within
-    ]:
-        rows = [(*line, "yes" if within else "NO") for *line, within in limits]
-        raise AssertionError(
-            f"{'; '.join(missed)} "
-            f"({note})\n{Tabular(headings=('metric', 'value', kind, 'ok'), rows=rows)}"
-        )
+    missed = []
+    rows = []
+    for metric, value, limit, within in limits:
+        rows.append((metric, value, limit, "yes" if within else "NO"))
+        if not within:
+            missed.append(f"{metric} is {value}, {word} {limit}")
+    if missed:
+        table = Tabular(headings=("metric", "value", kind, "ok"), rows=rows)
+        raise AssertionError(f"{'; '.join(missed)} ({note})\n{table}")
 
 
 def quantity(value: float, unit: str = "") -> str:

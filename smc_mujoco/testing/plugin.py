@@ -69,11 +69,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         return
     from smc_mujoco.common.errors import ScenarioError
 
+    wrong = ""
+    names_of: dict[str, list[str]] = {}
     try:
         names_of = _cases(marker.args, marker.kwargs, metafunc.fixturenames)
-        wrong = ""
     except ScenarioError as error:
-        names_of = {}
         wrong = str(error)
     if wrong:  # raised outside of the handler, so that pytest does not show the frames of the error
         pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
@@ -104,10 +104,7 @@ def _cases(
     for plural, default in defaults.items():
         argument = plural.removesuffix("s")
         value = named.get(plural, default)
-        if isinstance(value, list | tuple):
-            several = value
-        else:
-            several = [value]
+        several = value if isinstance(value, list | tuple) else [value]
         if argument in arguments:
             if not several:
                 raise ScenarioError(
@@ -167,10 +164,8 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
 
     @without_frames
     def compare(response: StepResponse, **tolerances: float) -> None:
-        if (n := next(number)) == 1:
-            key = test
-        else:
-            key = f"{test} {n}"
+        n = next(number)
+        key = test if n == 1 else f"{test} {n}"
         if update:
             files.record(file, key, response, tolerances)
             request.node.user_properties.append((GOLDEN, str(file)))
@@ -197,26 +192,22 @@ def pytest_runtest_makereport(
     if ledger and report.failed and call.when != "teardown" and (responses := _used(item, ledger)):
         from smc_mujoco.testing.response import report_of
 
-        config = item.config
-        out = item.config.getoption("smc_out")
-        if out:
-            folder = config.invocation_params.dir / out
-        else:
-            folder = ledger.temporary / "smc_mujoco"
-        text = report_of(item.nodeid, responses, folder, bool(config.getoption("smc_film")))
+        folder = ledger.temporary / "smc_mujoco"
+        if out := item.config.getoption("smc_out"):
+            folder = item.config.invocation_params.dir / out
+        film = bool(item.config.getoption("smc_film"))
+        text = report_of(item.nodeid, responses, folder, film)
         report.sections.append(("step responses", text))
     return report
 
 
 def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
-    """Return the responses that a test made, and those that it got from fixtures of a wider scope."""
+    """Return the responses that a test made, and those from fixtures of a wider scope."""
     from smc_mujoco.testing.response import StepResponse
 
-    fixed = []
-    for value in getattr(item, "funcargs", {}).values():
-        if isinstance(value, StepResponse):
-            fixed.append(value)
-    return list({id(response): response for response in [*fixed, *ledger.responses]}.values())
+    given = [*getattr(item, "funcargs", {}).values(), *ledger.responses]
+    found = {id(value): value for value in given if isinstance(value, StepResponse)}
+    return list(found.values())
 
 
 def pytest_terminal_summary(
@@ -224,10 +215,10 @@ def pytest_terminal_summary(
 ) -> None:
     """Print which golden files were written."""
     if config.getoption("smc_update"):
-        reports = itertools.chain.from_iterable(terminalreporter.stats.values())
-        properties = []
-        for report in reports:
-            for pair in getattr(report, "user_properties", ()):
-                properties.append(pair)
-        for file in sorted({value for name, value in properties if name == GOLDEN}):
+        files = set()
+        for report in itertools.chain.from_iterable(terminalreporter.stats.values()):
+            for name, value in getattr(report, "user_properties", ()):
+                if name == GOLDEN:
+                    files.add(value)
+        for file in sorted(files):
             terminalreporter.write_line(f"golden metrics recorded in {file}")

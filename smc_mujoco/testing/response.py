@@ -72,13 +72,11 @@ class StepResponse:
         """`metrics`, and those of each group of channels if there are several, with names such as
         "free peak".
         """
-        by_group = self.scores.items()
-        labelled = {
-            self._label(group, name): value
-            for group, values in by_group
-            for name, value in values.items()
-        }
-        return dict(self.metrics) | labelled
+        labelled = dict(self.metrics)
+        for group, values in self.scores.items():
+            for name, value in values.items():
+                labelled[self._label(group, name)] = value
+        return labelled
 
     @without_frames
     def __getattr__(self, name: str) -> float:
@@ -97,11 +95,10 @@ class StepResponse:
         return ", ".join(filter(None, (step, self.condition)))
 
     def __repr__(self) -> str:
-        how = f"failed, {self.failure}"
-        if self.failure is None:
-            how = ", ".join(
-                f"{name} {quantity(*self.value(name))}" for name in IN_REPR if name in self.metrics
-            )
+        if self.failure is not None:
+            return f"StepResponse({self}: failed, {self.failure})"
+        names = [name for name in IN_REPR if name in self.metrics]
+        how = ", ".join(f"{name} {quantity(*self.value(name))}" for name in names)
         return f"StepResponse({self}: {how})"
 
     def value(self, name: str) -> tuple[float, str]:
@@ -154,12 +151,8 @@ class StepResponse:
                 "check has no limits: give metrics with their largest values, as settling_time=0.6"
             )
         self.check_names(limits)
-        judge(
-            [bound(name, *self.value(name), limit) for name, limit in limits.items()],
-            "limit",
-            "not",
-            self,
-        )
+        bounds = [bound(name, *self.value(name), limit) for name, limit in limits.items()]
+        judge(bounds, "limit", "not", self)
 
     def table(self) -> str:
         """Return a table, as text, of the metrics that have a meaning for this run."""
@@ -194,20 +187,17 @@ def respond(
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
-    chosen, plant = find_condition(condition), as_plant(plant)
-    under = chosen.on(plant, number("duration", fields.get("duration", DURATION)))
+    chosen = find_condition(condition)
+    plant = as_plant(plant)
     start = {"x0": 0.0, "reference": Step(height)}
     if plant.rest:
-        start = {
-            "x0": plant.rest,
-            "reference": [Constant(x + height) for x in plant.rest[: plant.driven]],
-        }
+        goal = [Constant(x + height) for x in plant.rest[: plant.driven]]
+        start = {"x0": plant.rest, "reference": goal}
+    under = chosen.on(plant, number("duration", fields.get("duration", DURATION)))
     scenario = Scenario(plant=plant, law=law, **(start | under | dict(fields)))  # pyright: ignore[reportArgumentType]
+    words = [f"{name}={shown(value)}" for name, value in fields.items()]
     if chosen.name != "nominal":
-        words = [chosen.name]
-    else:
-        words = []
-    words += [f"{name}={shown(value)}" for name, value in fields.items()]
+        words.insert(0, chosen.name)
     return StepResponse(trace=run(scenario), step=height, condition=", ".join(words))
 
 
@@ -218,18 +208,20 @@ def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video:
     from smc_mujoco.draw.figure import figure
     from smc_mujoco.draw.film.film import film
 
-    parts = [f"{response}\n{response.table()}" for response in responses]
+    tables = [f"{response}\n{response.table()}" for response in responses]
     plants: dict[str, list[Trace]] = {}
     for response in responses:
         plants.setdefault(response.scenario.plant.name, []).append(response.trace)
+    titled = functools.partial(figure, title=test.rpartition("::")[2])
     lines = []
     for plant, traces in plants.items():
-        name = slug(test[-MAX_ID:], MAX_ID) + (f"-{slug(plant)}" if len(plants) > 1 else "")
-        titled = functools.partial(figure, title=test.rpartition("::")[2])
+        name = slug(test[-MAX_ID:], MAX_ID)
+        if len(plants) > 1:
+            name += f"-{slug(plant)}"
         lines.append(_line("figure", titled, traces, folder / f"{name}.png"))
         if video:
             lines.append(_line("film", film, traces, folder / f"{name}.mp4"))
-    return "\n\n".join([*parts, "\n".join(dict.fromkeys(lines))])
+    return "\n\n".join([*tables, "\n".join(dict.fromkeys(lines))])
 
 
 def _line(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.metrics.limit_cycle import largest_cycle, limit_cycle
+from smc_mujoco.metrics.limit_cycle import limit_cycle
 
 pytestmark = pytest.mark.quick
 
@@ -15,14 +15,6 @@ T = np.arange(0.0, 2.0, 1e-3)
 
 def wave(frequency, amplitude=0.3, phase=0.3):
     return amplitude * np.sin(math.tau * frequency * T + phase)
-
-
-def test_what_is_kept_for_a_trace_is_known_by_the_function_that_computes_it():
-    assert (largest_cycle.__name__, largest_cycle.__module__) == (
-        "largest_cycle",
-        limit_cycle.__module__,
-    )
-    assert largest_cycle.__wrapped__.__code__.co_name == "largest_cycle"
 
 
 @pytest.mark.parametrize("frequency", [3.1, 7.3, 19.37, 81.4])

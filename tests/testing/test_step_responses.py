@@ -1,4 +1,4 @@
-"""Step responses of the laws of the study, tested with the pytest plugin as users test their laws."""
+"""Step responses of the laws of the study, tested with the plugin as users test their laws."""
 
 import numpy as np
 import pytest

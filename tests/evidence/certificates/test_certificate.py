@@ -135,46 +135,22 @@ def test_the_set_of_a_switching_law_is_a_strip_and_of_a_stable_loop_everything()
         SAID["a terminal surface"].level(x, s)
 
 
-@pytest.mark.parametrize(
-    ("name", "axes", "shown", "inner"),
-    [
-        (
-            "fails and falls",
-            2,
-            ["certified", "level sets", "innermost", "bound", "run"],
-            [0.1, 0.6],
-        ),
-        ("a switching law", 1, ["certified", "level sets", "innermost"], [0.1, 0.6]),
-    ],
-)
-def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(
-    name, axes, shown, inner, monkeypatch
-):
+@pytest.mark.parametrize(("name", "axes"), [("fails and falls", 2), ("a switching law", 1)])
+def test_the_plane_of_a_certificate_has_its_levels_bound_and_runs(name, axes, monkeypatch):
     monkeypatch.setattr("smc_mujoco.evidence.certificates.figure.AXIS_POINTS", 81)
     made = SAID[name]
     run = trace_of(smc.Scenario(plant=made.plant, law="pid", duration=0.2))
-    page = made.figure(traces=[run] if made.bound else [])
-    unit = made.data["unit"]
-    assert [(one.get_xlabel(), one.get_ylabel()) for one in page.axes] == axes * [
-        (f"position ({unit})", f"velocity ({unit}/s)")
-    ]
-    (legend,) = page.legends
-    for words, text in zip(shown, legend.get_texts(), strict=True):
-        assert text.get_text().startswith(words)
-    levels = {
-        float(level)
-        for one in page.axes
-        for area in one.collections
-        if isinstance(area, ContourSet)
-        if not area.filled
-        for level in area.levels
-    }
-    assert set(inner) <= levels
-    assert len(levels) >= 5
-    for one, bound in [(one, made.bound) for one in page.axes if made.bound]:
-        dashed = [line for line in one.lines if line.get_linestyle() == "--"]
-        assert {x for line in dashed for x in line.get_xdata()} == {-bound, bound}
-        assert any(np.array_equal(line.get_xdata(), run.x[:, 0]) for line in one.lines)
+    page = made.figure(traces=[run])
+    assert len(page.axes) == axes
+    for ax in page.axes:
+        levels = set()
+        for lines in ax.collections:
+            if isinstance(lines, ContourSet) and not lines.filled:
+                levels |= set(lines.levels)
+        assert {0.1, 0.6} <= levels
+        assert any(np.array_equal(line.get_xdata(), run.x[:, 0]) for line in ax.lines)
+        dashed = [line.get_xdata()[0] for line in ax.lines if line.get_linestyle() == "--"]
+        assert dashed == ([-0.3, 0.3] if axes == 2 else [])
 
 
 def test_what_has_no_level_sets_has_no_plane():

@@ -1,8 +1,5 @@
 """Certificates: margins by hand, mutants that the checker refuses, starts that never leave, bounds
 that hold.
-
-As a script it starts 1e5 runs in each certified set: python
-tests/evidence/certificates/test_certify.py
 """
 
 import contextlib
@@ -11,7 +8,6 @@ import dataclasses
 import functools
 import json
 import math
-import random
 import shutil
 import subprocess
 import sys
@@ -27,9 +23,6 @@ from smc_mujoco.evidence.certificates.certificate import Certificate
 
 pytest.importorskip("flint", reason="python-flint is not installed: the extra proof does")
 from smc_mujoco.evidence.certificates import checker, loops, maker
-
-FORCE = {"duffing": 2.0, "inverted_pendulum": 1.0, "van_der_pol": 0.0}
-
 
 # gains that keep |u| <= u_max, an integral faster than d, a region with the start in it: tuned ones
 # need not
@@ -215,21 +208,6 @@ def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
             certificate("inverted_pendulum", "super_twisting", 0.5, slope)
     made = certificate("inverted_pendulum", "super_twisting", 0.5, 1.0)
     assert min(margins(made, "super-twisting").values()) > 0.0
-
-
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    [
-        ({"law": smc.law("twisting")}, "twisting on duffing"),
-        ({"plant": "cart_pole", "law": smc.law("observer_free")}, "cart_pole"),
-        ({"disturbance": smc.signals.OrnsteinUhlenbeck(1.0, 1.0)}, "no bound"),
-    ],
-)
-def test_what_has_no_theorem_is_one_sentence(changes, word):
-    fields = {"plant": "duffing", "law": smc.law("observer_free", lam=6.0, k1=3.0)} | changes
-    with pytest.raises(smc.ScenarioError, match=word) as said:
-        smc.audits.certify(smc.Scenario(**fields))
-    assert "\n" not in str(said.value)
 
 
 # the checker
@@ -585,13 +563,6 @@ def test_the_inner_set_lies_where_s_0_is_reached_on_both_sides(side, monkeypatch
             checker.levels(doc, grid, one, law)
 
 
-def test_any_number_that_changes_breaks_the_seal():
-    data = copy.deepcopy(certificate("duffing").data)
-    data["parts"][0]["conditions"][1]["boxes"][3][1] *= 1.0 + 1e-9
-    with pytest.raises(checker.Refused, match="seal"):
-        checker.check(data)
-
-
 def test_the_checker_stands_alone(tmp_path):
     """It imports nothing of ours, and runs as a file by itself."""
     shutil.copy(checker.__file__, tmp_path / "apart.py")
@@ -615,75 +586,6 @@ def test_the_checker_stands_alone(tmp_path):
 
 
 # runs
-
-
-def steps(made, x, v, d, duration, dt=1e-3):
-    """States of the exact loop under a force that is held for each step, by the Runge-Kutta method
-    of order 4.
-    """
-    loop, _, _ = loops.loop_of(made.data)
-
-    def rates(x, v, d):
-        return v, (loop.phi(x) - loop.D(x) * v - loop.sigma(v + loop.c * x) + d) / loop.M
-
-    for k in range(round(duration / dt)):
-        force = d(k * dt, x, v)
-        a = rates(x, v, force)
-        b = rates(x + dt / 2 * a[0], v + dt / 2 * a[1], force)
-        c = rates(x + dt / 2 * b[0], v + dt / 2 * b[1], force)
-        e = rates(x + dt * c[0], v + dt * c[1], force)
-        x = x + dt / 6 * (a[0] + 2 * b[0] + 2 * c[0] + e[0])
-        v = v + dt / 6 * (a[1] + 2 * b[1] + 2 * c[1] + e[1])
-        yield x, v
-
-
-def starts(made, count, rng):
-    """Random states of the certified set."""
-    (levels,) = (one for one in made.data["parts"] if one["theorem"] == LEVELS)
-    x, s = rng.uniform(-1, 1, (2, 40 * count)) * np.array([[levels["x"][-1]], [levels["s"][-1]]])
-    v = s - made.surface * x
-    inside = made.contains(x, v)
-    assert inside.sum() >= count
-    return x[inside][:count], v[inside][:count]
-
-
-def forces(count, d0, rng):
-    """The force on each run: constant, with the velocity's sign, against it, and switching at
-    random times.
-    """
-    kind = np.arange(count) % 4
-    period = rng.uniform(0.05, 1.0, count)
-    sign = rng.choice([-1.0, 1.0], count)
-    phase = rng.uniform(0.0, 1.0, count)
-
-    def d(t, x, v):
-        switching = np.sign(np.sin(np.pi * (t / period + phase)))
-        return d0 * np.choose(kind, [sign, np.sign(v), -np.sign(v), switching])
-
-    return d
-
-
-def escapes(plant, count, duration):
-    """Runs that leave the certified set, and those that are not within the bound in the end."""
-    d0 = FORCE[plant]
-    rng = np.random.default_rng(3)
-    made = certificate(plant, disturbance=d0)
-    x, v = starts(made, count, rng)
-    left = np.zeros(count, bool)
-    for k, (x, v) in enumerate(steps(made, x, v, forces(count, d0, rng), duration, dt=2e-3)):  # noqa: B020
-        if k % 5 == 0:
-            left |= ~made.contains(x, v)
-    if d0:
-        bound = part(made.data, LEVELS)["bound"]
-    else:
-        bound = 1e-3
-    return int(left.sum()), int((np.abs(x) > bound).sum())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("plant", FORCE)
-def test_no_start_leaves_its_certified_set_and_all_end_within_the_bound(plant):
-    assert escapes(plant, 100, 6.0) == (0, 0)
 
 
 @pytest.mark.slow
@@ -714,17 +616,22 @@ def test_without_damping_no_bound_holds_from_everywhere():
     """
     free = smc.plant("inverted_pendulum", b=0.0)
     made = smc.audits.certify(smc.Scenario(plant=free, law=gain_sets.law(free, "observer_free")))
+    loop, _, _ = loops.loop_of(made.data)
     x = np.array([10.0, 20.0])
     v = np.zeros(2)
-    reached = [x for x, _ in steps(made, x, v, lambda t, x, v: np.sign(v), 20.0)]
-    late = np.abs(np.array(reached[len(reached) // 2 :])).max(axis=0)
+    reached = []
+    for _ in range(20_000):
+        v = v + 1e-3 * (loop.phi(x) - loop.sigma(v + loop.c * x) + np.sign(v)) / loop.M
+        x = x + 1e-3 * v
+        reached.append(np.abs(x))
+    late = np.max(reached[10_000:], axis=0)
     assert late[0] < 10.0
     assert late[1] > 20.0
 
 
 GAINS = {  # law -> the ends of its random gains
-    "observer_free": {"lam": (2.0, 30.0), "k1": (0.5, 8.0)},
-    "boundary_layer": {"k": (2.0, 30.0), "c": (0.5, 8.0), "phi": (0.05, 2.0)},
+    "observer_free": {"lam": (5.5, 30.0), "k1": (0.5, 8.0)},
+    "boundary_layer": {"k": (5.5, 30.0), "c": (0.5, 8.0), "phi": (0.05, 2.0)},
     "lqr": {"q1": (1.0, 500.0), "q2": (0.1, 50.0), "r": (0.1, 2.0)},
     "classical": {"k": (2.0, 30.0), "c": (0.5, 8.0)},
     "terminal": {"k": (1.0, 5.0), "b": (0.5, 2.0), "bound": (0.02, 0.9)},
@@ -732,26 +639,29 @@ GAINS = {  # law -> the ends of its random gains
 }
 
 
-def claims(made, d0):
+def claims(made, d0, rng):
     """What a certificate says of runs: (x0, v0, disturbance, largest |x| in the end)."""
     pushes = [smc.Constant(d0), smc.Constant(-d0), smc.Sine(d0, 1.0), smc.Sine(d0, 3.0)]
     if made.stable:
         yield from ((x0, 0.0, None, 0.02) for x0 in (0.1, 1.0, -3.0))
-    for push in pushes:
-        if found := [one for one in made.data["parts"] if one["theorem"] == LEVELS]:
-            (wide, end) = (value for theorem, _, value, _ in made.ranges if theorem == LEVELS)
-            yield 0.95 * wide, 0.0, push, max(1.02 * end, 0.02)
-            assert found[0]["bound"] > 0.0
-        for one in made.data["parts"]:
-            if one["theorem"] == "reaching":  # s = 0 is kept
-                x0 = 0.95 * one["X"]
-                gains = made.data["law"]["gains"]
-                v0 = made.surface * x0
-                if "p" in gains:
-                    v0 = gains["b"] * x0 ** gains["p"]
-                yield x0, -v0, push, 0.02
-            if one["theorem"] == TWISTING:
-                yield 0.0, 0.0, push, one["X"]
+    for one in made.data["parts"]:
+        if one["theorem"] == LEVELS:
+            end = 0.0 if made.rests else one["bound"]
+            x, s = rng.uniform(-1, 1, (2, 4000)) * [[one["x"][-1]], [one["s"][-1]]]
+            v = s - made.surface * x
+            level = made.level(x, v)
+            edge = np.flatnonzero((level <= one["outer"]) & (level > 0.9 * one["outer"]))[:6]
+            for k, at in enumerate(edge):
+                yield float(x[at]), float(v[at]), pushes[k % 4], max(1.02 * end, 0.02)
+        if one["theorem"] == "reaching":  # s = 0 is kept
+            x0 = 0.95 * one["X"]
+            gains = made.data["law"]["gains"]
+            v0 = made.surface * x0
+            if "p" in gains:
+                v0 = gains["b"] * x0 ** gains["p"]
+            yield from ((x0, -v0, push, 0.02) for push in pushes)
+        if one["theorem"] == TWISTING:
+            yield from ((0.0, 0.0, push, one["X"]) for push in pushes)
 
 
 @pytest.mark.slow
@@ -760,19 +670,19 @@ def test_no_run_contradicts_a_certificate(law):
     """Of random gains at the edge of what is proven: what maker and checker both overlook of a law,
     its runs do not.
     """
-    rng = random.Random(law)
+    rng = np.random.default_rng(len(law))
     seen = 0
     for plant in ("duffing", "van_der_pol", "inverted_pendulum"):
         gains = {}
         for name, (low, high) in GAINS[law].items():
-            gains[name] = round(low * (high / low) ** rng.random(), 3)
-        d0 = round(rng.uniform(0.01, 0.5), 3)
+            gains[name] = round(float(low * (high / low) ** rng.random()), 3)
+        d0 = round(float(rng.uniform(0.01, 0.5)), 3)
         one = smc.Scenario(plant=plant, law=smc.law(law, **gains), duration=40.0, x0=0.05)
         try:
             made = smc.audits.certify(one, smc.Uncertainty(disturbance=d0, slope=3.0 * d0))
         except smc.ScenarioError:  # the gains are too small
             continue
-        told = list(claims(made, d0))
+        told = list(claims(made, d0, rng))
         runs = []
         for x0, v0, push, _ in told:
             runs.append(dataclasses.replace(one, x0=x0, v0=v0, disturbance=push or ()))
@@ -827,11 +737,3 @@ def test_without_python_flint_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "flint", None)
     with pytest.raises(smc.ScenarioError, match=r"smc.audits.certify needs .*smc-mujoco\[proof\]"):
         smc.audits.certify(scenario("duffing"))
-
-
-if __name__ == "__main__":
-    for name in FORCE:
-        left, outside = escapes(name, 100_000, 8.0)
-        print(
-            f"{name}: of 100000 starts {left} left the certified set, {outside} did not end within the bound"
-        )

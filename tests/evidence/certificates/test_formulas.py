@@ -324,79 +324,6 @@ def test_a_form_attracts_where_it_falls_on_a_dense_grid():
         checker.quadratic(numbers, e, f, [tuple(1.001 * inside)])
 
 
-def test_w_is_the_time_to_the_target_along_the_loop():
-    """1 - exp(-T) of nodes from which the loop, without a disturbance, takes the time T at a cost
-    of 1.
-    """
-    terms = {"B": -0.3, "E": 0.6}
-    made = loop("observer_free", terms)
-    x = search.axis(1.5, 0.01)
-    s = search.axis(2.5, 0.015)
-    X, S = np.meshgrid(x, s, indexing="ij")
-    far = np.maximum(np.abs(X) / 0.1, np.abs(S) / 0.15) > 1.0
-    W = search.times(made, x, s, far.astype(float))
-    for i, j in ((150, 130), (180, 160), (165, 70), (60, 150)):
-        z = np.array([x[i], s[j]])
-        t = 0.0
-        while max(abs(z[0]) / 0.1, abs(z[1]) / 0.15) > 1.0:
-            half = z + 5e-4 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], 0.0)])
-            z, t = (
-                z + 1e-3 * np.array([half[1] - 1.7 * half[0], made.fall(half[0], half[1], 0.0)]),
-                t + 1e-3,
-            )
-        assert W[i, j] == pytest.approx(1.0 - math.exp(-t), abs=0.04)
-    pushed = search.times(loop("observer_free", terms, 0.2), x, s, far.astype(float))
-    assert (pushed > W - 0.02).all()
-    assert np.mean(pushed - W) > 0.01
-
-
-def test_a_grid_has_its_least_step_about_0_and_reaches_its_ends():
-    nodes = search.axis(3.0, 0.004)
-    assert len(nodes) == 221
-    np.testing.assert_allclose(nodes, -nodes[::-1])
-    assert nodes[-1] == 3.0
-    assert nodes[111] == pytest.approx(0.004, rel=1e-5)
-    steps = np.diff(nodes[110:])
-    assert (np.diff(steps) > -1e-5).all()
-    np.testing.assert_allclose(
-        np.diff(search.axis(3.0, 1.0)), 3.0 / 110, rtol=0.05
-    )  # no wider than even
-
-
-@pytest.mark.parametrize(
-    ("terms", "d0", "at"),
-    [({"B": -0.7}, 0.5, None), ({"B": 2.5}, 0.5, None), ({"B": -0.7}, 0.0, 0.0)],
-)
-def test_the_loop_rests_where_forces_balance(terms, d0, at):
-    made = loop("boundary_layer", terms, d0)
-    slope = 2.3 * 1.7 / 0.4 - terms["B"]
-    expected = d0 / slope if at is None else at
-    assert search.rest(made, 2.0) == pytest.approx(expected, abs=1e-12)
-    assert math.isnan(search.rest(loop("boundary_layer", {"B": 30.0}, d0), 2.0))
-
-
-def test_the_set_of_a_bounded_disturbance_holds_the_linear_loops_worst_case():
-    """With d switching against the motion, for a boundary layer so wide that the loop is linear."""
-    made = loops._loop(
-        1.3,
-        [0.0, -0.3, 0.0, 0.6, 0.0],
-        Space(name="boundary_layer", k=2.3, c=1.7, phi=1.1),
-        4.0,
-        0.5,
-    )
-    P = search.form(made, 2.0, lambda P: True)
-    assert P is not None
-    Q = np.linalg.inv(P)
-    z = np.zeros(2)
-    far = 0.0
-    for k in range(40_000):
-        d = 0.5 if (k // 700) % 2 else -0.5
-        z = z + 1e-3 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], d)])
-        far = max(far, z @ P @ z)
-    assert 0.2 < far <= 1.0
-    assert math.sqrt(Q[0, 0]) < 1.6 * search.rest(made, 2.0)
-
-
 # the maker
 
 
@@ -460,26 +387,6 @@ def test_bounds_of_a_disturbance_are_those_of_its_sum(signals, bounds):
     assert maker._bounds(
         smc.Scenario(plant="duffing", law="pid", disturbance=signals)
     ) == pytest.approx(bounds)
-
-
-def test_a_window_is_the_widest_range_of_levels_that_no_cell_spoils_and_the_lowest_of_equals():
-    its = object.__new__(search._Grid)
-    its.x = np.array([0.0, 0.5, 2.0])
-    its.low = np.array([[0.25, 0.5], [0.625, 0.0]])
-    its.high = np.array([[0.5, 0.5625], [0.75, 1.0]])
-    its.bad = np.array([[True, False], [True, False]])
-    its.border = 1.0
-    its.limit = 1.0
-    assert its.window() == (0.0, 0.25)
-    its.border = 1.125
-    assert its.window() == (0.75, 1.125)
-    assert its.bound((0.25, 1.0)) == 2.0
-    its.limit = 0.75  # of levels below which the inner set lies
-    assert its.window() == (0.0, 0.25)
-    its.bad[1, 1] = True
-    assert its.window() is None
-    assert (its.bound(None), its.worth(None, (0.0, 0.0))) == (math.inf, (True, math.inf))
-    assert its.bound((-0.5, 1.0)) == 0.0
 
 
 def test_a_law_that_is_bounded_is_too_weak_far_from_a_force_that_grows():

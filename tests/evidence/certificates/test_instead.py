@@ -1,4 +1,4 @@
-"""What the author may claim instead: the paper's file, the page and the certificates say the same."""
+"""What the author may claim instead: paper, page and certificates say the same."""
 
 import functools
 import json

@@ -245,17 +245,6 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
         assert (np.sqrt(np.mean(np.square(blocks))) > 2.0) == (memory > 0.0)
 
 
-@pytest.mark.parametrize(("memory", "count"), [(0.0, 400), (0.9, 105), (0.995, 60)])
-def test_blocks_are_as_long_as_residuals_depend_on_each_other(memory, count):
-    """Of a residual whose correlation falls by `memory` from sample to sample, in two columns."""
-    random = np.random.default_rng(2)
-    r = np.zeros((20_000, 2))
-    for k in range(1, len(r)):
-        r[k] = memory * r[k - 1] + random.normal(size=2)
-    slopes = Slopes(Point(np.zeros(0), np.zeros(0)), [r.ravel()], [], [], 2, 1)
-    assert uncertainty._blocks(slopes) == pytest.approx(count, rel=0.15)
-
-
 @pytest.mark.parametrize(
     ("value", "least", "most", "scale"),
     [
@@ -374,14 +363,6 @@ def test_torques_above_5_hz_are_left_out_by_four_poles_forward_and_backward(hert
     np.testing.assert_allclose(
         low[middle], abs(gain[0]) ** 2 * np.sin(math.tau * hertz * at[middle]), atol=6e-3
     )
-
-
-@pytest.mark.parametrize(
-    ("seconds", "step", "enough"), [(1.0, 0.05, True), (0.99, 0.01, False), (2.0, 0.051, False)]
-)
-def test_a_record_has_torques_from_1_s_on_at_20_hz(seconds, step, enough):
-    data = {"t": np.append(step * np.arange(round(seconds / step)), seconds)}
-    assert inverse.long_enough(data, records.Columns()) is enough
 
 
 def test_a_twin_falls_beyond_two_ranges_from_when_it_was_one_range_off():

@@ -49,7 +49,10 @@ def told(value):
         case _ if dataclasses.is_dataclass(value):
             given = {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
             plain = {one.name: one.default for one in dataclasses.fields(value)}
-            text = f"{type(value).__name__} {told({name: one for name, one in given.items() if one is not plain[name]})}"
+            text = (
+                f"{type(value).__name__} "
+                f"{told({name: one for name, one in given.items() if one is not plain[name]})}"
+            )
         case _:
             text = "a function" if callable(value) else str(value)
     return text

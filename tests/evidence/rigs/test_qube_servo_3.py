@@ -3,7 +3,6 @@ pendulum.
 """
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -65,29 +64,3 @@ def test_each_quantity_that_was_found_is_needed():
         frequency, damping = falls(other)
         apart = abs(frequency / FREQUENCY - 1.0), abs(damping / DAMPING - 1.0)
         assert step_error(other) > 0.02 or apart[0] > 0.02 or apart[1] > 0.06, name
-
-
-def test_its_laws_have_the_surface_of_least_quadratic_cost_of_its_arm_pendulum_and_motor():
-    from scipy.linalg import solve_continuous_are
-
-    rig = smc.rig("qube_servo_3")
-    q = SimpleNamespace(**rig.values)
-    per_volt = q.torque_constant / q.resistance
-    pull = q.pendulum_mass * q.arm_length * q.pendulum_centre
-    around = q.arm_inertia + q.rotor_inertia + q.pendulum_mass * q.arm_length**2
-    swinging = q.pendulum_inertia + q.pendulum_mass * q.pendulum_centre**2
-    inverse = np.linalg.inv([[around, pull], [pull, swinging]])
-    forces = np.array(
-        [
-            [-q.cable, 0.0, -q.arm_damping - per_volt * q.torque_constant, 0.0],
-            [0.0, q.pendulum_mass * q.gravity * q.pendulum_centre, 0.0, 0.0],
-        ]
-    )
-    A = np.vstack([np.eye(4)[2:], inverse @ forces])
-    b = np.concatenate([np.zeros(2), inverse[:, 0]])[:, np.newaxis]
-    P = solve_continuous_are(A, b, np.diag([1.0, 10.0, 0.05, 0.05]), [[2000.0]])
-    surface = (b.T @ P).ravel() / 2000.0 / per_volt
-    for law in rig.laws:
-        assert [law.gains[name] for name in ("c1", "c2", "c3", "c4")] == pytest.approx(
-            surface, rel=1e-4
-        )

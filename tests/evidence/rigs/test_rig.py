@@ -234,7 +234,7 @@ def test_the_delay_is_a_whole_number_of_steps():
 
 
 def test_a_record_is_a_trace_of_what_was_measured(record):
-    """Shifted by the encoder's offset, so that a film shows the machine where its twin counts from."""
+    """Shifted by the encoder's offset, so that a film shows the machine where its twin counts."""
     trace = QUBE.measured(record, start=3.0, duration=1.0)
     part = slice(1500, 2001)
     bias = QUBE.values["encoder_offset"]

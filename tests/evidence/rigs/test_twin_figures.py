@@ -1,4 +1,4 @@
-"""What simulation said of real machines, and what these did: the rows that come with the package."""
+"""What simulation said of real machines, and what these did: the package's rows."""
 
 import dataclasses
 import math
@@ -104,7 +104,7 @@ def test_the_page_has_the_package_s_rows():
 
 @pytest.mark.parametrize("condition", ["hold", "nudges"])
 def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
-    """Of the stepper's twin, which was found from the linear law's figures; not of the plain one."""
+    """Of the stepper's twin, found from the linear law's figures; not of the plain one."""
     whole, plain = (
         next(
             one
@@ -156,20 +156,3 @@ def test_the_command_tells_all_machines_or_one(monkeypatch):
     stepper = CliRunner().invoke(app, ["rig", "stepper_furuta"]).output
     assert stepper.count("without") == len(twin_figures.orders()) - 2
     assert CliRunner().invoke(app, ["rig", "srv02"]).exit_code != 0
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
-def test_rows_of_the_qube_servo_are_those_of_its_records():
-    twin = smc.rig("qube_servo")
-    record = dict(np.load(DATA / "qube-11.npz"))
-    ((predicted, measured, _),) = twin.predictions([record])
-    fit = twin.fit(record)
-    driver = twin.set("driver").predictions([record])[0][0]
-    for column, name in zip(measured, fit, strict=True):
-        told = row("qube_servo", "11", f"{column} rms")
-        values = np.std(measured[column]), np.std(predicted[column]), np.std(driver[column])
-        assert (told.machine, told.twin, told.published) == pytest.approx(values, rel=1e-3)
-        assert told.fit == pytest.approx(fit[name], abs=0.1)
-    fell = twin.with_values({"ripple": 0.0}).fit(record)
-    assert all(math.isinf(value) for value in fell.values())
