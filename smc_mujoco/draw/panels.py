@@ -439,7 +439,10 @@ def over_time(
         list(zip(panel.traces, colours, means, lines, starts, strict=True))
     ):
         y = QUANTITIES[name](trace)
-        steps = "default" if smoothed(trace) or name != "u" else "steps-post"
+        if smoothed(trace) or name != "u":
+            steps = "default"
+        else:
+            steps = "steps-post"
         if bands and name not in UNBANDED:
             artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
         look: dict[str, Any] = {"color": colour, "drawstyle": steps}

@@ -107,7 +107,10 @@ def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) ->
     result = list(states)
     for run, after in itertools.pairwise(runs):
         state = states[run[0]]
-        before = result[run[0] - 1] if run[0] else states[after[0]]
+        if run[0]:
+            before = result[run[0] - 1]
+        else:
+            before = states[after[0]]
         brief = times[after[0]] - times[run[0]] < hold - 1e-9
         if (
             brief

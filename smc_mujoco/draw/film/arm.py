@@ -222,7 +222,10 @@ class Overlay:
             end = x + BAR_WIDTH * s
             draw.rectangle((x, zero - half, end, zero + half), style.PAPER, style.RULE)
             low, high = sorted((zero, zero - value * half))
-            colour = style.FAILED if abs(value) > 0.999 else self.colours[k]
+            if abs(value) > 0.999:
+                colour = style.FAILED
+            else:
+                colour = self.colours[k]
             draw.rectangle((x + 1, low, end - 1, high), colour)
             place = ((x + end) / 2, zero + half + 2 * s)
             draw.text(place, str(i), style.MUTED, letters, anchor="ma")

@@ -206,7 +206,10 @@ def flying_scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         push = max(push, float(pushes.max(initial=0.0)))
     by_group = {}
     for group in style.split(traces):
-        by_group[group] = Scale(control, push) if group.unit == "m" else Scale(0.0, 0.0)
+        if group.unit == "m":
+            by_group[group] = Scale(control, push)
+        else:
+            by_group[group] = Scale(0.0, 0.0)
     return by_group
 
 

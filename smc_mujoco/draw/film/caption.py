@@ -219,7 +219,10 @@ class Caption:
         draw = ImageDraw.Draw(image)
         self.head(draw, time, speed)
         for k, text in enumerate(self.texts(failed)):
-            colour = style.FAILED if failed[k] else self.colours[k]
+            if failed[k]:
+                colour = style.FAILED
+            else:
+                colour = self.colours[k]
             self.label(draw, tuple(self.pills[k]), text, colour)
             state = states[k] if states else None
             if state:
@@ -360,7 +363,10 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
         words = []
         for group, scale in scales.items():
             size = getattr(scale, quantity)
-            more = " or more" if quantity in scale.exceeded else ""
+            if quantity in scale.exceeded:
+                more = " or more"
+            else:
+                more = ""
             if size:
                 words.append(f"{style.short(size)} {style.units(group)[unit]}{more}")
         return ", ".join(words)
@@ -369,7 +375,10 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     plant = traces[0].scenario.plant
     if sizes := longest("control"):
         drive = any(scale.drive for scale in scales.values())
-        what = "force of an actuator" if plant.pose else "mean control"
+        if plant.pose:
+            what = "force of an actuator"
+        else:
+            what = "mean control"
         if drive:
             what = "force of the drive"
         words.append(f"arrow: {what}, longest {sizes}")

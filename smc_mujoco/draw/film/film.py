@@ -185,7 +185,10 @@ def film(
       ScenarioError: nothing to show, a size that is odd or too small or large, another ending, or
         no OpenGL to render with.
     """
-    ending = "" if path is None else with_ending(path, *WRITERS).suffix
+    if path is None:
+        ending = ""
+    else:
+        ending = with_ending(path, *WRITERS).suffix
     if path is not None and (ending == ".png") != (at is not None):
         raise ScenarioError(
             "the picture at a time is a .png: give at, in s, with a path that ends in .png"
@@ -200,7 +203,9 @@ def film(
         span = (0.0, 4.0)
     size = size or (SMALL_SIZE if ending in ("", ".webp") else FULL_SIZE)
     frames = Frames(traces, labels, title, size, fps, speed, camera, at, span)
-    return frames if path is None else write(frames, Path(path))
+    if path is None:
+        return frames
+    return write(frames, Path(path))
 
 
 def write(frames: Frames, path: Path) -> Path:
@@ -289,7 +294,10 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     for trace, colour in zip(traces, colours, strict=True):
         tracks.append(MachineTrack(trace, colour, edges, grid, scales, arms))
     row = scene.in_a_row(scenario, scene.turn(scenario, frames.camera))
-    below = arm.room(traces, width / len(traces) / scale) if arms else None
+    if arms:
+        below = arm.room(traces, width / len(traces) / scale)
+    else:
+        below = None
     words = arm.key(traces) if arms else None
     told = [track.told for track in tracks]
     title = frames.title
@@ -297,8 +305,14 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     charts = Charts(traces, names, colours, (width, low), scale)
     with Stage(tracks, above, caption.room, frames.camera, caption.apart, scale) as stage:
         caption.place(stage.boxes)
-        over = arm.Overlay(traces, colours, stage, edges, caption.badges) if arms else None
-        flights = arm.Paths(traces, colours, stage) if scenario.plant.pose else None
+        if arms:
+            over = arm.Overlay(traces, colours, stage, edges, caption.badges)
+        else:
+            over = None
+        if scenario.plant.pose:
+            flights = arm.Paths(traces, colours, stage)
+        else:
+            flights = None
         for frame, time in enumerate(times.tolist()):
             drawn = []
             for k, track in enumerate(tracks):

@@ -94,7 +94,10 @@ class Puppet:
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Return the shape of the machine at a time, s, and its data with the channels at x."""
         now = self.shape(time)
-        rest = None if track.motion is None else track.motion.at(time)
+        if track.motion is None:
+            rest = None
+        else:
+            rest = track.motion.at(time)
         data[now].qpos[:] = self.qpos(x, rest=rest)
         scene.forward(self.shapes[now].model, data[now])
         return self.shapes[now].model, data[now]

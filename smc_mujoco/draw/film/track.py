@@ -55,7 +55,10 @@ class MachineTrack:
         self.colour = colour
         times = edges[1:]
         n = scene.first_channels(trace.scenario).plant.n
-        sizes = [] if arms else arrows.scales_by_channel(trace, scales)[:n]
+        if arms:
+            sizes = []
+        else:
+            sizes = arrows.scales_by_channel(trace, scales)[:n]
         self.drawn = drawn(trace, edges, sizes, colour)
         self.framing = drawn(trace, grid, sizes, colour)
         self.states = [None] * len(times)
@@ -113,5 +116,8 @@ def motion(trace: Trace, times: np.ndarray) -> Motion | None:
     known = len(names)
     for name in names:
         known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0
-    moved = None if known == model.nq else poses(trace, times)
+    if known == model.nq:
+        moved = None
+    else:
+        moved = poses(trace, times)
     return None if moved is None else Motion(times, moved)
