@@ -31,7 +31,7 @@ from smc_mujoco.simulation.serialise import describe, restore
 from smc_mujoco.simulation.signals import Push
 
 PUSH_WIDTH = 0.1  # s
-SAVED = '''"""What was seen of {plant} in `smc-mujoco view`, to the bit."""
+SAVED = '''"""What was seen in `smc-mujoco view`, to the bit."""
 
 from math import inf, nan  # noqa: F401
 
@@ -39,9 +39,8 @@ import smc_mujoco as smc
 from smc_mujoco.simulation.serialise import restore
 
 RUNS = {runs}
-scene = smc.Scene(
-    title="A view of {plant}", conditions={{"view": {{label: restore(run) for label, run in RUNS.items()}}}}
-)
+RESTORED = {{label: restore(run) for label, run in RUNS.items()}}
+scene = smc.Scene(title={title!r}, conditions={{"view": RESTORED}})
 
 if __name__ == "__main__":
     smc.play(__file__)
@@ -195,19 +194,21 @@ class Session:
         self.change(lambda s: at_keyframe(s, self.batches[0].base, key))
 
     def save(self, path: Path) -> Path:
-        """Write a scene file whose runs are these to the bit; refuse what it could not repeat."""
+        """Write a new scene file whose runs are these to the bit; refuse what it could not repeat."""
         runs = {f"{s.law.name} {i + 1}": describe(s) for i, s in enumerate(self.scenarios)}
         runs = json.loads(json.dumps(runs))
         if [restore(run) for run in runs.values()] != list(self.scenarios):
             raise ScenarioError(
                 "the session cannot be saved: a scene file cannot name its law or plant"
             )
-        plant = self.scenarios[0].plant.name
+        title = f"A view of {self.scenarios[0].plant.name}"
+        text = SAVED.format(title=title, runs=pformat(runs, width=110, sort_dicts=False))
+        try:
+            with path.open("x", encoding="utf-8") as file:
+                file.write(text)
+        except FileExistsError:
+            raise ScenarioError(f"{path} exists: move it, then save again") from None
         self.message = f"saved as {path}"
-        path.write_text(
-            SAVED.format(plant=plant, runs=pformat(runs, width=110, sort_dicts=False)),
-            encoding="utf-8",
-        )
         return path
 
 

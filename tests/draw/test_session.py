@@ -2,6 +2,7 @@
 session repeats.
 """
 
+import ast
 import dataclasses
 import queue
 import types
@@ -105,6 +106,21 @@ def test_a_law_that_a_file_cannot_name_is_not_saved(tmp_path):
 
     with pytest.raises(smc.ScenarioError, match="cannot be saved"):
         Session([dataclasses.replace(DUFFING, law=mine())]).save(tmp_path / "view.py")
+
+
+@pytest.mark.parametrize("name", ['5" arm', "a\\", 'x"""+str(exit(3))+"""', "{runs}"])
+def test_a_saved_file_holds_the_name_of_a_plant_as_text_and_replaces_no_other(name, tmp_path):
+    """A quote in a name lost the session; the name of a file ran as code when it was opened."""
+    plant = smc.plant_from(ARM, ["shoulder"], name=name)
+    session = Session([smc.Scenario(plant=plant, law="pid", duration=0.1)])
+    path = session.save(tmp_path / "view.py")
+    text = path.read_text(encoding="utf-8")
+    assert f"A view of {name}" in [
+        node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)
+    ]
+    with pytest.raises(smc.ScenarioError, match=r"view.py exists"):
+        session.save(path)
+    assert path.read_text(encoding="utf-8") == text
 
 
 def test_an_own_arm_starts_from_its_keyframe_and_is_saved(arm, tmp_path):
