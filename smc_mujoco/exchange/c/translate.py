@@ -21,6 +21,7 @@ import functools
 import inspect
 import itertools
 import math
+import operator
 import re
 import textwrap
 import threading
@@ -151,7 +152,7 @@ class Kind(NamedTuple):
     @property
     def number(self) -> "Kind":
         """The kind of its numbers."""
-        return Kind("real" if self.of == "memory" else self.of)
+        return REAL if self.of == "memory" else Kind(self.of)
 
 
 INT = Kind("int")
@@ -179,14 +180,17 @@ class Value(NamedTuple):
         """Return the items of a tuple, or the numbers of a vector."""
         if self.items or not self.kind.shape:
             return self.items
-        texts = [self.text.replace(ROW, str(i)) for i in range(self.kind.shape[0])]
-        return tuple(Value(text, self.kind.number, self.level) for text in texts)
+        kind = self.kind.number
+        indices = map(str, range(self.kind.shape[0]))
+        return tuple(Value(self.text.replace(ROW, i), kind, self.level) for i in indices)
 
 
 def array_at(base: str, kind: Kind, offset: str = "", sources: Iterable[str] = ()) -> Value:
     """Return the array that begins in another one, or at a pointer, from an offset on."""
     if len(kind.shape) == 2:
-        width = SLOTS if kind.of == "memory" else kind.shape[1]
+        width = str(kind.shape[1])
+        if kind.of == "memory":
+            width = SLOTS
         place = f"{ROW} * {width} + {COLUMN}"
     elif kind.stride == "1":
         place = ROW
@@ -214,8 +218,8 @@ def translate(
     """
     program = Program(component, single, joints)
     program.used_names |= others.keys()
-    slots = (joints, component.memory) if joints else (component.memory,)
-    kinds = Kind("y"), Kind("gains"), Kind("memory", slots)
+    slots = [joints, component.memory] if joints else [component.memory]
+    kinds = Kind("y"), Kind("gains"), Kind("memory", tuple(slots))
     texts = [Function(program, component.function, kinds, entry=True).text(program.symbol)]
     for name, (function, kinds) in others.items():
         texts.append(Function(program, function, kinds).text(name).removeprefix("static "))
@@ -232,6 +236,7 @@ class Program:
         self.component = component
         self.single = single
         self.joints = joints
+        self.vector = (joints,) if joints else ()  # the shape of u
         self.symbol = f"smc_{component.kind}"
         self.texts: dict[str, str] = {}  # name of a function or a constant array -> text
         self.constants: dict[str, str] = {}  # content of a constant array -> name
@@ -264,10 +269,12 @@ class Program:
         function = f"{name}_{of}"
         body = body or HELPERS[name]
         number = TYPES[of]
-        second = f", {number} b" if "b" in body else ""
+        arguments = f"{number} a"
+        if "b" in body:
+            arguments += f", {number} b"
         self.used_names.add(function)
         self.texts[function] = (
-            f"static {number} {function}({number} a{second})\n{{\n    return {body};\n}}"
+            f"static {number} {function}({arguments})\n{{\n    return {body};\n}}"
         )
         return function
 
@@ -279,7 +286,7 @@ class Program:
                 None,
                 f"the constant {plain(name)}, which is not a one-dimensional array of numbers,",
             )
-        of = "int" if data.dtype.kind == "i" else "real"
+        of = {"i": "int", "f": "real"}[data.dtype.kind]
         items = []
         for number in data.tolist():
             items.append(literal(number, self.single, ast.Constant(number)).text)
@@ -312,8 +319,8 @@ class Program:
         if key not in self.known:
             self.known[key] = None
             made = Function(self, function, kinds, constants)
-            same = [name for name, text in self.texts.items() if made.text(name) == text]
-            name = same[0] if same else self.unique_name(tree.name)
+            same = (name for name, text in self.texts.items() if made.text(name) == text)
+            name = next(same, "") or self.unique_name(tree.name)
             self.texts[name] = made.text(name)
             self.known[key] = name, made
         if (known := self.known[key]) is None:
@@ -342,7 +349,7 @@ class Function:
         written, self.tree = parsed(function)
         self.globals = around(written) | dict(constants)
         arguments = [argument.arg for argument in self.tree.args.args]
-        nodes = [node for statement in self.tree.body for node in ast.walk(statement)]
+        nodes = inside(self.tree.body)
         gives = entry or any(isinstance(node, ast.Return) for node in nodes)
         if len(arguments) != len(kinds):
             raise refuse(None, f"{self.tree.name} with its arguments")
@@ -359,7 +366,7 @@ class Function:
             for name in assigned(node):
                 self.assignments[name].append(node)
         loops = [node for node in nodes if isinstance(node, ast.For | ast.While)]
-        self.in_loops = {node for loop in loops for node in ast.walk(loop)}
+        self.in_loops = {*inside(loops)}
         self.kinds = dict(self.parameters)
         self.views = set[str]()  # names that are pointers to arrays or parts of them
         self.names = dict[str, Value]()
@@ -431,8 +438,9 @@ class Function:
         of = TYPES[kind.of]
         if kind.of == "y" and self.program.component.kind == "estimator":
             of = "smc_reading"
-        constant = self.names[name].sources <= self.parameters.keys() - self.changed
-        return f"const {of} *" if constant else f"{of} *"
+        if self.names[name].sources <= self.parameters.keys() - self.changed:
+            of = f"const {of}"
+        return f"{of} *"
 
     def gives_number(self) -> bool:
         """Return whether it returns one number."""
@@ -443,8 +451,10 @@ class Function:
         kind = self.kinds[name]
         if kind.shape:
             return array_at(self.c_name(name), kind, sources=[name])
-        sources = frozenset() if kind.of in WIDTHS else frozenset([name])  # of y and gains
-        return Value(self.c_name(name), kind, sources=sources)
+        value = Value(self.c_name(name), kind)
+        if kind.of in WIDTHS:
+            return value
+        return value._replace(sources=frozenset([name]))  # y and gains
 
     def c_name(self, name: str) -> str:
         """Return a variable's name in C."""
@@ -465,16 +475,16 @@ class Function:
 
     def temporary(self, kind: Kind) -> Value:
         """Return a new variable."""
-        word = "array" if kind.shape else "number"
-        names = (f"{word}_{i}" for i in self.counts)
-        name = next(name for name in names if name not in self.taken)
+        name = f"new_{next(self.counts)}"
+        while name in self.taken:
+            name = f"new_{next(self.counts)}"
         self.temporaries[name] = kind = kind._replace(stride="1")
-        return array_at(name, kind) if kind.shape else Value(name, kind)
+        if kind.shape:
+            return array_at(name, kind)
+        return Value(name, kind)
 
     def kept(self, value: Value) -> Value:
         """Return a value after a line that stores it in a new variable."""
-        if value.items and any(item.kind.shape for item in value.items):
-            raise Untranslatable(f"a tuple of arrays{NEEDS_C}")
         place = self.temporary(value.kind)
         self.fill(place, value)
         return place._replace(sources=value.sources)
@@ -551,8 +561,7 @@ class Function:
 
     def loop(self, node: ast.For, variable: str) -> None:
         """Translate for i in range(...) and for element in array."""
-        inside = {other for part in node.body for other in ast.walk(part)}
-        if inside & {*self.assignments[variable]}:
+        if {*inside(node.body)} & {*self.assignments[variable]}:
             raise refuse(node.iter, "a loop that changes its own variable")
         match node.iter:
             case ast.Call(func=ast.Name(id="range"), args=[*bounds]) if 1 <= len(bounds) <= 3:
@@ -575,16 +584,20 @@ class Function:
         step = self.whole(bounds[2]) if len(bounds) == 3 else 1
         if len(bounds) == 1:
             bounds = [ast.Constant(0), *bounds]
-        first, last = [self.number(bound) for bound in bounds[:2]]
+        first, last = map(self.number, bounds[:2])
         if (first.kind, last.kind) != (INT, INT) or not step:
             raise refuse(self.line, "a range of other than integers with a constant step")
         end = self.whole(bounds[1])
         if end is None:  # Python computes it once
             last = self.kept(last)
-        if self.natural(bounds[0]) if step > 0 else end is not None and end >= -1:
+        natural = self.natural(bounds[0])
+        sign = "<"
+        if step < 0:
+            natural = end is not None and end >= -1
+            sign = ">"
+        if natural:
             self.counters.add(variable)
         i = self.c_name(variable)
-        sign = "<" if step > 0 else ">"
         change = {1: "++", -1: "--"}.get(step, f" += {step}")
         self.names[variable] = Value(i, INT)
         loop = f"int32_t {i} = {first.text}; {i} {sign} {last.text}; {i}{change}"
@@ -604,12 +617,13 @@ class Function:
         places = self.results_at()
         for i, item in enumerate(values):
             self.results[i] = wider(self.results[i], item.kind)
-            arguments = {source.partition(".")[0] for source in item.sources}
-            self.returned |= {self.position[name] for name in arguments & self.parameters.keys()}
+            for source in item.sources:
+                name = source.partition(".")[0]
+                if name in self.parameters:
+                    self.returned.add(self.position[name])
             if places:
                 self.fill(places[i], item)
-        joints = self.program.joints
-        shape = (joints,) if joints else ()
+        shape = self.program.vector
         if self.entry and [kind.shape for kind in self.results] != [shape] * 2:
             raise refuse(node, "a result other than u and s, a number or one of each joint,")
         if places:
@@ -628,7 +642,7 @@ class Function:
             elif not self.entry:
                 places.append(Value(f"*out_{i}", kind))
             elif kind.shape:
-                places.append(array_at("out", kind, JOINTS if i else ""))
+                places.append(array_at("out", kind, ("", JOINTS)[i]))
             else:
                 places.append(Value(f"out[{i}]", kind))
         return places
@@ -660,7 +674,10 @@ class Function:
             if self.origins(value.text) & written:
                 value = self.kept(value)  # noqa: PLW2901
             held.append(value)
-            written |= {part.id} if isinstance(part, ast.Name) else self.names[root(part)].sources
+            if isinstance(part, ast.Name):
+                written.add(part.id)
+            else:
+                written |= self.origins(self.changeable(part).text)
         for part, value in zip(targets, held, strict=True):
             self.store(part, value)
 
@@ -679,7 +696,7 @@ class Function:
         if place is None or place.text == value.text:
             return
         if place.kind.shape:  # elements that it reads must not be those that the loop has changed
-            others = " ".join(item.text for item in value.items or (value,))
+            others = joined(value.items or (value,))
             if self.origins(others.replace(place.text, "")) & self.origins(place.text):
                 value = self.kept(value)
         self.fill(place, value)
@@ -735,8 +752,8 @@ class Function:
         Results go directly to those of the targets that are variables and that it does not read.
         """
         function = self.callee(call)
-        values = [self.argument(node) for node in call.args]
-        literals = [self.constant(node) for node in call.args]
+        values = [*map(self.argument, call.args)]
+        literals = [*map(self.constant, call.args)]
         name, made = self.program.function(function, values, literals)
         self.check_changes(call, values, made)
         arguments = []
@@ -745,7 +762,9 @@ class Function:
             arguments.append(value.pointer or value.text)
         if made.gives_number():
             value = Value(f"{name}({', '.join(arguments)})", made.results[0])
-            return self.kept(value) if made.changed & made.parameters.keys() else value
+            if made.changed & made.parameters.keys():
+                return self.kept(value)
+            return value
         sources = frozenset[str]().union(*(values[i].sources for i in made.returned))
         read = self.origins(" ".join(arguments))
         kinds = made.results
@@ -758,7 +777,9 @@ class Function:
         for kind, target in zip(kinds, targets, strict=True):
             place = self.receiver(target, kind, read) or self.temporary(kind)
             arguments.append(place.pointer or f"&{place.text}")
-            items.append(place._replace(sources=sources if kind.shape else frozenset()))
+            if kind.shape:
+                place = place._replace(sources=sources)
+            items.append(place)
         if alone:
             arguments += [f"{items[0].pointer} + {i}" for i in range(1, items[0].kind.shape[0])]
         self.lines.append(f"{name}({', '.join(arguments)});")
@@ -784,8 +805,8 @@ class Function:
                     raise refuse(node, "a part of a matrix, which a function changes,")
             elif values[i].sources:
                 raise refuse(node, "a result that shares its numbers, which a function changes,")
-            others = values[:i] + values[i + 1 :]
-            if any(values[i].sources & other.sources for other in others):
+            others = map(operator.attrgetter("sources"), values[:i] + values[i + 1 :])
+            if values[i].sources & frozenset().union(*others):
                 raise refuse(call, "a call that gets an array twice and changes it")
             within = set(ast.walk(call))
             targets = getattr(self.line, "targets", [])
@@ -828,7 +849,7 @@ class Function:
 
         Calls with numbers are done once, before the loop over the elements.
         """
-        values = [self.number(part) for part in parts]
+        values = [*map(self.number, parts)]
         shapes = {value.kind.shape for value in values} - {()}
         if any(value.kind.fields is not None for value in values):
             raise refuse(node, "a tuple as a number")
@@ -853,12 +874,12 @@ class Function:
             return value.text
         return f"{value.within(UNARY)} != 0"
 
-    def constant(self, node: ast.expr) -> Any:
+    def constant(self, node: ast.expr | None) -> Any:
         """Return the literal number that an expression is, or None."""
         match node:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                value = self.constant(operand)
-                return None if value is None else -value
+                if (value := self.constant(operand)) is not None:
+                    return -value
             case ast.Constant(value=int() | float()):
                 return node.value
             case ast.Name(id=name):
@@ -877,8 +898,10 @@ class Function:
                 return None
             case ast.Name() if isinstance(number := self.resolve(node), int):
                 return number
-        constant = None if node is None else self.constant(node)
-        return constant if isinstance(constant, int) else None
+        constant = self.constant(node)
+        if isinstance(constant, int):
+            return constant
+        return None
 
     def natural(self, node: ast.expr) -> bool:
         """Return whether an index is certainly not negative."""
@@ -901,7 +924,9 @@ class Function:
 
     def calls_python(self, node: ast.expr) -> bool:
         """Return whether an expression is the call of a function that is translated itself."""
-        function = self.resolve(node.func) if isinstance(node, ast.Call) else None
+        if not isinstance(node, ast.Call):
+            return False
+        function = self.resolve(node.func)
         return in_python(function) is not None and function not in REQUESTS
 
     def callee(self, node: ast.Call) -> Any:
@@ -939,17 +964,22 @@ class Function:
             fields = CHANNEL_FIELDS.get(component.kind, Measurement._fields)
             if joints:
                 fields = ("t", "dt", "model", *joint_law.ARRAYS)
-            check("reading" if component.kind == "estimator" else "measurement", name, fields)
+            check("measurement", name, fields)
             place = f"{owner.text}->{name}"
-            shape = (joints, joints) if name == "M" else (joints,)
+            shape = self.program.vector
+            if name == "M":
+                shape *= 2
             if joints and name in joint_law.ARRAYS:
                 return array_at(place, Kind("real", shape), sources=sources)
         elif owner.kind.of == "gains":
             check("gain", name, component.gains)
-            offset = f"GAIN_{plain(name)} * {JOINTS}" if joints else f"GAIN_{plain(name)}"
+            offset = f"GAIN_{plain(name)}"
+            if joints:
+                offset += f" * {JOINTS}"
             place = f"{owner.text}[{offset}]"
             if joints and name not in component.shared:
-                return array_at(owner.text, Kind("real", (joints,)), offset, sources)
+                kind = Kind("real", self.program.vector)
+                return array_at(owner.text, kind, offset, sources)
         elif owner.kind.fields:
             check("field", name, owner.kind.fields)
             return owner.elements()[owner.kind.fields.index(name)]
@@ -960,7 +990,9 @@ class Function:
     def _subscript(self, node: ast.Subscript) -> Value:
         owner = self.value(node.value)
         shape = owner.kind.shape
-        places = [*node.slice.elts] if isinstance(node.slice, ast.Tuple) else [node.slice]
+        places = [node.slice]
+        if isinstance(node.slice, ast.Tuple):
+            places = list(node.slice.elts)
         if not shape or len(places) > len(shape):
             raise refuse(node, "an element")
         places += [ast.Slice()] * (len(shape) - len(places))
@@ -972,7 +1004,9 @@ class Function:
         memory = owner.kind.of == "memory"
         strides = [owner.kind.stride]
         if len(shape) == 2:
-            strides = [SLOTS if memory else str(shape[1]), "1"]
+            strides = [str(shape[1]), "1"]
+            if memory:
+                strides[0] = SLOTS
         tokens = (ROW, COLUMN)[: len(shape)]
         made = owner
         left = list[int]()
@@ -995,8 +1029,8 @@ class Function:
         if not owner.pointer or (len(left) == 2 and (memory or left[1] != shape[1])):
             made = made._replace(pointer="")  # its numbers do not lie in a row
             stride = "1"
-        fields = owner.kind.fields if owner.kind.fields is None else ()
-        return made._replace(kind=Kind(owner.kind.number.of, tuple(left), fields, stride))
+        kind = Kind(owner.kind.number.of, tuple(left), owner.kind.fields and (), stride)
+        return made._replace(kind=kind)
 
     def part(self, node: ast.Subscript, place: ast.Slice, size: int, slots: bool) -> range:
         """Return the indices of a slice of a dimension. `slots`: whether it is the memory's."""
@@ -1015,12 +1049,14 @@ class Function:
     def index(self, node: ast.Subscript, place: ast.expr, size: int, slots: bool) -> Value:
         """Return the index of an element. Python counts a negative one from the end."""
         constant = self.constant(place)
-        if slots:
-            self.program.claim(node, size if constant is None or constant < 0 else constant + 1)
         if isinstance(constant, int):
+            if slots:
+                self.program.claim(node, max(constant, constant % size) + 1)
             if not -size <= constant < size:
                 raise refuse(node, f"an index outside {-size} to {size - 1}")
             return Value(str(constant % size), INT)
+        if slots:
+            self.program.claim(node, size)
         value = self.number(place)
         if value.kind != INT:
             raise refuse(node, "an index that is not an integer")
@@ -1034,26 +1070,26 @@ class Function:
         (value,), _ = self.matched(node, [node.operand])
         if not isinstance(node.op, ast.USub):
             raise refuse(node, "the operator")
-        of = "int" if value.kind.of == "bool" else value.kind.of
-        return Value(f"-{value.within(ATOM)}", Kind(of, value.kind.shape), UNARY)
+        kind = value.kind._replace(of=value.kind.of.replace("bool", "int"))
+        return Value(f"-{value.within(ATOM)}", kind, UNARY)
 
     def _binop(self, node: ast.BinOp) -> Value:
-        operator = type(node.op)
-        if operator is ast.Pow:
+        sort = type(node.op)
+        if sort is ast.Pow:
             return self.power(node)
-        if operator is ast.MatMult:
+        if sort is ast.MatMult:
             raise refuse(node, "the operator @")
         (left, right), shape = self.matched(node, [node.left, node.right])
         whole = left.kind.of in WHOLE and right.kind.of in WHOLE
-        if operator in BIT_OPERATORS and whole:
-            text = f"{left.within(ATOM)} {BIT_OPERATORS[operator]} {right.within(ATOM)}"
+        if sort in BIT_OPERATORS and whole:
+            text = f"{left.within(ATOM)} {BIT_OPERATORS[sort]} {right.within(ATOM)}"
             return Value(text, Kind("int", shape), LOOSE)
-        if operator is ast.Mod and whole:
+        if sort is ast.Mod and whole:
             text = f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})"
             return Value(text, Kind("int", shape))
-        if operator not in OPERATORS:
-            raise refuse(node, f"the operator {operator.__name__}")
-        sign, level = OPERATORS[operator]
+        if sort not in OPERATORS:
+            raise refuse(node, f"the operator {sort.__name__}")
+        sign, level = OPERATORS[sort]
         first = left.within(level)
         of = widest(left.kind.of, right.kind.of)
         if whole:
@@ -1100,14 +1136,16 @@ class Function:
             if value.kind != BOOL:
                 raise refuse(node, "`and` or `or` of anything but two comparisons")
             self.lines += lines
-            nested = "&&" in value.text or "||" in value.text
-            parts.append(f"({value.text})" if nested else value.text)
-        sign = " && " if isinstance(node.op, ast.And) else " || "
+            text = value.text
+            if "&&" in text or "||" in text:
+                text = f"({text})"
+            parts.append(text)
+        sign = {ast.And: " && ", ast.Or: " || "}[type(node.op)]
         return Value(sign.join(parts), BOOL, LOOSE)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
         text = self.truth(node.test)
-        test = Value(text, BOOL, LOOSE if " " in text else ATOM)
+        test = Value(text, BOOL, LOOSE)
         yes, first = self.captured(self.number, node.body)
         no, second = self.captured(self.number, node.orelse)
         is_tuple = yes.kind.fields is not None
@@ -1127,7 +1165,7 @@ class Function:
         return items[0]._replace(sources=yes.sources | no.sources)
 
     def _tuple(self, node: ast.Tuple) -> Value:
-        return gathered([self.number(part) for part in node.elts])
+        return gathered([*map(self.number, node.elts)])
 
     def _call(self, node: ast.Call) -> Value:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
@@ -1140,9 +1178,9 @@ class Function:
         elif function in REQUESTS:
             made = self.requested(function, node)
         elif hasattr(function, "_fields"):
-            made = gathered([self.number(part) for part in node.args], function._fields)
+            made = gathered([*map(self.number, node.args)], function._fields)
         elif function is np.array and isinstance(node.args[0], ast.List | ast.Tuple):
-            made = gathered([self.number(part) for part in node.args[0].elts])
+            made = gathered([*map(self.number, node.args[0].elts)])
             made = self.kept(made._replace(kind=made.kind._replace(fields=None)))
         elif self.calls_python(node):
             made = self.results_of(node)
@@ -1153,7 +1191,7 @@ class Function:
     def filled(self, function: Any, node: ast.Call) -> Value:
         """Return an array that is filled with one number."""
         (size,) = node.args
-        parts = size.elts if isinstance(size, ast.Tuple) else [size]
+        parts = getattr(size, "elts", [size])
         shape = tuple(self.whole(part) or 0 for part in parts)
         if 0 in shape:
             raise refuse(node, "a length that is not known before the law runs")
@@ -1163,7 +1201,7 @@ class Function:
     def requested(self, function: Any, node: ast.Call) -> Value:
         """Translate coriolis and jacobian, which the caller of the law provides."""
         name, rows = REQUESTS[function]
-        y, *rest = [self.argument(part) for part in node.args]
+        y, *rest = map(self.argument, node.args)
         array = self.temporary(Kind("real", (*rows, self.program.joints)))
         pointers = [value.pointer for value in (*rest, array)]
         self.lines.append(f"{y.text}->{name}({', '.join([f'{y.text}->plant', *pointers])});")
@@ -1183,7 +1221,7 @@ class Function:
             made = values[0]
             for value in values[1:]:
                 of = widest(made.kind.of, value.kind.of)
-                helper = self.program.helper("minimum" if function is min else "maximum", of)
+                helper = self.program.helper(f"{name}imum", of)
                 made = Value(f"{helper}({made.text}, {value.text})", Kind(of))
         elif function in CASTS and len(values) == 1:
             kind = Kind(CASTS[function])
@@ -1198,17 +1236,18 @@ class Function:
         elif ELEMENTWISE[function] in HELPERS or (numbers[0] in WHOLE and "abs" in name):
             of = functools.reduce(widest, numbers)
             helper = self.program.helper(ELEMENTWISE[function].replace("fabs", "absolute"), of)
-            made = Value(f"{helper}({', '.join(value.text for value in values)})", Kind(of, shape))
+            made = Value(f"{helper}({joined(values)})", Kind(of, shape))
         else:
             made = self.math(ELEMENTWISE[function], values, shape)
         return made
 
     def math(self, name: str, values: Sequence[Value], shape: tuple[int, ...] = ()) -> Value:
         """Translate a call of a function of math.h, in the precision of its arguments."""
-        single = all(value.kind.of == "single" for value in values)
-        suffix = "f" if single or self.program.single else ""
-        arguments = ", ".join(value.text for value in values)
-        return Value(f"{name}{suffix}({arguments})", Kind("single" if single else "real", shape))
+        single = {value.kind.of for value in values} == {"single"}
+        if single or self.program.single:
+            name += "f"
+        kind = Kind("single" if single else "real", shape)
+        return Value(f"{name}({joined(values)})", kind)
 
 
 # reading Python
@@ -1244,15 +1283,18 @@ def in_python(function: Any) -> FunctionType | None:
     return written
 
 
+def inside(nodes: Iterable[ast.AST]) -> list[ast.AST]:
+    """Return some nodes with all that they contain."""
+    return [*itertools.chain.from_iterable(map(ast.walk, nodes))]
+
+
 def assigned(node: ast.AST) -> set[str]:
     """Return the names that an assignment or a loop binds; none of other code."""
-    targets = getattr(node, "targets", None) or [getattr(node, "target", None)]
-    names = set()
-    for target in targets:
-        for part in ast.walk(target) if target else ():
-            if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store):
-                names.add(part.id)
-    return names
+    targets = getattr(node, "targets", [])
+    if hasattr(node, "target"):
+        targets = [node.target]
+    names = [part for part in inside(targets) if isinstance(part, ast.Name)]
+    return {name.id for name in names if isinstance(name.ctx, ast.Store)}
 
 
 def returns(body: Sequence[ast.stmt]) -> bool:
@@ -1268,7 +1310,7 @@ def root(node: ast.AST) -> str:
     """Return the name of the array whose elements an expression names, or an empty text."""
     while isinstance(node, ast.Subscript):
         node = node.value
-    return node.id if isinstance(node, ast.Name) else ""
+    return getattr(node, "id", "")
 
 
 def check(what: str, name: str, names: Iterable[str]) -> None:
@@ -1282,8 +1324,9 @@ NEEDS_C = " has no translation into C: write it with arithmetic, if, for and mat
 
 def refuse(node: ast.AST | None, what: str) -> Untranslatable:
     """Return the error for a piece of Python without translation."""
-    code = "" if node is None else f" ({shown(ast.unparse(node))[1:-1]})"
-    return Untranslatable(f"{what}{code}{NEEDS_C}")
+    if node is not None:
+        what += f" ({shown(ast.unparse(node))[1:-1]})"
+    return Untranslatable(what + NEEDS_C)
 
 
 # writing C
@@ -1291,9 +1334,7 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
 
 def gathered(items: Sequence[Value], fields: tuple[str, ...] = ()) -> Value:
     """Return a tuple of values."""
-    of = items[0].kind.of if items else "bool"
-    for item in items[1:]:
-        of = widest(of, item.kind.of)
+    of = functools.reduce(widest, [item.kind.of for item in items], "bool")
     return Value("", Kind(of, (len(items),), fields), items=tuple(items))
 
 
@@ -1312,7 +1353,7 @@ def widest(first: str, second: str) -> str:
 
     An integer and a single give a real.
     """
-    pair = [WIDTHS.index("real" if of == "memory" else of) for of in (first, second)]
+    pair = [WIDTHS.index(Kind(of).number.of) for of in (first, second)]
     if max(pair) == WIDTHS.index("single") != min(pair):
         return "real"
     return WIDTHS[max(pair)]
@@ -1322,7 +1363,9 @@ def wider(first: Kind, second: Kind) -> Kind:
     """Return the kind of a name, or of a result, that has one kind and then another."""
     if first.shape != second.shape:
         raise refuse(None, "a name for a number and an array, or for arrays of two shapes,")
-    fields = first.fields if first.fields == second.fields else ()
+    fields = first.fields
+    if fields != second.fields:
+        fields = ()
     return Kind(widest(first.of, second.of), first.shape, fields)
 
 
@@ -1333,10 +1376,12 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
     if isinstance(value, int | np.integer):
         if abs(value) >= 2**31:
             raise refuse(node, f"the whole number {value}, beyond 32 bits,")
-        return Value(str(int(value)), INT, UNARY if value < 0 else ATOM)
+        return signed(str(int(value)), INT)
     if not isinstance(value, float | np.floating):
         raise refuse(node, f"the value {shown(value)}")
-    kind = Kind("single" if isinstance(value, np.float32) else "real")
+    kind = REAL
+    if isinstance(value, np.float32):
+        kind = Kind("single")
     text = repr(float(value))
     if math.isnan(value):
         text = "NAN"
@@ -1344,7 +1389,14 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
         text = "INFINITY" if value > 0.0 else "-INFINITY"
     elif single or kind.of == "single":
         text += "f"
-    return Value(text, kind, UNARY if text.startswith("-") else ATOM)
+    return signed(text, kind)
+
+
+def signed(text: str, kind: Kind) -> Value:
+    """Return a number that may have a sign."""
+    if text.startswith("-"):
+        return Value(text, kind, UNARY)
+    return Value(text, kind)
 
 
 def indexed(array: Value, token: str, index: Value, start: Value, stride: str) -> Value:
@@ -1353,20 +1405,29 @@ def indexed(array: Value, token: str, index: Value, start: Value, stride: str) -
     for found, rest in zip(after[::2], after[1::2], strict=True):
         text += f"[{index.text}]" if found[0] == "[" else index.within(PRODUCT)
         text += rest
-    offset = start.within(SUM) if stride == "1" else f"{start.within(PRODUCT)} * {stride}"
-    pointer = array.pointer if start.text == "0" else f"{array.pointer} + {offset}"
-    return array._replace(text=text, pointer=pointer)
+    offset = f" + {start.within(PRODUCT)} * {stride}"
+    if stride == "1":
+        offset = f" + {start.within(SUM)}"
+    if start.text == "0":
+        offset = ""
+    return array._replace(text=text, pointer=array.pointer + offset)
 
 
 def declaration(name: str, kind: Kind) -> str:
     """Return the line that declares a variable."""
-    size = f"[{math.prod(kind.shape)}]" if kind.shape else " = 0"
-    return f"{TYPES[kind.of]} {name}{size};"
+    if kind.shape:
+        return f"{TYPES[kind.of]} {name}[{math.prod(kind.shape)}];"
+    return f"{TYPES[kind.of]} {name} = 0;"
 
 
 def plain(name: str) -> str:
     """Return a name in ASCII letters, which every C99 compiler accepts."""
     return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
+
+
+def joined(values: Iterable[Value]) -> str:
+    """Return the texts of values, with commas."""
+    return ", ".join(value.text for value in values)
 
 
 def words(text: str) -> set[str]:
