@@ -72,7 +72,7 @@ def export(
 
     - OUT.c: C99 without dependencies, for firmware or for smc.law_from. The C is translated from
       the law's Python, operation by operation. It keeps its state in the array memory[] that its
-      caller passes, and allocates nothing. The comment at its top says how many bytes of code and
+      caller passes, and allocates nothing. The comment at its top says how many bytes of
       state it takes. In double precision it gives the trace of the library's own law; compile it
       with -ffp-contract=off to get the same bits.
     - OUT.fmu: FMI 3.0 for Co-Simulation, for Simulink, Modelica and other tools, with C source code

@@ -5,20 +5,16 @@ compiled law bit for bit if both use the same C library. A division by zero rais
 gives inf or NaN, which ends a run too.
 """
 
-import functools
 import inspect
 import math
-import platform
 import re
 import textwrap
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
-from smc_mujoco.common.files import no_room
 from smc_mujoco.common.jit import AtAddress
-from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
-from smc_mujoco.control.law import FREE_BODY, Law, catalogue, known_laws
+from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
 from smc_mujoco.exchange.c import body, build
 from smc_mujoco.exchange.c.translate import (
     JOINTS,
@@ -38,7 +34,6 @@ from smc_mujoco.simulation.scenario import Scenario
 NUMBER_BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
 Q15_LAW = "observer_free_q15"
 MAX_JOINTS = 100
-SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of the code is measured
 
 
 def law_to_c(
@@ -79,25 +74,16 @@ def law_to_c(
         code = _fixed_point(law)
     else:
         slots, code = translated(law, numbers == "float", joints, plant)
-    return with_head(law, numbers, slots, code, joints, measured=True)
+    return with_head(law, numbers, slots, code, joints)
 
 
-def with_head(
-    law: Component, numbers: str, slots: int, code: str, joints: int, *, measured: bool
-) -> str:
-    """Return the file of a law that is translated.
-
-    If `measured`, its head has the size that a compiler gives it.
-    """
-    if numbers == "float":
-        real = ["#define SMC_REAL float"]
-    else:
-        real = []
+def with_head(law: Component, numbers: str, slots: int, code: str, joints: int) -> str:
+    """Return the file of a law that is translated."""
     facts = _facts(law, slots, joints, numbers == "float")
-    body = "\n".join([*includes(facts + code), "", *real, facts, code, ""])
-    return (
-        f"{_head(law, numbers, slots, joints, code, _measured(body) if measured else '')}\n{body}"
-    )
+    lines = [_head(law, numbers, slots, joints, code), *includes(facts + code), ""]
+    if numbers == "float":
+        lines.append("#define SMC_REAL float")
+    return "\n".join([*lines, facts, code, ""])
 
 
 def writable(law: Component | Template | str) -> Component:
@@ -129,7 +115,8 @@ def number_of_joints(law: Component, joints: int | None) -> int:
     if law.plants == (FREE_BODY,):
         if joints not in (None, len(PLACES)):
             raise ScenarioError(
-                f"law {law.name!r} is of a free body, of {len(PLACES)} joints: leave joints={shown(joints)} out"
+                f"law {law.name!r} is of a free body, of {len(PLACES)} joints: leave "
+                f"joints={shown(joints)} out"
             )
         joints = len(PLACES)
     if joints is None and not several:
@@ -142,8 +129,8 @@ def number_of_joints(law: Component, joints: int | None) -> int:
     for name, values in several.items():
         if values != count:
             raise ScenarioError(
-                f"gain {name} of {law.name} has {values} values, {gain_text(law.gains[name])}, for {count} joints: "
-                f"give one number, or {count}"
+                f"gain {name} of {law.name} has {values} values, {gain_text(law.gains[name])}, for "
+                f"{count} joints: give one number, or {count}"
             )
     return count
 
@@ -156,19 +143,20 @@ def translated(
 
     Of a law of a free body, or for a plant that is one, it has `body.functions`, too.
     """
-    if not (plant is not None and plant.pose):
+    if plant is not None and not plant.pose:
         plant = None
-    of_body = plant is not None or (
-        joints and isinstance(component, Law) and component.plants == (FREE_BODY,)
-    )
+    others = {}
+    if plant is not None or (joints and getattr(component, "plants", ()) == (FREE_BODY,)):
+        others = body.functions(plant)
     try:
-        slots, code = translate(component, single, joints, body.functions(plant) if of_body else {})
+        slots, code = translate(component, single, joints, others)
     except Untranslatable as error:
         raise ScenarioError(
             f"{component.kind} {component.name!r} cannot be written in C: {error}"
         ) from None
     if plant is not None:
-        code = f"enum {{ SMC_ACTUATORS = {len(mixer(plant))} }}; /* whose controls smc_actuators sets */\n\n{code}"
+        count = f"enum {{ SMC_ACTUATORS = {len(mixer(plant))} }};"
+        code = f"{count} /* whose controls smc_actuators sets */\n\n{code}"
     return slots, code
 
 
@@ -182,7 +170,7 @@ def includes(code: str) -> list[str]:
 
 
 def gain_names(component: Component) -> list[str]:
-    """Return the line that names the elements of gains[], or nothing for a component without gains."""
+    """Return the line that names the elements of gains[]; nothing without gains."""
     names = ", ".join(f"GAIN_{plain(name)}" for name in component.gains)
     return [f"enum {{ {names} }};"] if names else []
 
@@ -195,7 +183,8 @@ def _in_q15(law: Component) -> Component:
         law = catalogue()[Q15_LAW].bind(law.gains, warn=True)
     if law.function is not catalogue()[Q15_LAW].function:
         raise ScenarioError(
-            f"law {law.name!r} has no Q15 form: give observer_free or {Q15_LAW}, or write double or float numbers"
+            f"law {law.name!r} has no Q15 form: give observer_free or {Q15_LAW}, or write double or "
+            "float numbers"
         )
     return law
 
@@ -218,35 +207,29 @@ def _fixed_point(law: Component) -> str:
 
 def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
-    texts = {}
-    for name, v in law.gains.items():
-        texts[name] = " ".join(map(repr, v if isinstance(v, tuple) else (v,)))
-    defaults = ",".join(f"{plain(name)}={text}" for name, text in texts.items())
+    texts = []
     values = []
-    for value in law.gains.values():
-        for i in range(max(joints, 1)):
-            values.append(_literal(gain_at(value, i), single))
-    lines = [
-        *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
-        build.HEADER.read_text(encoding="utf-8"),
-        *gain_names(law),
-        f'const char smc_law_gains[] = "{defaults}";',
-        *(
-            textwrap.wrap(f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};", 112)
-            if values
-            else []
-        ),
-        *(
-            [f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";']
-            if joints
-            else []
-        ),
-        f"const int smc_law_memory = {slots};",
-        "const int smc_law_real = sizeof(smc_real);",
-        *([] if joints else [f"const int smc_law_degree = {law.relative_degree};"]),
-        f"const int smc_law_modelled = {int(law.requires_model)};",
-        "",
-    ]
+    for name, value in law.gains.items():
+        numbers = [gain_at(value, i) for i in range(max(joints, 1))]
+        values += [_literal(number, single) for number in numbers]
+        if not isinstance(value, tuple):
+            numbers = numbers[:1]
+        texts.append(f"{plain(name)}={' '.join(map(repr, numbers))}")
+    lines = []
+    if joints:
+        lines += [f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"]
+    lines += [build.HEADER.read_text(encoding="utf-8"), *gain_names(law)]
+    lines.append(f'const char smc_law_gains[] = "{",".join(texts)}";')
+    if values:
+        defaults = f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};"
+        lines += textwrap.wrap(defaults, 112)
+    if joints:
+        lines.append(f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";')
+    lines.append(f"const int smc_law_memory = {slots};")
+    lines.append("const int smc_law_real = sizeof(smc_real);")
+    if not joints:
+        lines.append(f"const int smc_law_degree = {law.relative_degree};")
+    lines += [f"const int smc_law_modelled = {int(law.requires_model)};", ""]
     return "\n".join(lines)
 
 
@@ -257,37 +240,31 @@ def _literal(value: float, single: bool) -> str:
     return f"(float){value!r}" if single else repr(value)
 
 
-def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size: str) -> str:
+def _head(law: Component, numbers: str, slots: int, joints: int, code: str) -> str:
     """Return the comment at the top: formula, source, gains, sizes."""
     template = known_laws().get(law.name)
-    ours = template is not None and template.function is law.function
-    if template is not None and ours:
+    doc = inspect.cleandoc(law.function.__doc__ or "")
+    if template is not None and template.function is law.function:
         doc = template.doc
-    else:
-        doc = inspect.cleandoc(law.function.__doc__ or "")
-    gains = ", ".join(f"{name} = {gain_text(value)}" for name, value in law.gains.items()) or "none"
+    gains = [f"{name} = {gain_text(value)}" for name, value in law.gains.items()]
+    order = "gains[] in this order"
+    many = ""
+    unit = "channel"
     if joints:
+        order += f", {joints} numbers each"
         many = f" of {joints} joints"
         unit = "joint"
-    else:
-        many = ""
-        unit = "channel"
+    words = {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}
+    memory = f"memory[{slots * max(joints, 1)}]; no static data but constants, no malloc"
     facts = {
-        "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),
-        "numbers": {
-            "q15": "words of 16 bits, sums of 32, and double where they meet the plant"
-        }.get(numbers, numbers),
-        "state": f"{slots * NUMBER_BYTES[numbers]} bytes a {unit}, memory[{slots * max(joints, 1)}]; no static data "
-        "but constants, no malloc",
-        **(
-            {"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))}
-            if joints
-            else {}
-        ),
-        **({"code": size} if size else {}),
+        "gains": f"{', '.join(gains) or 'none'}; {order}",
+        "numbers": words.get(numbers, numbers),
+        "state": f"{slots * NUMBER_BYTES[numbers]} bytes a {unit}, {memory}",
         "licence": "use without restriction, without warranty",
         "build": "cc -std=c99 -O2 -ffp-contract=off, and -lm",
     }
+    if joints:
+        facts["reads"] = ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))
     title = f"{law.name}: a control law{many} in C99, written out by smc_mujoco {__version__}."
     lines = [title, "", *doc.splitlines(), ""]
     for name, fact in facts.items():
@@ -296,36 +273,3 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
         )
     text = "\n".join(f" * {line}".rstrip() for line in lines)[2:]
     return f"/*{text.replace('*/', '* /').replace('/*', '/ *')}\n */"
-
-
-@functools.cache
-def _tools(command: tuple[str, ...]) -> tuple[str, str]:
-    """Return a compiler's version, and the program that prints the sizes of an object file."""
-    version = timed([*command, "-dumpversion"], 60.0).stdout.strip()
-    return version, timed([*command, "-print-prog-name=size"], 60.0).stdout.strip() or "size"
-
-
-def _measured(code: str) -> str:
-    """Return the bytes of code and of constants in words, or why they are not measured."""
-    source = build.fresh(".c")
-    target = build.fresh(".o")
-    command = build.compiler()
-    with no_room():
-        source.write_text(code, encoding="utf-8")
-    try:
-        done = build.run_compiler(
-            [*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0
-        )
-        version, tool = _tools(tuple(command))
-        table = timed([tool, "-A", str(target)], 60.0).stdout
-    except (OSError, TimedOut):
-        return "not measured: there is no compiler here"
-    sections = []
-    for name, n in re.findall(r"^\.(text|rodata)\S*\s+(\d+)", table, re.MULTILINE):
-        sections.append((name, int(n)))
-    if done.returncode or not sections:
-        return "not measured: the compiler here does not say"
-    text, constants = (
-        sum(n for name, n in sections if name == kind) for kind in ("text", "rodata")
-    )
-    return f"{text} bytes, and {constants} of constants ({command[0]} {version} -Os, {platform.machine()})"

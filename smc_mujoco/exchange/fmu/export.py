@@ -223,7 +223,7 @@ def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]
             v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None)
             for v in listed
         ]
-    law = with_head(exported.law, "double", *exported.code["law"], exported.joints, measured=False)
+    law = with_head(exported.law, "double", *exported.code["law"], exported.joints)
     files = {
         "controller.c": contents.source(
             listed, contents.helpers(exported), contents.body(listed, exported)

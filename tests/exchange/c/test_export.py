@@ -20,7 +20,7 @@ from smc_mujoco.cli import main as cli
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
-from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.exchange.c import build, sandbox
 from smc_mujoco.exchange.c.load import CLaw
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.python_functions import gains_of
@@ -64,7 +64,7 @@ def compiled(folder):
         path.write_text(smc.exchange.law_to_c(name))
         return smc.exchange.law_from_c(path, flags=STRICT, plants=LAWS[name].plants, timeout=60.0)
 
-    with unmeasured(), ThreadPoolExecutor(2) as pool:
+    with untried(), ThreadPoolExecutor(2) as pool:
         made = dict(zip(LAWS, pool.map(make, LAWS), strict=True))
         for template in LAWS.values():
             cfunctions.compile_component(template())  # compiles, while the others do
@@ -93,12 +93,9 @@ def traces(compiled):
 
 
 @contextlib.contextmanager
-def unmeasured():
-    """Files without the size of their code, and loaded untried, which takes a process or two for
-    each.
-    """
+def untried():
+    """Files that are loaded untried: a trial takes a process for each."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(export, "_measured", lambda code: "not measured")
         patch.setattr(
             sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
         )
@@ -190,7 +187,7 @@ def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, na
 @pytest.mark.slow
 def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
     paths = [folder / f"{name}-single.c" for name in LAWS]
-    with unmeasured(), ThreadPoolExecutor(2) as pool:
+    with untried(), ThreadPoolExecutor(2) as pool:
         for path, text in zip(
             paths, pool.map(lambda name: smc.exchange.law_to_c(name, "float"), LAWS), strict=True
         ):
@@ -420,7 +417,6 @@ def test_the_file_says_formula_source_gains_and_sizes(tmp_path):
     state = "4 bytes a channel, memory[1]"
     for words in ("u = -k1 [s]^(1/2) + w", "A. Levant", gains, state):
         assert words in head
-    assert re.search(r"code     [1-9]\d\d bytes, and \d+ of constants", head)
     assert 'const char smc_law_gains[] = "k1=5.0,k2=4.4,c=1.5,w_max=inf";' in rest
     assert head.count("licence  use without restriction, without warranty\n") == 1
     assert "malloc" not in rest
@@ -452,14 +448,6 @@ def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
     assert [*(kind * len(values)).in_dll(library, "smc_law_defaults")] == [
         kind(one).value for one in values
     ]
-
-
-def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
-    with_one = smc.exchange.law_to_c("twisting")
-    monkeypatch.setenv("CC", "nocc")
-    without = smc.exchange.law_to_c("twisting")
-    assert "not measured: there is no compiler here" in without
-    assert without.partition("*/")[2] == with_one.partition("*/")[2]
 
 
 def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):

@@ -11,7 +11,7 @@ from helpers.flights import MEASUREMENT, recorded, scenarios
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.control.law import FREE_BODY, joint_catalogue
-from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.exchange.c import build, sandbox
 from smc_mujoco.mechanisms.rotation import quaternion, rotation_vector
 
 pytestmark = needs_compiler
@@ -52,7 +52,6 @@ def traces(tmp_path_factory):
         return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
-        patch.setattr(export, "_measured", lambda code: "not measured")
         patch.setattr(
             sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
         )

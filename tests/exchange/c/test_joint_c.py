@@ -28,7 +28,7 @@ from smc_mujoco.control.joint_law import (
     torque,
 )
 from smc_mujoco.control.units import Gain
-from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.exchange.c import build, sandbox
 from smc_mujoco.simulation import python_functions
 from smc_mujoco.simulation.python_functions import gains_of
 
@@ -225,7 +225,6 @@ def compiled(folder):
         return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
-        patch.setattr(export, "_measured", lambda code: "not measured")
         patch.setattr(
             sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
         )

@@ -24,7 +24,6 @@ import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
 from smc_mujoco.control.law import catalogue  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
-from smc_mujoco.exchange.c import export as c_export  # noqa: E402
 
 pytestmark = needs_compiler
 
@@ -47,14 +46,6 @@ COMBINED = [
     ("prescribed_time", None, "kalman"),
     ("pid", None, "measured"),
 ]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def unmeasured():
-    """Without the size of each law's code, which takes a run of the compiler."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(c_export, "_measured", lambda code: "not measured")
-        yield
 
 
 @pytest.fixture(scope="module")
