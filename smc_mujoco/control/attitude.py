@@ -149,7 +149,9 @@ def steer(y, v, stiffness, damping, memory):
     F = np.zeros(3)
     dF = np.zeros(3)
     if memory[0, 1] == 0.0:
-        memory[:3, 0], memory[3:, 0], memory[0, 1] = y.de[:3], y.ddr[:3], 1.0
+        memory[:3, 0] = y.de[:3]
+        memory[3:, 0] = y.ddr[:3]
+        memory[0, 1] = 1.0
     for i in range(3):
         F[i] = m * (y.ddr[i] + v[i]) + y.h[i]
         change = BANDWIDTH * (y.de[i] - memory[i, 0]) / (1.0 + y.dt * BANDWIDTH)

@@ -192,7 +192,8 @@ class TunedGains:
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
     """Return the gains of a law on a plant from a tuned set, and the search behind them."""
     find("set of tuned gains", gains, OBJECTIVES)
-    plant, name = as_plant(plant), ALIASES.get(name, name)
+    plant = as_plant(plant)
+    name = ALIASES.get(name, name)
     if (stored := _stored(plant.name, name, gains)) is not None:
         return stored
     example = next(iter(find_law(name).gains), "k")

@@ -41,9 +41,11 @@ def deviation(plant: Plant | str, mechanism: str, reach: Positive | None = None)
     error = size = 0.0
     for x, v in _states(plant.n, reach):
         f = np.array([plant.nominal(x, v, i, values)[0] for i in range(plant.n)])
-        data.qpos[:], data.qvel[:] = x, v
+        data.qpos[:] = x
+        data.qvel[:] = v
         mujoco.mj_forward(model, data)
-        error, size = max(error, np.abs(data.qacc - f).max()), max(size, np.abs(f).max())
+        error = max(error, np.abs(data.qacc - f).max())
+        size = max(size, np.abs(f).max())
     return error / size
 
 

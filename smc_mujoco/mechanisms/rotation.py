@@ -101,7 +101,9 @@ def put_attitude_error(x, v, r, dr, e, de):
     e[3], e[4], e[5] = rotation_vector(error[0], error[1], error[2], error[3])
     own = rate(r[3], r[4], r[5], dr[3], dr[4], dr[5])
     wx, wy, wz = turned_back(error, own[0], own[1], own[2])
-    de[3], de[4], de[5] = v[3] - wx, v[4] - wy, v[5] - wz
+    de[3] = v[3] - wx
+    de[4] = v[4] - wy
+    de[5] = v[5] - wz
 
 
 @njit(error_model="numpy")

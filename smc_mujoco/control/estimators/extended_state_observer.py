@@ -24,9 +24,11 @@ from smc_mujoco.control.units import RATE, Gain
 
 @estimator_function(gains={"w": Gain(100.0, RATE, positive=True)}, memory=4)
 def extended_state_observer(y, gains, memory):
-    h, b = y.dt, math.exp(-gains.w * y.dt)
+    h = y.dt
+    b = math.exp(-gains.w * y.dt)
     if memory[0] == 0.0:
-        memory[0], memory[1] = 1.0, y.x
+        memory[0] = 1.0
+        memory[1] = y.x
     z3 = memory[3]
     z2 = memory[2] + h * z3
     z1 = memory[1] + h * memory[2] + h * h / 2.0 * z3

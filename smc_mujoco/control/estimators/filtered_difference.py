@@ -16,5 +16,7 @@ def filtered_difference(y, gains, memory):
     if started:
         a = gains.tau / (gains.tau + y.dt)
         v = a * v + (1.0 - a) * (y.x - x_) / y.dt
-    memory[0], memory[1], memory[2] = 1.0, y.x, v
+    memory[0] = 1.0
+    memory[1] = y.x
+    memory[2] = v
     return v

@@ -20,10 +20,14 @@ from smc_mujoco.control.units import RATE, Gain
 
 @estimator_function(gains={"w": Gain(100.0, RATE, positive=True)}, memory=3)
 def high_gain(y, gains, memory):
-    h, b = y.dt, math.exp(-gains.w * y.dt)
+    h = y.dt
+    b = math.exp(-gains.w * y.dt)
     if memory[0] == 0.0:
-        memory[0], memory[1] = 1.0, y.x
-    z1, z2 = memory[1] + h * memory[2], memory[2]
+        memory[0] = 1.0
+        memory[1] = y.x
+    z1 = memory[1] + h * memory[2]
+    z2 = memory[2]
     miss = y.x - z1
-    memory[1], memory[2] = z1 + (1.0 - b * b) * miss, z2 + (1.0 - b) ** 2 / h * miss
+    memory[1] = z1 + (1.0 - b * b) * miss
+    memory[2] = z2 + (1.0 - b) ** 2 / h * miss
     return memory[2]

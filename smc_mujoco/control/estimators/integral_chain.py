@@ -21,14 +21,21 @@ from smc_mujoco.control.units import RATE, Gain
 
 @estimator_function(gains={"w": Gain(200.0, RATE, positive=True)}, memory=5)
 def integral_chain(y, gains, memory):
-    w, h = gains.w, y.dt
+    w = gains.w
+    h = y.dt
     if memory[0] == 0.0:
-        memory[0], memory[1], memory[4] = 1.0, y.x, y.x
+        memory[0] = 1.0
+        memory[1] = y.x
+        memory[4] = y.x
     slope = (y.x - memory[4]) / h
     # deviation from the steady state on a ramp, (x - 3 slope / w, slope, 0)
-    p, v, a = memory[1] - memory[4] + 3.0 * slope / w, memory[2] - slope, memory[3]
+    p = memory[1] - memory[4] + 3.0 * slope / w
+    v = memory[2] - slope
+    a = memory[3]
     n1, n2, n3 = w * p + v, w * v + a, -(w**3) * p - 3.0 * w * w * v - 2.0 * w * a  # N (p, v, a)
-    m1, m2, m3 = w * n1 + n2, w * n2 + n3, -(w**3) * n1 - 3.0 * w * w * n2 - 2.0 * w * n3
+    m1 = w * n1 + n2
+    m2 = w * n2 + n3
+    m3 = -(w**3) * n1 - 3.0 * w * w * n2 - 2.0 * w * n3
     decay = math.exp(-w * h)
     memory[1] = y.x - 3.0 * slope / w + decay * (p + h * n1 + h * h / 2.0 * m1)
     memory[2] = slope + decay * (v + h * n2 + h * h / 2.0 * m2)

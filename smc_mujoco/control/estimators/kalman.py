@@ -47,7 +47,8 @@ def square_root(a, b):
 def kalman(y, gains, memory):
     h = y.dt
     if memory[0] == 0.0:
-        memory[0], memory[1] = 1.0, y.x
+        memory[0] = 1.0
+        memory[1] = y.x
         lam = gains.q * h**5 / gains.sigma**2
         # m = -c, the negative root, by Newton's method from an upper bound, where the cubic is
         # convex
@@ -60,25 +61,31 @@ def kalman(y, gains, memory):
         # the other roots: m^2 - (c - lam / 120) m + lam / c
         half = (c - lam / 120.0) / 2.0
         root, root_i = square_root(half * half - lam / c, 0.0)  # _i: an imaginary part
-        at_zero, at_one, at_minus = -p, 1.0 - p, -1.0 - p
-        total, product, product_i = 0.0, 1.0, 0.0
+        at_zero = -p
+        at_one = 1.0 - p
+        at_minus = -1.0 - p
+        total = 0.0
+        product = 1.0
+        product_i = 0.0
         for i in range(2):
             sign = 1.0 - 2.0 * i
-            m, m_i = half + sign * root, sign * root_i
+            m = half + sign * root
+            m_i = sign * root_i
             spread, spread_i = square_root(
                 (m * m - m_i * m_i) / 4.0 - m, (m * m_i + m_i * m) / 4.0 - m_i
             )
-            z, z_i = 1.0 - m / 2.0 - spread, -m_i / 2.0 - spread_i
+            z = 1.0 - m / 2.0 - spread
+            z_i = -m_i / 2.0 - spread_i
             if math.hypot(z, z_i) > 1.0:
-                z, z_i = 1.0 - m / 2.0 + spread, -m_i / 2.0 + spread_i
+                z = 1.0 - m / 2.0 + spread
+                z_i = -m_i / 2.0 + spread_i
             total += z
             product, product_i = product * z - product_i * z_i, product * z_i + product_i * z
-        at_zero, at_one, at_minus = (
-            at_zero * product,
-            at_one * (1.0 - total + product),
-            at_minus * (1.0 + total + product),
-        )
-        memory[4], memory[6] = 1.0 + at_zero, at_one / 2.0
+        at_zero = at_zero * product
+        at_one = at_one * (1.0 - total + product)
+        at_minus = at_minus * (1.0 + total + product)
+        memory[4] = 1.0 + at_zero
+        memory[6] = at_one / 2.0
         memory[5] = (at_minus + 8.0 - 4.0 * memory[4]) / 2.0
     a = memory[3]
     v = memory[2] + h * a

@@ -50,10 +50,16 @@ def correction(a, p, m, L, share):
     },
 )
 def levant(y, gains, memory):
-    n, h, L = min(max(int(gains.order), 1), 3), y.dt, gains.L
+    n = min(max(int(gains.order), 1), 3)
+    h = y.dt
+    L = gains.L
     if memory[0] == 0.0:
-        memory[0], memory[1] = 1.0, y.x
-    z0, z1, z2, z3 = memory[1], memory[2], memory[3], memory[4]
+        memory[0] = 1.0
+        memory[1] = y.x
+    z0 = memory[1]
+    z1 = memory[2]
+    z2 = memory[3]
+    z3 = memory[4]
     a = z0 - y.x
     if n == 1:
         memory[1] = z0 + h * (correction(a, 1 / 2, 1.5, L, 1 / 2) + z1)

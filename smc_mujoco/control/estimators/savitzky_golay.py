@@ -42,15 +42,26 @@ CONDITIONS = {
 def savitzky_golay(y, gains, memory):
     N = min(max(int(gains.window), 2), MAX_READINGS)
     degree = min(max(int(gains.degree), 1), N - 1)
-    velocities, accelerations, readings = 2, 2 + MAX_READINGS, 2 + 2 * MAX_READINGS
+    velocities = 2
+    accelerations = 2 + MAX_READINGS
+    readings = 2 + 2 * MAX_READINGS
     if memory[0] == 0.0:
         memory[0] = 1.0
         end = (N - 1) / 2.0
         for i in range(N):
             memory[readings + i] = y.x
-            t, norm, b = i - end, float(N), 0.0
+            t = i - end
+            norm = float(N)
+            b = 0.0
             # p at t; q, q', q'' at the end; with _ those of degree m - 1
-            p, p_, q, q_, dq, dq_, ddq, ddq_ = 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            p = 1.0
+            p_ = 0.0
+            q = 1.0
+            q_ = 0.0
+            dq = 0.0
+            dq_ = 0.0
+            ddq = 0.0
+            ddq_ = 0.0
             for m in range(1, degree + 1):
                 p, p_ = t * p - b * p_, p
                 ddq, ddq_ = end * ddq + 2.0 * dq - b * ddq_, ddq
@@ -63,7 +74,8 @@ def savitzky_golay(y, gains, memory):
     newest = int(memory[1])
     memory[readings + newest] = y.x
     memory[1] = (newest + 1) % N
-    v, a = 0.0, 0.0
+    v = 0.0
+    a = 0.0
     for i in range(N):
         x = (
             memory[readings + (newest + 1 + i) % N] - y.x

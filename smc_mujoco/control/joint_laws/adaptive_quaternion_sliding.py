@@ -75,8 +75,12 @@ RATE3 = Unit(time=-3)
     memory=STEERING + 1,  # and K - K0
 )
 def adaptive_quaternion_sliding(y, gains, memory):
-    s, K0, grown = np.zeros(6), np.zeros(6), memory[:, 2]
-    K0[:2], K0[2], K0[3:] = gains.Kx, gains.Kz, gains.K
+    s = np.zeros(6)
+    K0 = np.zeros(6)
+    grown = memory[:, 2]
+    K0[:2] = gains.Kx
+    K0[2] = gains.Kz
+    K0[3:] = gains.K
     c = np.array([gains.c, gains.c, gains.cz])
     lam = 0.5 * np.array([gains.lam, gains.lam, gains.lamz])
     s[:3], v, stiffness, damping = slide(y, c, K0[:3] + grown[:3], gains.rhox)

@@ -61,7 +61,9 @@ class Axis(NamedTuple):
     + 5,  # and, in the last rows, the observers of three axes: start, z1, z2, z3, acceleration
 )
 def adrc_attitude(y, gains, memory):
-    s, v, ones = np.zeros(6), np.zeros(3), np.ones(3)
+    s = np.zeros(6)
+    v = np.zeros(3)
+    ones = np.ones(3)
     s[:3] = y.de[:3] + gains.kx / gains.kv * y.e[:3]
     F, error, turning, moving = steer(
         y, -gains.kv * s[:3], gains.kx * ones, gains.kv * ones, memory

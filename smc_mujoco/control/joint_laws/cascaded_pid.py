@@ -103,9 +103,13 @@ def _gains(turns, **values):
     memory=4,
 )
 def cascaded_pid(y, gains, memory):
-    s, F, v, started = np.zeros(6), np.zeros(3), np.zeros(3), memory[0, 3]
+    s = np.zeros(6)
+    F = np.zeros(3)
+    v = np.zeros(3)
+    started = memory[0, 3]
     memory[0, 3] = 1.0
-    gravity, slope = y.h[2] / y.M[2, 2], math.tan(gains.tilt)
+    gravity = y.h[2] / y.M[2, 2]
+    slope = math.tan(gains.tilt)
     for i in range(3):
         P, I, Pv, Iv = (
             (gains.P, 0.0, gains.Pv, gains.Iv)
@@ -126,7 +130,8 @@ def cascaded_pid(y, gains, memory):
     error = relative(of_thrust(F, y.r[3:]), quaternion(y.x[3], y.x[4], y.x[5]))
     angle, change = shorter(error, (y.v[3], y.v[4], y.v[5]))
     for i in range(3):
-        j, yaw = 3 + i, i == 2
+        j = 3 + i
+        yaw = i == 2
         P, I, D = (gains.Paz, gains.Iaz, gains.Daz) if yaw else (gains.Pa, gains.Ia, 0.0)
         memory[j, 0] = _integrated(memory[j, 0], -angle[i], y.dt, OF_HEADING if yaw else OF_ANGLE)
         s[j] = y.v[j] - (I * memory[j, 0] - P * angle[i] - D * change[i])

@@ -68,7 +68,8 @@ def hybrid_sliding(y, gains, memory):
     w = y.ddr - gains.c * y.de
     w = w - z * (inner(A, w) / G)
     a = -gains.k * saturate(s / gains.width)
-    tip, inverse = np.zeros(3), np.zeros((3, 3))
+    tip = np.zeros(3)
+    inverse = np.zeros((3, 3))
     for i in range(3):
         tip[i] = inner(J[i], a)
         column = solve(y.M, J[i])

@@ -40,11 +40,9 @@ def _low_pass(x, i, cutoff, dt, states):
     """
     k = math.tan(math.pi * cutoff * dt)
     scale = 1.0 / (1.0 + math.sqrt(2.0) * k + k * k)
-    b, a1, a2 = (
-        k * k * scale,
-        2.0 * (k * k - 1.0) * scale,
-        (1.0 - math.sqrt(2.0) * k + k * k) * scale,
-    )
+    b = k * k * scale
+    a1 = 2.0 * (k * k - 1.0) * scale
+    a2 = (1.0 - math.sqrt(2.0) * k + k * k) * scale
     filtered = b * x + states[i]
     states[i] = 2.0 * b * x - a1 * filtered + states[3 + i]
     states[3 + i] = b * x - a2 * filtered
@@ -73,13 +71,18 @@ def _low_pass(x, i, cutoff, dt, states):
     + 4,  # and states of both filters; torque of the rotors and w before; command and dMz before
 )
 def indi_attitude(y, gains, memory):
-    s, v, ones, started = np.zeros(6), np.zeros(3), np.ones(3), memory[0, 1]
+    s = np.zeros(6)
+    v = np.zeros(3)
+    ones = np.ones(3)
+    started = memory[0, 1]
     s[:3] = y.de[:3] + gains.kx / gains.kv * y.e[:3]
     F, error, turning, moving = steer(
         y, -gains.kv * s[:3], gains.kx * ones, gains.kv * ones, memory
     )
     angle, _ = shorter(error, turning)
-    rotors, before, held = memory[:3, 4], memory[3:, 4], memory[:, 5]
+    rotors = memory[:3, 4]
+    before = memory[3:, 4]
+    held = memory[:, 5]
     follow = 1.0 if gains.lag == 0.0 else -math.expm1(-y.dt / gains.lag)
     for i in range(3):
         s[3 + i] = turning[i] + gains.kq / gains.kw * angle[i]

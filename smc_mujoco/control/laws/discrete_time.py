@@ -33,5 +33,7 @@ def discrete_time(y, gains, memory):
     applied = v
     if abs(u) > y.limit:
         applied = v + (min(max(u, -y.limit), y.limit) - u) * input_gain(y)
-    memory[0], memory[1], memory[2] = s, applied, 1.0
+    memory[0] = s
+    memory[1] = applied
+    memory[2] = 1.0
     return u, s

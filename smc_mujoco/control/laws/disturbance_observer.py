@@ -44,5 +44,7 @@ def disturbance_observer(y, gains, memory):
         memory[1] += (1.0 - math.exp(-gains.l * y.dt)) * (acceleration - memory[3] - memory[1])
     s, v_eq = sliding(y, gains.c)
     u = (v_eq - gains.k * sgn(s) - memory[1] - known) / b
-    memory[0], memory[2], memory[3] = 1.0, y.de, b * min(max(u, -y.limit), y.limit) + known
+    memory[0] = 1.0
+    memory[2] = y.de
+    memory[3] = b * min(max(u, -y.limit), y.limit) + known
     return u, s

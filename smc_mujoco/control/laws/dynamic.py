@@ -30,8 +30,10 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
 def dynamic(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
     rate = (s - memory[1]) / y.dt if memory[2] != 0.0 else 0.0
-    memory[1], memory[2] = s, 1.0
-    u, w = command(y, v_eq + memory[0]), memory[0] - y.dt * gains.k * sgn(rate + gains.q * s)
+    memory[1] = s
+    memory[2] = 1.0
+    u = command(y, v_eq + memory[0])
+    w = memory[0] - y.dt * gains.k * sgn(rate + gains.q * s)
     next_u = command(y, v_eq + w)
     if abs(next_u) <= y.limit or abs(next_u) < abs(u):
         memory[0] = w

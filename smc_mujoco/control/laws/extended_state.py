@@ -55,7 +55,8 @@ def observe(y, l1, l2, l3, memory):
             y.de,
         )  # the first prediction is the reading
     push = memory[3] + memory[4]
-    z1, z2 = memory[1] + h * memory[2] + h * h / 2.0 * push, memory[2] + h * push
+    z1 = memory[1] + h * memory[2] + h * h / 2.0 * push
+    z2 = memory[2] + h * push
     miss = y.e - z1
     memory[1] = z1 + l1 * miss
     memory[2] = z2 + l2 * miss

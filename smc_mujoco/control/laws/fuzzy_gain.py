@@ -38,9 +38,12 @@ def inferred(size, rate):
     """Return the mean of the four active rules, weighted by membership, at a size in 0 .. 1 and a
     rate in -1 .. 1.
     """
-    across, down = 2.0 * min(size, 1.0), 1.0 + min(max(rate, -1.0), 1.0)
-    i, j = min(int(across), 1), min(int(down), 1)
-    p, q = across - i, down - j
+    across = 2.0 * min(size, 1.0)
+    down = 1.0 + min(max(rate, -1.0), 1.0)
+    i = min(int(across), 1)
+    j = min(int(down), 1)
+    p = across - i
+    q = down - j
     near = (1.0 - q) * rule(i, j) + q * rule(i, j + 1)
     far = (1.0 - q) * rule(i + 1, j) + q * rule(i + 1, j + 1)
     return (1.0 - p) * near + p * far
@@ -63,7 +66,8 @@ def inferred(size, rate):
 def fuzzy_gain(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
     rate = (abs(s) - memory[0]) / y.dt if memory[1] != 0.0 else 0.0
-    memory[0], memory[1] = abs(s), 1.0
+    memory[0] = abs(s)
+    memory[1] = 1.0
     K = gains.k_min + (gains.k_max - gains.k_min) * inferred(
         abs(s) / gains.width, rate / gains.rate
     )

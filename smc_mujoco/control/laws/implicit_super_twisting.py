@@ -36,7 +36,8 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 )
 def implicit_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
-    b, step = s + y.dt * memory[0], y.dt * gains.k2
+    b = s + y.dt * memory[0]
+    step = y.dt * gains.k2
     if abs(b) <= y.dt * step:
         memory[0] -= b / y.dt
         return command(y, v_eq + memory[0]), s

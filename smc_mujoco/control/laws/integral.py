@@ -32,9 +32,11 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 def integral(y, gains, memory):
     s0, v_eq = y.de + gains.c * y.e, -gains.c * y.de  # of the nominal loop: with or without a model
     if y.has_surface != 0.0:
-        s0, v_eq = y.s, y.v_eq
+        s0 = y.s
+        v_eq = y.v_eq
     if memory[2] == 0.0:
-        memory[0], memory[2] = s0, 1.0
+        memory[0] = s0
+        memory[2] = 1.0
     s = s0 - memory[0] + gains.q * memory[1]
     memory[1] += y.dt * s0
     return command(y, v_eq - gains.q * s0 - gains.M * sgn(s)), s

@@ -52,7 +52,13 @@ MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = (
 )  # chosen; from no plan 34 steps were enough in 60,000 states
 AT_E, AT_DE, AT_MIDDLE, AT_REACH, MOST_E, MOST_DE, MOST_MIDDLE, ROOM = range(10, 18)
 PLAN, SIDE, FROM_E, FROM_DE, FROM_MIDDLE, FROM_REACH, BY_E, BY_DE = range(18, 26)
-ROW, GRADIENT, STEP, MOVED, HESSIAN, FACTOR, SLOTS = 8, 178, 198, 218, 238, 638, 1038
+ROW = 8
+GRADIENT = 178
+STEP = 198
+MOVED = 218
+HESSIAN = 238
+FACTOR = 638
+SLOTS = 1038
 UNBOUNDED = 1e30  # in place of no bound, as 0 times infinity is no number
 ENOUGH, FAR = (
     1e-13,
@@ -68,14 +74,29 @@ def sampled(a1, a2, b, H):
     """
     # the series of the exponential: T_k = (M H)^k / k!, A = sum of T_k, and the integral is H sum
     # of T_k / (k + 1)
-    t11, t12, t21, t22 = 1.0, 0.0, 0.0, 1.0
-    A11, A12, A21, A22, B1, B2 = 1.0, 0.0, 0.0, 1.0, 0.0, b * H
+    t11 = 1.0
+    t12 = 0.0
+    t21 = 0.0
+    t22 = 1.0
+    A11 = 1.0
+    A12 = 0.0
+    A21 = 0.0
+    A22 = 1.0
+    B1 = 0.0
+    B2 = b * H
     for k in range(1, TERMS):
-        n11, n12 = t21 * H / k, t22 * H / k
-        t21, t22 = (a1 * t11 + a2 * t21) * H / k, (a1 * t12 + a2 * t22) * H / k
-        t11, t12 = n11, n12
-        A11, A12, A21, A22 = A11 + t11, A12 + t12, A21 + t21, A22 + t22
-        B1, B2 = B1 + b * H * t12 / (k + 1), B2 + b * H * t22 / (k + 1)
+        n11 = t21 * H / k
+        n12 = t22 * H / k
+        t21 = (a1 * t11 + a2 * t21) * H / k
+        t22 = (a1 * t12 + a2 * t22) * H / k
+        t11 = n11
+        t12 = n12
+        A11 = A11 + t11
+        A12 = A12 + t12
+        A21 = A21 + t21
+        A22 = A22 + t22
+        B1 = B1 + b * H * t12 / (k + 1)
+        B2 = B2 + b * H * t22 / (k + 1)
     return A11, A12, A21, A22, B1, B2
 
 
@@ -84,34 +105,53 @@ def riccati(A11, A12, A21, A22, B1, B2, q1, q2):
     """Return P11, P12, P22 of the discrete Riccati equation with the weights q1, q2 and 1, by
     doubling.
     """
-    g11, g12, g22, p11, p12, p22 = B1 * B1, B1 * B2, B2 * B2, q1, 0.0, q2
-    a11, a12, a21, a22 = A11, A12, A21, A22
+    g11 = B1 * B1
+    g12 = B1 * B2
+    g22 = B2 * B2
+    p11 = q1
+    p12 = 0.0
+    p22 = q2
+    a11 = A11
+    a12 = A12
+    a21 = A21
+    a22 = A22
     for _ in range(TERMS):
         # W = (1 + G P)^-1
-        m11, m12 = 1.0 + g11 * p11 + g12 * p12, g11 * p12 + g12 * p22
-        m21, m22 = g12 * p11 + g22 * p12, 1.0 + g12 * p12 + g22 * p22
+        m11 = 1.0 + g11 * p11 + g12 * p12
+        m12 = g11 * p12 + g12 * p22
+        m21 = g12 * p11 + g22 * p12
+        m22 = 1.0 + g12 * p12 + g22 * p22
         det = m11 * m22 - m12 * m21
-        w11, w12, w21, w22 = m22 / det, -m12 / det, -m21 / det, m11 / det
+        w11 = m22 / det
+        w12 = -m12 / det
+        w21 = -m21 / det
+        w22 = m11 / det
         # P grows by a' P W a, G by a W G a', and a becomes a W a
-        c11, c12, c21, c22 = (
-            w11 * a11 + w12 * a21,
-            w11 * a12 + w12 * a22,
-            w21 * a11 + w22 * a21,
-            w21 * a12 + w22 * a22,
-        )
-        r11, r12 = p11 * c11 + p12 * c21, p11 * c12 + p12 * c22
-        r21, r22 = p12 * c11 + p22 * c21, p12 * c12 + p22 * c22
-        h11, h12 = w11 * g11 + w12 * g12, w11 * g12 + w12 * g22
-        h21, h22 = w21 * g11 + w22 * g12, w21 * g12 + w22 * g22
-        s11, s12 = a11 * h11 + a12 * h21, a11 * h12 + a12 * h22
-        s21, s22 = a21 * h11 + a22 * h21, a21 * h12 + a22 * h22
-        more11, more12, more22 = a11 * r11 + a21 * r21, a11 * r12 + a21 * r22, a12 * r12 + a22 * r22
-        p11, p12, p22 = p11 + more11, p12 + more12, p22 + more22
-        g11, g12, g22 = (
-            g11 + s11 * a11 + s12 * a12,
-            g12 + s11 * a21 + s12 * a22,
-            g22 + s21 * a21 + s22 * a22,
-        )
+        c11 = w11 * a11 + w12 * a21
+        c12 = w11 * a12 + w12 * a22
+        c21 = w21 * a11 + w22 * a21
+        c22 = w21 * a12 + w22 * a22
+        r11 = p11 * c11 + p12 * c21
+        r12 = p11 * c12 + p12 * c22
+        r21 = p12 * c11 + p22 * c21
+        r22 = p12 * c12 + p22 * c22
+        h11 = w11 * g11 + w12 * g12
+        h12 = w11 * g12 + w12 * g22
+        h21 = w21 * g11 + w22 * g12
+        h22 = w21 * g12 + w22 * g22
+        s11 = a11 * h11 + a12 * h21
+        s12 = a11 * h12 + a12 * h22
+        s21 = a21 * h11 + a22 * h21
+        s22 = a21 * h12 + a22 * h22
+        more11 = a11 * r11 + a21 * r21
+        more12 = a11 * r12 + a21 * r22
+        more22 = a12 * r12 + a22 * r22
+        p11 = p11 + more11
+        p12 = p12 + more12
+        p22 = p22 + more22
+        g11 = g11 + s11 * a11 + s12 * a12
+        g12 = g12 + s11 * a21 + s12 * a22
+        g22 = g22 + s21 * a21 + s22 * a22
         a11, a12, a21, a22 = (
             a11 * c11 + a12 * c21,
             a11 * c12 + a12 * c22,
@@ -135,25 +175,23 @@ def prepare(n, a1, a2, b, H, q1, q2, memory):
         i = n - 1 - k
         # B' S of the cost from move i + 1 on without control; then back through A, one move earlier
         # each
-        v1, v2 = B1 * s11 + B2 * s12, B1 * s12 + B2 * s22
+        v1 = B1 * s11 + B2 * s12
+        v2 = B1 * s12 + B2 * s22
         memory[HESSIAN + MOVES * i + i] = 1.0 + v1 * B1 + v2 * B2
         for m in range(i):
             j = i - 1 - m
             v1, v2 = v1 * A11 + v2 * A21, v1 * A12 + v2 * A22
             memory[HESSIAN + MOVES * i + j] = v1 * B1 + v2 * B2
             memory[HESSIAN + MOVES * j + i] = v1 * B1 + v2 * B2
-        memory[BY_E + ROW * i], memory[BY_DE + ROW * i] = v1 * A11 + v2 * A21, v1 * A12 + v2 * A22
-        r11, r12, r21, r22 = (
-            s11 * A11 + s12 * A21,
-            s11 * A12 + s12 * A22,
-            s12 * A11 + s22 * A21,
-            s12 * A12 + s22 * A22,
-        )
-        s11, s12, s22 = (
-            q1 + A11 * r11 + A21 * r21,
-            A11 * r12 + A21 * r22,
-            q2 + A12 * r12 + A22 * r22,
-        )
+        memory[BY_E + ROW * i] = v1 * A11 + v2 * A21
+        memory[BY_DE + ROW * i] = v1 * A12 + v2 * A22
+        r11 = s11 * A11 + s12 * A21
+        r12 = s11 * A12 + s12 * A22
+        r21 = s12 * A11 + s22 * A21
+        r22 = s12 * A12 + s22 * A22
+        s11 = q1 + A11 * r11 + A21 * r21
+        s12 = A11 * r12 + A21 * r22
+        s22 = q2 + A12 * r12 + A22 * r22
     memory[ROOM] = -1.0
     return tabulate(n, -math.inf, math.inf, memory)
 
@@ -182,7 +220,8 @@ def residual(n, e, de, low, high, memory):
 @njit
 def held(i, low, high, memory):
     """Return whether a move is at a bound, and its gradient keeps it there."""
-    v, slope = memory[PLAN + ROW * i], memory[GRADIENT + i]
+    v = memory[PLAN + ROW * i]
+    slope = memory[GRADIENT + i]
     return (v <= low and slope > 0.0) or (v >= high and slope < 0.0)
 
 
@@ -246,7 +285,8 @@ def move(n, share, low, high, memory):
     """
     whole = True
     for i in range(n):
-        v, wanted = memory[PLAN + ROW * i], memory[PLAN + ROW * i] + share * memory[STEP + i]
+        v = memory[PLAN + ROW * i]
+        wanted = memory[PLAN + ROW * i] + share * memory[STEP + i]
         memory[MOVED + i] = min(max(wanted, low), high) - v
         if wanted < low or wanted > high:
             whole = False
@@ -264,7 +304,8 @@ def advance(n, low, high, memory):
             n, share, low, high, memory
         )  # a whole step that no bound clips ends at the least cost
         if not enough:
-            promised, curved = 0.0, 0.0
+            promised = 0.0
+            curved = 0.0
             for i in range(n):
                 promised += memory[GRADIENT + i] * memory[MOVED + i]
                 for j in range(n):
@@ -312,7 +353,8 @@ def tabulate(n, low, high, memory):
             memory[BY_E + ROW * i],
             memory[BY_DE + ROW * i],
         )
-        memory[FROM_MIDDLE + ROW * i], memory[FROM_REACH + ROW * i] = 0.0, 0.0
+        memory[FROM_MIDDLE + ROW * i] = 0.0
+        memory[FROM_REACH + ROW * i] = 0.0
         for j in range(n):
             memory[FROM_MIDDLE + ROW * i] += (
                 abs(memory[SIDE + ROW * j]) * memory[HESSIAN + MOVES * i + j]
@@ -330,7 +372,9 @@ def tabulate(n, low, high, memory):
                 for j in range(n):
                     memory[column + ROW * i] += memory[HESSIAN + MOVES * i + j] * memory[STEP + j]
                 memory[column + ROW * i] /= memory[HESSIAN + MOVES * i + i]
-    memory[MOST_E], memory[MOST_DE], memory[MOST_MIDDLE] = 0.0, 0.0, 0.0
+    memory[MOST_E] = 0.0
+    memory[MOST_DE] = 0.0
+    memory[MOST_MIDDLE] = 0.0
     for i in range(n):
         memory[MOST_E] = max(memory[MOST_E], abs(memory[FROM_E + ROW * i]))
         memory[MOST_DE] = max(memory[MOST_DE], abs(memory[FROM_DE + ROW * i]))
@@ -356,14 +400,18 @@ def recall(n, e, de, middle, reach, memory):
     """
     left = UNBOUNDED
     for i in range(n):
-        value, side = tabulated(i, e, de, middle, reach, memory), memory[SIDE + ROW * i]
+        value = tabulated(i, e, de, middle, reach, memory)
+        side = memory[SIDE + ROW * i]
         if side == 0.0:
             memory[PLAN + ROW * i] = min(max(value, middle - reach), middle + reach)
             left = min(left, reach - abs(value - middle))
         else:
             memory[PLAN + ROW * i] = middle + side * reach
             left = min(left, -side * value)
-    memory[AT_E], memory[AT_DE], memory[AT_MIDDLE], memory[AT_REACH] = e, de, middle, reach
+    memory[AT_E] = e
+    memory[AT_DE] = de
+    memory[AT_MIDDLE] = middle
+    memory[AT_REACH] = reach
     return left
 
 
@@ -385,7 +433,8 @@ def planned(n, e, de, middle, reach, memory):
     """
     left = recall(n, e, de, middle, reach, memory)
     if left < 0.0:
-        low, high = middle - reach, middle + reach
+        low = middle - reach
+        high = middle + reach
         if (
             solve(n, e, de, low, high, 1.0, memory) > FAR
         ):  # bounds cut the steps short: the state is far from the last

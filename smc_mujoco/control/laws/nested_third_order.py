@@ -27,6 +27,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     relative_degree=3,
 )
 def nested_third_order(y, gains, memory):
-    q1, q2 = y.de / gains.w, (y.a - y.ddr) / gains.w**2
+    q1 = y.de / gains.w
+    q2 = (y.a - y.ddr) / gains.w**2
     inner = power(abs(q1) ** 3 + y.e * y.e, 1.0 / 6.0) * sgn(q1 + power(y.e, 2.0 / 3.0))
     return command(y, -gains.a * sgn(q2 + 2.0 * inner)), y.e

@@ -29,5 +29,6 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0},
 )
 def nonsingular_terminal(y, gains, memory):
-    s, v_eq = y.e + power(y.de, gains.p) / gains.B, -gains.B / gains.p * power(y.de, 2.0 - gains.p)
+    s = y.e + power(y.de, gains.p) / gains.B
+    v_eq = -gains.B / gains.p * power(y.de, 2.0 - gains.p)
     return command(y, v_eq - gains.k * sgn(s)), s

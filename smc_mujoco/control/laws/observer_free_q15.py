@@ -24,7 +24,8 @@ from numba import njit
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, POSITION, RATE, SPEED, Gain
 
-UNITS, MAX_WORD = 32768, 32767
+UNITS = 32768
+MAX_WORD = 32767
 TABLE = np.array(
     [round(MAX_WORD * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64
 )  # each fits 16 bits
@@ -73,13 +74,16 @@ def saturated(n):
     },
 )
 def observer_free_q15(y, gains, memory):
-    e, de = word(y.e, gains.e_range), word(y.de, gains.de_range)
-    k_e, k_de = word(gains.k1 * gains.e_range / 8.0, 16.0), word(gains.de_range / 8.0, 16.0)
+    e = word(y.e, gains.e_range)
+    de = word(y.de, gains.de_range)
+    k_e = word(gains.k1 * gains.e_range / 8.0, 16.0)
+    k_de = word(gains.de_range / 8.0, 16.0)
     s = saturated(product(k_e, e, 11) + product(k_de, de, 11))
     surface_s, v_eq = sliding(y, gains.k1)
     if y.has_surface != 0.0:
         s = word(surface_s, 8.0)
-    i, part = abs(s) >> 7, abs(s) & 127
+    i = abs(s) >> 7
+    part = abs(s) & 127
     T = TABLE[i] + product(TABLE[i + 1] - TABLE[i], part, 7)
     u = product(word(gains.lam, gains.u_range), T if s >= 0 else -T, 15)
     return command(y, v_eq - u * gains.u_range / UNITS), s * 8.0 / UNITS

@@ -17,7 +17,10 @@ import numpy as np
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
-ONE, TEN, A45, A105 = np.float32(1.0), np.float32(10.0), np.float32(45.0), np.float32(105.0)
+ONE = np.float32(1.0)
+TEN = np.float32(10.0)
+A45 = np.float32(45.0)
+A105 = np.float32(105.0)
 QUARTER, MAX_S = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 
 

@@ -56,5 +56,7 @@ def pd_observer(y, gains, memory):
         )
     s = gains.wc * gains.wc * y.e + 2.0 * gains.wc * y.de
     u = -(s + memory[3] + known) / b
-    memory[0], memory[1], memory[2] = 1.0, y.de, b * min(max(u, -y.limit), y.limit) + known
+    memory[0] = 1.0
+    memory[1] = y.de
+    memory[2] = b * min(max(u, -y.limit), y.limit) + known
     return u, s

@@ -36,7 +36,8 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 )
 def proper_conditioned_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
-    w, step = memory[0], y.dt * gains.k2
+    w = memory[0]
+    step = y.dt * gains.k2
     if abs(s) <= y.dt * step:
         free = w - 2.0 * s / y.dt
     else:

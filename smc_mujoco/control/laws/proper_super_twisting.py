@@ -36,7 +36,8 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 )
 def proper_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
-    w, root = memory[0], 0.0
+    w = memory[0]
+    root = 0.0
     if abs(s) <= y.dt * y.dt * gains.k2:
         memory[0] = w - s / y.dt
     else:

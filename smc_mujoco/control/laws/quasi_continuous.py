@@ -19,7 +19,8 @@ from smc_mujoco.control.units import FORCE, SPEED_PER_ROOT, Gain
 
 def brakes(gains):
     """Return whether the cubic of the docstring is negative at its minimum, r, and r > b."""
-    a, b = gains.a, gains.b
+    a = gains.a
+    b = gains.b
     r = (math.sqrt(b * b + 6.0 * a) - b) / 3.0
     return r > b and r**3 + b * r * r - 2.0 * a * r + 2.0 * a * b < 0.0
 

@@ -29,5 +29,6 @@ def suboptimal(y, gains, memory):
         memory[0] = y.e if abs(y.e) > abs(memory[2]) else memory[2]
         if y.de == 0.0:
             memory[0] = y.e
-    memory[1], memory[2] = y.de, y.e
+    memory[1] = y.de
+    memory[2] = y.e
     return command(y, -gains.r1 * sgn(y.e - 0.5 * memory[0]) + gains.r2 * sgn(memory[0])), y.e

@@ -33,7 +33,8 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     short="TE",
 )
 def terminal(y, gains, memory):
-    s, v_eq = y.de + gains.b * power(y.e, gains.p), 0.0
+    s = y.de + gains.b * power(y.e, gains.p)
+    v_eq = 0.0
     if y.e != 0.0:
         v_eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
     return command(y, min(max(v_eq, -gains.bound), gains.bound) - gains.k * sgn(s)), s

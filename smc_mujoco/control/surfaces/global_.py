@@ -19,6 +19,8 @@ from smc_mujoco.control.units import RATE, Gain
 def global_(y, gains, memory):
     linear = y.de + gains.c * y.e
     if memory[0] == 0.0:  # the first sample
-        memory[0], memory[1], memory[2] = 1.0, linear, y.t
+        memory[0] = 1.0
+        memory[1] = linear
+        memory[2] = y.t
     offset = memory[1] * math.exp(-gains.q * (y.t - memory[2]))
     return linear - offset, -gains.c * y.de - gains.q * offset

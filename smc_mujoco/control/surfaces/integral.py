@@ -18,7 +18,8 @@ from smc_mujoco.control.units import RATE, RATE2, Gain
 )
 def integral(y, gains, memory):
     if memory[0] == 0.0:  # the first sample
-        memory[0], memory[1] = 1.0, y.de + gains.k2 * y.e
+        memory[0] = 1.0
+        memory[1] = y.de + gains.k2 * y.e
     s = y.de + gains.k2 * y.e - memory[1] + gains.k1 * memory[2]
     memory[2] += y.dt * y.e
     return s, -gains.k1 * y.e - gains.k2 * y.de

@@ -26,7 +26,8 @@ from smc_mujoco.control.units import ACCELERATION, TIME, Gain
     conditions={"0 < p < 1/2": lambda g: 0.0 < g.p < 0.5},
 )
 def predefined_time(y, gains, memory):
-    p, size = gains.p, abs(y.e)
+    p = gains.p
+    size = abs(y.e)
     if size == 0.0:
         return y.de, 0.0
     grown = math.exp(min(size**p, 300.0)) / (p * gains.T)

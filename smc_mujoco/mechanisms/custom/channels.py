@@ -403,10 +403,8 @@ def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
     """Return the largest force that all ranges allow in both directions, N m or N, because |u| has
     one bound.
     """
-    low, high = (
-        max([-math.inf, *(low for low, _ in ranges)]),
-        min([math.inf, *(high for _, high in ranges)]),
-    )
+    low = max([-math.inf, *(low for low, _ in ranges)])
+    high = min([math.inf, *(high for _, high in ranges)])
     if not low < 0.0 < high:
         raise ScenarioError(f"{who} {low:g} to {high:g}, but a law pushes both ways: {cure}")
     return min(-low, high)
@@ -442,7 +440,8 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, f
         ends.append(
             sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i])
         )
-    low, high = sum(low for low, _ in ends), sum(high for _, high in ends)
+    low = sum(low for low, _ in ends)
+    high = sum(high for _, high in ends)
     if low < 0.0 < high:
         return (low, high)
     return (-math.inf, math.inf)

@@ -126,7 +126,8 @@ class NominalModel:
     ) -> tuple[float, float]:
         """Return f and g of channel i, given the last commands u, (n,), of the others."""
         with self._placed(x, p) as (model, places, data):
-            data.qvel[places["qvel"]], ctrl = v, driven(places)
+            data.qvel[places["qvel"]] = v
+            ctrl = driven(places)
             j = i % len(ctrl)  # the driven channel that moves channel i
             if u is None:
                 data.ctrl[ctrl] = 0.0
@@ -152,7 +153,9 @@ class NominalModel:
         """
         model, places, data, _ = prepared(self, frozen(vars(p)))
         with _lock:
-            data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
+            data.qpos[:] = model.qpos0
+            data.qvel[:] = 0.0
+            data.ctrl[:] = 0.0
             data.qpos[places["qpos"]] = x
             if (free := free_joint(model)) >= 0:
                 first = model.jnt_qposadr[free]
@@ -275,7 +278,8 @@ def prepared(
     joints = joint_ids(model)
     ctrl = model.actuator_ctrladr[drive_ids(model)]
     places = np.full(len(joints), -1, PLACE)
-    places["qpos"], places["qvel"] = model.jnt_qposadr[joints], dof_ids(model)
+    places["qpos"] = model.jnt_qposadr[joints]
+    places["qvel"] = dof_ids(model)
     if free_joint(model) >= 0:
         places["qpos"] += np.arange(len(joints))
     places["ctrl"][: len(ctrl)] = ctrl
@@ -485,10 +489,13 @@ def native() -> Function:
             if (
                 last_x[j] != x[j] or last_v[j] != v[j]
             ):  # NaN, the initial value, differs from everything
-                fresh, last_x[j], last_v[j] = True, x[j], v[j]
+                fresh = True
+                last_x[j] = x[j]
+                last_v[j] = v[j]
         if fresh:  # the first channel of a sample; the others have the same state
             for j in range(n):
-                qpos[place_at(places, j).qpos], qvel[place_at(places, j).qvel] = x[j], v[j]
+                qpos[place_at(places, j).qpos] = x[j]
+                qvel[place_at(places, j).qvel] = v[j]
             positions(model, data)
             velocities(model, data)
         for j in range(driven):
@@ -504,7 +511,8 @@ def native() -> Function:
         solve(model, data, int(at.moved), int(at.unit), 1)
         output = carray(pointer(out), (2,))
         dof = place_at(places, i).qvel
-        output[0], output[1] = qacc[dof], moved[dof]
+        output[0] = qacc[dof]
+        output[1] = moved[dof]
         return 0
 
     return Function(native, Key("nominal-model", fingerprint.now(native)))

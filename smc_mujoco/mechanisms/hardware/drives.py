@@ -178,7 +178,8 @@ class DCMotor(Actuator):
         ):
             raise ScenarioError(
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} "
-                f"N m/A is too weak for a resistance of {self.resistance:g} ohm: give a stronger motor"
+                f"N m/A is too weak for a resistance of {self.resistance:g} ohm: "
+                "give a stronger motor"
             )
 
     @property

@@ -119,7 +119,8 @@ def coulomb_step(v, smooth, level, mobility, h):
         mean += force * span
         moment += force * span * (left - 0.5 * span)
         left -= span
-    mean, moment = mean / h, moment / (h * h)
+    mean = mean / h
+    moment = moment / (h * h)
     return mean, 6.0 * (0.5 * mean - moment), held
 
 

@@ -12,11 +12,11 @@ creep at the speed at which F equals the load. So a joint slides or sticks:
 
 A joint sticks when its speed changes sign or is small (STICKING_SPEED). x_s is then such that the
 spring carries the joint's load, within the bounds: the joint rests where it stops. For a joint at
-rest from the start of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves the bounds. So friction is F to the last bit
-while a joint slides, and a stuck joint does not creep, because its friction depends on its
-position. Under a new load a stuck joint turns by load/stiffness. Its speed decays as exp(-200 t/s)
-if it moves alone, and slower if other joints move with it. A joint that slides keeps sliding at the
-speed at which F equals the load.
+rest from the start of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves
+the bounds. So friction is F to the last bit while a joint slides, and a stuck joint does not creep,
+because its friction depends on its position. Under a new load a stuck joint turns by
+load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower if other joints move
+with it. A joint that slides keeps sliding at the speed at which F equals the load.
 
 Limit: bristles are critically damped for each joint alone. Stuck joints that move together have
 less damping. A sudden load makes them overshoot, and may tear a joint loose below the limit that

@@ -239,7 +239,8 @@ def advance(g, p, queue, start, end):
                 break
             slot = 2 * int(g.tail % p.slots)
             g.free = max(g.free, now)
-            queue[slot], queue[slot + 1] = g.free, direction
+            queue[slot] = g.free
+            queue[slot + 1] = direction
             g.free += g.period
             g.tail += 1.0
         if p.refill > 0.0:
@@ -315,7 +316,8 @@ def field(g, p, queue, start, end):
                 g.position = g.target
                 g.slope = 0.0
     h = end - start
-    mean, moment = mean / h, moment / (h * h)
+    mean = mean / h
+    moment = moment / (h * h)
     g.middle = mean
     g.rise = 6.0 * (0.5 * mean - moment)
 

@@ -59,7 +59,8 @@ def on_floor(spec):
     column = spec.geom("column")
     bottom = 0.03 + down
     top = column.pos[2] + column.size[1]
-    column.pos[2], column.size[1] = (bottom + top) / 2, (top - bottom) / 2
+    column.pos[2] = (bottom + top) / 2
+    column.size[1] = (top - bottom) / 2
     spec.stat.center[2] -= down
     hit(spec, ("floor", "bob"), FLOOR_RESTITUTION)
 

@@ -648,13 +648,12 @@ def test_the_file_s_own_sensors_are_no_channels(arm):
 def test_dry_friction_of_the_file_holds_an_arm_that_weighs_less(joint, tendon):
     """It weighs 2.45 N m when level. As MuJoCo's default it would sink by 0.06 rad in 2 s."""
     text = f"""<mujoco><worldbody><body><joint name="j" axis="0 1 0" {joint}/>
-      <geom type="capsule" fromto="0 0 0 .5 0 0" size=".02" mass="1" contype="0"/></body></worldbody>
-      {tendon}<actuator><motor joint="j"/></actuator></mujoco>"""
+      <geom type="capsule" fromto="0 0 0 .5 0 0" size=".02" mass="1" contype="0"/></body>
+      </worldbody>{tendon}<actuator><motor joint="j"/></actuator></mujoco>"""
     arm = smc.plant_from(text, ["j"])
     trace = smc.run(smc.Scenario(plant=arm, law="none", duration=2.0))
     assert np.abs(trace.x).max() < 1e-4
-    soft = text.replace('frictionloss="3"', 'frictionloss="3" FIELD="0.02 1.5"')
-    soft = soft.replace("FIELD", "solreffriction")
+    soft = text.replace('frictionloss="3"', 'frictionloss="3" solreffriction="0.02 1.5"')
     kept = smc.plant_from(soft, ["j"]).load()
     assert 1.5 in (*kept.dof_solref[:, 1], *kept.tendon_solref_fri[:, 1])
 
