@@ -149,23 +149,18 @@ class TunedGains:
     """The gains of a law on a plant, and the searches that found them."""
 
     sets: tuple[Mapping[str, float], ...]  # each name -> value; of each search, in order
-    objectives: tuple[
-        float, ...
-    ]  # J of each, s^2, see `analysis.tuning.objective`; each search has its own runs
+    # J of each, s^2, see `analysis.tuning.objective`; each search has its own runs
+    objectives: tuple[float, ...]
     evaluations: int  # number of sets of gains that the searches evaluated
     seed: int
-    at_bound: Mapping[
-        str, str
-    ]  # gain -> "lower" or "upper", for those of the best gains at a bound of the search
-    near: Mapping[
-        str, tuple[float, float]
-    ]  # gain -> its range in sets within 3 % of their search's best
-    front: tuple[
-        tuple[float, float], ...
-    ]  # tracking in s^2 and variation in 1/s, Pareto front of the first search
-    first: tuple[
-        float, float
-    ]  # tracking and variation of the first search's best gains, which are on the front
+    # gain -> "lower" or "upper", for those of the best gains at a bound of the search
+    at_bound: Mapping[str, str]
+    # gain -> its range in sets within 3 % of their search's best
+    near: Mapping[str, tuple[float, float]]
+    # tracking in s^2 and variation in 1/s, Pareto front of the first search
+    front: tuple[tuple[float, float], ...]
+    # tracking and variation of the first search's best gains, which are on the front
+    first: tuple[float, float]
     rule: str  # the search, in words
     versions: Mapping[str, str]  # of the packages that the numbers depend on
 

@@ -20,11 +20,8 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, catalogue, known_laws, laws
 from smc_mujoco.mechanisms.plant import Plant
 
-VELOCITY = {
-    "v",
-    "de",
-    "dq",
-}  # fields of the measurement that a velocity sensor or an estimator gives
+# fields of the measurement that a velocity sensor or an estimator gives
+VELOCITY = {"v", "de", "dq"}
 
 
 class Property(NamedTuple):

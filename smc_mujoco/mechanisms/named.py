@@ -28,10 +28,7 @@ def as_plant(value: object) -> Plant:
         raise ScenarioError(
             "plant is the text of a model: give smc.plant_from(text, channels=['joint'])"
         )
-    if isinstance(value, str):
-        made = from_text(value)
-    else:
-        made = value
+    made = from_text(value) if isinstance(value, str) else value
     if not isinstance(made, Plant):
         raise ScenarioError(
             f"plant is {shown(made)}: give a name that smc.plants() lists, smc.plant(...), "

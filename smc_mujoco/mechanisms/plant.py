@@ -109,9 +109,8 @@ class Plant:
     """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d)."""
 
     name: str  # as in `smc.plants()`
-    parameters: Mapping[
-        str, float
-    ]  # name -> value, SI units; the nominal ones, which laws may know
+    # name -> value, SI units; the nominal ones, which laws may know
+    parameters: Mapping[str, float]
     mass: str  # parameter that is meant by "mass" in a mismatch or a jump
     unit: str  # of x, "rad" or "m"; that of the first channel if they differ
     x0: tuple[float, ...]  # default initial positions, those of the paper study, (n,)
@@ -119,9 +118,8 @@ class Plant:
     n: int = 1  # number of channels
     sizes: tuple[int, int] = (1, 1)  # smallest and largest n that `smc.plant(name, n=...)` takes
     build: Callable[[int], mujoco.MjSpec]  # n -> the ideal mechanism with the default parameters
-    fields: Callable[
-        [mujoco.MjModel, Values], Iterator[Field]
-    ]  # the model fields which the parameters set
+    # the model fields which the parameters set
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
     nominal: Nominal  # f and g of the plant's equation
     lane: tuple[float, float, float]  # m, offset between machines that stand side by side in a film
     # Kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs
@@ -130,15 +128,13 @@ class Plant:
     )
     # Name -> another mechanism, which realises the equation, or a part of it, by other means
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
-    mixed: tuple[
-        str, ...
-    ] = ()  # units of all channels if they differ, (n,); `units` has them in both cases
+    # units of all channels if they differ, (n,); `units` has them in both cases
+    mixed: tuple[str, ...] = ()
     underactuated: bool = (
         False  # whether it has channels without an actuator, which come after those with one
     )
-    goal: tuple[
-        float, ...
-    ] = ()  # where its free joints should come to rest, (free,), rad or m; empty: at 0
+    # where its free joints should come to rest, (free,), rad or m; empty: at 0
+    goal: tuple[float, ...] = ()
     # Parameter -> the only value that fits the geometry of the contacts
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
     # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch
@@ -159,24 +155,20 @@ class Plant:
     uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(
         default_factory=dict, compare=False, repr=False
     )
-    dry: tuple[
-        str, ...
-    ] = ()  # parameters that are dry friction. A plant with one that is not 0 is not smooth
+    # parameters that are dry friction. A plant with one that is not 0 is not smooth
+    dry: tuple[str, ...] = ()
     unmodelled: str = ""  # why there is no nominal model; "" if there is one
     # hardware.part.Friction of its joints according to its source, for a scenario; or None
     friction: Any = None
-    limits: tuple[
-        float, ...
-    ] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
+    # N m or N, largest force of each driven channel's motor; empty: no limits
+    limits: tuple[float, ...] = ()
     reach: Callable[[Values], tuple[float, ...]] | None = (
         None  # `limits` of other parameters, if they depend on them
     )
-    sets: Mapping[str, Mapping[str, float]] = dataclasses.field(
-        default_factory=dict
-    )  # name -> parameters, a published set
-    above_zero: tuple[
-        str, ...
-    ] = ()  # parameters that must be greater than 0, beside masses and lengths
+    # name -> parameters, a published set
+    sets: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    # parameters that must be greater than 0, beside masses and lengths
+    above_zero: tuple[str, ...] = ()
     ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
@@ -414,14 +406,12 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
         values[key] = base.constraint(key)(f"{name}'s {key}", value)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
+    smooth = base.smooth
     if base.dry:
         smooth = not any(values[key] for key in base.dry)
-    else:
-        smooth = base.smooth
+    limits = base.limits
     if base.reach:
         limits = base.reach(Values(**values))
-    else:
-        limits = base.limits
     return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth, limits=limits)
 
 

@@ -127,9 +127,8 @@ def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceede
             tt=0.5,
         )
     assert called(law, 20_000, e=1.0, limit=6.0) == pytest.approx(-(6.0 + 5.0 * 0.5), rel=1e-6)
-    assert called(law, 1001, e=1.0) == pytest.approx(
-        -(10.0 + 5.0), rel=1e-9
-    )  # no bound: it winds up as ki t
+    # no bound: it winds up as ki t
+    assert called(law, 1001, e=1.0) == pytest.approx(-(10.0 + 5.0), rel=1e-9)
 
 
 @pytest.mark.parametrize(

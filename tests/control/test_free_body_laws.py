@@ -146,9 +146,8 @@ def test_an_unknown_torque_turns_the_body_by_the_closed_form(drone):
     s = math.atanh(TORQUE / (J * law.gains["K"])) / law.gains["rho"]
     trace = smc.run(smc.Scenario(law=pushed(law), **common))
     assert trace.s[-1, 3] == pytest.approx(s, rel=1e-6)
-    tilt = 2.0 * math.asin(
-        s / law.gains["lam"]
-    )  # of the wanted thrust, m (c Kx rhox e) sideways and m g upwards
+    # of the wanted thrust, m (c Kx rhox e) sideways and m g upwards
+    tilt = 2.0 * math.asin(s / law.gains["lam"])
     sideways = 5.0 * math.tanh(1.25 * abs(trace.e[-1, 1])) / G
     assert math.atan(sideways) == pytest.approx(tilt, rel=1e-4)
     law = smc.law("geometric")
@@ -490,12 +489,8 @@ def test_indi_leaves_the_rotors_lag_between_what_it_asks_for_and_the_acceleratio
 
 @pytest.mark.parametrize("axis", range(3))
 def test_adrc_near_its_attitude_is_its_linear_observer_and_loop(drone, axis):
-    wc, wo, lag, loop = (
-        4.0,
-        40.0,
-        0.0625,
-        np.zeros((7, 7)),
-    )  # z1, z2, z3, A v, angle, w, acceleration
+    # z1, z2, z3, A v, angle, w, acceleration
+    wc, wo, lag, loop = (4.0, 40.0, 0.0625, np.zeros((7, 7)))
     loop[0, 1] = loop[1, 2] = loop[1, 3] = loop[4, 5] = loop[5, 6] = 1.0
     corrections = np.array([3.0 * wo, 3.0 * wo**2, wo**3])
     feedback = np.array([wc**2, 2.0 * wc, 1.0])
@@ -680,9 +675,8 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
         e = trace.x[k, :3] - r
         de = trace.v[k, :3] - dr
         slow, earlier = before or (de, ddr)
-        slow = (slow + dt * 20.0 * de) / (
-            1.0 + dt * 20.0
-        )  # the implicit step of slow' = 20 (de - slow)
+        # the implicit step of slow' = 20 (de - slow)
+        slow = (slow + dt * 20.0 * de) / (1.0 + dt * 20.0)
         dde = 20.0 * (de - slow)
         jerk = (ddr - earlier) / dt
         before = (slow, ddr)

@@ -91,6 +91,5 @@ def test_the_first_shipped_search_comes_out_again():
         seed=known.seed,
         searches=1,
     )
-    assert again.objective == pytest.approx(
-        known.objectives[0], rel=1e-3
-    )  # another processor rounds otherwise
+    # another processor rounds otherwise
+    assert again.objective == pytest.approx(known.objectives[0], rel=1e-3)

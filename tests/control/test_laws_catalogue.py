@@ -58,9 +58,8 @@ def traces():
     }
     found = {}
     for name in smc.laws():
-        first = (
-            zlib.crc32(name.encode()) % 2
-        )  # one half of the laws each, whichever laws there are beside it
+        # one half of the laws each, whichever laws there are beside it
+        first = zlib.crc32(name.encode()) % 2
         models = itertools.cycle(("none", "nominal") if first else ("nominal", "none"))
         if name in MODELLED or name == "none":
             models = itertools.repeat("nominal" if name in MODELLED else "none")
@@ -103,9 +102,8 @@ def test_none_leaves_each_plant_where_its_equation_takes_it():
 @LAWS
 def test_a_law_is_odd_in_what_it_measures_and_commands_nothing_where_there_is_no_error(name):
     law = smc.law(name)
-    plain = rebuild(
-        law.function, lambda helper: helper
-    )  # numba would compile the helpers of mpc for seconds
+    # numba would compile the helpers of mpc for seconds
+    plain = rebuild(law.function, lambda helper: helper)
     law, memory = dataclasses.replace(law, function=plain), np.zeros(law.memory)
     for _ in range(3):
         assert called(law, measured(limit=6.0), memory) == (0.0, 0.0)

@@ -40,9 +40,8 @@ def changes(name):
             "g": 2.0,
         }
         y = Measurement(*numbers)._replace(**known)
-        memory = np.abs(random.normal(size=law.memory)) * random.choice(
-            [0.0, 1.0]
-        )  # at the first sample, and later
+        # at the first sample, and later
+        memory = np.abs(random.normal(size=law.memory)) * random.choice([0.0, 1.0])
         one = memory.copy()
         result = [*called(law, y, one), *one]
         for field in {*Measurement._fields} - found:
@@ -76,9 +75,8 @@ def test_what_a_law_reads_is_found_through_functions_and_else_is_everything():
     assert reads(position_only) == {"e", "g"}
     assert PROPERTIES["no-velocity"].holds(position_only)
     assert reads(hands_on) == set(Measurement._fields)
-    assert {"has_surface", "model", "ddr"} <= reads(
-        catalogue()["classical"]
-    )  # in `sliding` and `command`
+    # in `sliding` and `command`
+    assert {"has_surface", "model", "ddr"} <= reads(catalogue()["classical"])
 
 
 # continuity

@@ -19,9 +19,8 @@ from smc_mujoco.simulation import python_functions
 pytestmark = pytest.mark.quick
 
 SURFACES = pytest.mark.parametrize("name", laws(kind="surface"))
-SECOND = [
-    name for name in laws(kind="surface") if name != "higher_order"
-]  # those that an acceleration of the error keeps
+# those that an acceleration of the error keeps
+SECOND = [name for name in laws(kind="surface") if name != "higher_order"]
 MASS = smc.plant(
     "duffing",
     M=1.0,

@@ -140,9 +140,8 @@ def everything(plant, law):
 
 
 def test_every_plant_of_the_study_has_its_equation_here():
-    assert set(smc.paper.GAINS) == set(
-        EQUATION
-    )  # the others: test_underactuated.py and test_rig_plants.py
+    # the others: test_underactuated.py and test_rig_plants.py
+    assert set(smc.paper.GAINS) == set(EQUATION)
 
 
 @pytest.mark.slow

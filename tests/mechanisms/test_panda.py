@@ -299,9 +299,8 @@ def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    data.qvel[{"table": 1, "wall": 3}[kind]] = {"table": 1.0, "wall": 5.0}[
-        kind
-    ]  # of the shoulder, of the elbow
+    # of the shoulder, of the elbow
+    data.qvel[{"table": 1, "wall": 3}[kind]] = {"table": 1.0, "wall": 5.0}[kind]
     mujoco.mj_forward(model, data)
     start = data.energy.sum()
     touched = False

@@ -56,9 +56,8 @@ def newton_euler(duration, period, p, wind):
         t = k * period
         F = 0.3 + 0.05 * math.sin(9.0 * t)
         M = 6e-4 * math.sin(5.0 * t), 3e-4 * math.cos(7.0 * t), 2e-4 * math.sin(3.0 * t + 1.0)
-        signs = np.array(
-            [(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)]
-        )  # as in the firmware's power distribution
+        # as in the firmware's power distribution
+        signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])
         asked = F / 4 + signs @ np.array([M[0] / p["a"], M[1] / p["a"], M[2] / p["c"]]) / 4
         asked = np.clip(asked - max(0.0, asked.max() - p["fmax"]), 0.0, p["fmax"])
         told = np.array([speed(p, f) for f in asked])
@@ -381,11 +380,8 @@ LIFTS = {  # set -> thrust over weight, as its source or what was derived of it 
     "crazys": 2.41,
     "hummingbird": 10.2,
 }
-HOVERS = {
-    "crazyflow": 18_968,
-    "gym": 14_480,
-    "rotorpy": 17_079,
-}  # rpm at which a set hovers, of the same sources
+# rpm at which a set hovers, of the same sources
+HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}
 
 
 @pytest.mark.parametrize("name", list(QUADROTOR.sets))

@@ -160,11 +160,8 @@ def test_nominal_is_the_equation_without_dry_friction(name):
             assert f + g * u[i % plant.driven] == pytest.approx(expected[i], rel=1e-10, abs=1e-10)
 
 
-START = {
-    "furuta": (0.0, 2.6),
-    "servo_axis": 0.1,
-    "acrobot": (0.5, 1.0),
-}  # the Furuta pendulum about hanging
+# the Furuta pendulum about hanging
+START = {"furuta": (0.0, 2.6), "servo_axis": 0.1, "acrobot": (0.5, 1.0)}
 
 
 @pytest.mark.slow

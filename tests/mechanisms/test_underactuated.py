@@ -22,10 +22,8 @@ import smc_mujoco as smc
 NAMES = ("cart_pole", "overhead_crane")
 PLANTS = pytest.mark.parametrize("name", NAMES)
 GRAV = 9.81
-LENGTH = {
-    "cart_pole": 4.0 / 3.0 * 0.5,
-    "overhead_crane": -0.7,
-}  # m, L of the law's docstring
+# m, L of the law's docstring
+LENGTH = {"cart_pole": 4.0 / 3.0 * 0.5, "overhead_crane": -0.7}
 LAW = SimpleNamespace(**smc.law("hierarchical").gains)
 
 

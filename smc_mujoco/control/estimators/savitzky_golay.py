@@ -77,9 +77,8 @@ def savitzky_golay(y, gains, memory):
     v = 0.0
     a = 0.0
     for i in range(N):
-        x = (
-            memory[readings + (newest + 1 + i) % N] - y.x
-        )  # less rounding: a constant has no derivative
+        # less rounding: a constant has no derivative
+        x = memory[readings + (newest + 1 + i) % N] - y.x
         v += memory[velocities + i] * x
         a += memory[accelerations + i] * x
     return v / y.dt, a / y.dt**2

@@ -69,9 +69,8 @@ def adrc_attitude(y, gains, memory):
         y, -gains.kv * s[:3], gains.kx * ones, gains.kv * ones, memory
     )
     angle, change = shorter(error, turning)
-    turns = (
-        inner(angle, memory[3:, 3]) < -2.0
-    )  # from one side of 180 degrees to the other, where |y| = 2
+    # from one side of 180 degrees to the other, where |y| = 2
+    turns = inner(angle, memory[3:, 3]) < -2.0
     l1, l2, l3 = corrections(gains.wo, y.dt)
     follow = 1.0 if gains.lag == 0.0 else -math.expm1(-y.dt / gains.lag)
     part = max(abs(error[0]), LEAST)

@@ -47,9 +47,8 @@ from smc_mujoco.mechanisms.rotation import quaternion, relative
 
 LEAST = 20_000 / 42_700  # of the weight, that the thrust carries at least
 DEGREES = math.pi / 180.0
-OF_ANGLE, OF_HEADING, OF_RATE, OF_YAW = (
-    bound * DEGREES for bound in (20.0, 360.0, 33.3, 166.7)
-)  # integrals' bounds
+# integrals' bounds
+OF_ANGLE, OF_HEADING, OF_RATE, OF_YAW = (bound * DEGREES for bound in (20.0, 360.0, 33.3, 166.7))
 
 
 @njit

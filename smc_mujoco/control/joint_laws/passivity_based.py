@@ -36,7 +36,6 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, SPEED, Gain
 )
 def passivity_based(y, gains, memory):
     s = y.de + gains.c * y.e
-    feedforward = (
-        product(y.M, y.ddr - gains.c * y.de) + y.h - coriolis(y, s)
-    )  # C v_r = C v - C s, and h has C v
+    # C v_r = C v - C s, and h has C v
+    feedforward = product(y.M, y.ddr - gains.c * y.de) + y.h - coriolis(y, s)
     return feedforward - gains.K * s - gains.k * saturate(s / gains.width), s

@@ -31,10 +31,8 @@ from smc_mujoco.control.law import command, input_gain, law_function, linear_pla
 from smc_mujoco.control.laws.lqi import monic
 from smc_mujoco.control.units import FORCE_PER_POSITION, INPUT_GAIN, RATE, RATE2, Gain
 
-ROUNDS, TERMS = (
-    200,
-    40,
-)  # of Newton's method and of the series of an exponential; chosen, more than doubles resolve
+# of Newton's method and of the series of an exponential; chosen, more than doubles resolve
+ROUNDS, TERMS = (200, 40)
 SUBOPTIMAL = 1.1  # gamma over its least value, as in the source's designs
 PHI, GAMMA, SLOTS = 12, 21, 30  # 3 x 3 matrices in the memory, by rows
 
@@ -42,12 +40,8 @@ PHI, GAMMA, SLOTS = 12, 21, 30  # 3 x 3 matrices in the memory, by rows
 @njit
 def design(a1, a2, b, k, wi):
     """Return F and Hs, three numbers each, in observable form of the shaped plant, and gamma."""
-    n0, n1, d1, d2 = (
-        b * k * wi,
-        b * k,
-        -a1,
-        -a2,
-    )  # the shaped plant is (n1 s + n0) / (s^3 + d2 s^2 + d1 s)
+    # the shaped plant is (n1 s + n0) / (s^3 + d2 s^2 + d1 s)
+    n0, n1, d1, d2 = (b * k * wi, b * k, -a1, -a2)
     p0 = abs(n0)
     p2, p1 = monic(p0, d1 * d1 + n1 * n1, d2 * d2 - 2.0 * d1)
     # X of the controllable form, which is Z of the observable form

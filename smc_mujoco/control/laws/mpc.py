@@ -44,12 +44,8 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 # `room`; then a row for each move: itself, its side (-1 held at the lower bound, 1 at the upper, 0
 # free), its function of e, de and the bounds' middle and reach, the linear term by e and by de; the
 # gradient, the step, what a share of it changes; and the Hessian and the factor, 20 x 20, by rows.
-MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = (
-    20,
-    40,
-    40,
-    40,
-)  # chosen; from no plan 34 steps were enough in 60,000 states
+# chosen; from no plan 34 steps were enough in 60,000 states
+MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = (20, 40, 40, 40)
 AT_E, AT_DE, AT_MIDDLE, AT_REACH, MOST_E, MOST_DE, MOST_MIDDLE, ROOM = range(10, 18)
 PLAN, SIDE, FROM_E, FROM_DE, FROM_MIDDLE, FROM_REACH, BY_E, BY_DE = range(18, 26)
 ROW = 8
@@ -60,10 +56,8 @@ HESSIAN = 238
 FACTOR = 638
 SLOTS = 1038
 UNBOUNDED = 1e30  # in place of no bound, as 0 times infinity is no number
-ENOUGH, FAR = (
-    1e-13,
-    1e-6,
-)  # gradient of free moves over the linear term: solved up to it; above it, solved from v = 0
+# gradient of free moves over the linear term: solved up to it; above it, solved from v = 0
+ENOUGH, FAR = (1e-13, 1e-6)
 SUFFICIENT = 1e-4  # share of the decrease that the gradient promises, L. Armijo's
 
 
@@ -300,9 +294,8 @@ def advance(n, low, high, memory):
     """
     share = newton(n, low, high, memory)
     for _ in range(MOST_HALVINGS):
-        enough = move(
-            n, share, low, high, memory
-        )  # a whole step that no bound clips ends at the least cost
+        # a whole step that no bound clips ends at the least cost
+        enough = move(n, share, low, high, memory)
         if not enough:
             promised = 0.0
             curved = 0.0

@@ -26,9 +26,8 @@ from smc_mujoco.control.units import FORCE, POSITION, RATE, SPEED, Gain
 
 UNITS = 32768
 MAX_WORD = 32767
-TABLE = np.array(
-    [round(MAX_WORD * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64
-)  # each fits 16 bits
+# each fits 16 bits
+TABLE = np.array([round(MAX_WORD * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64)
 TABLE.flags.writeable = False
 
 

@@ -20,10 +20,8 @@ import numpy as np
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
-MAX_STEPS, MAX_S = (
-    256,
-    5.0,
-)  # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
+# steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
+MAX_STEPS, MAX_S = (256, 5.0)
 TABLE = np.array([math.tanh(MAX_S * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1.0])
 TABLE.flags.writeable = False
 

@@ -32,10 +32,8 @@ UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE
 
 Place = Annotated[float, Number(low=-1e6, high=1e6)]  # rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
-ONE_JOINT = (
-    mujoco.mjtTrn.mjTRN_JOINT.value,
-    mujoco.mjtTrn.mjTRN_JOINTINPARENT.value,
-)  # transmissions to one joint
+# transmissions to one joint
+ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
@@ -88,8 +86,7 @@ def coerce(channels: object) -> Pairs:
         raise ScenarioError(
             f"channels is {shown(channels)}: give joints' names, such as ['elbow', 'wrist']"
         )
-    named = isinstance(channels, Mapping)
-    if named:
+    if isinstance(channels, Mapping):
         pairs = list(channels.items())
     else:
         pairs = [(joint, None) for joint in items_of("channels", channels)]
@@ -100,13 +97,16 @@ def coerce(channels: object) -> Pairs:
 
 def as_text(joint: str, channel: Channel) -> str:
     """Return a channel as on the command line, such as "lift(motor,x0=0.2)"."""
-    given = [
-        field.name
-        if value is True
-        else f"{field.name}={value if isinstance(value, str) else format(value, 'g')}"
-        for field in dataclasses.fields(channel)
-        if field.name not in SUGGESTED and (value := getattr(channel, field.name)) != field.default
-    ]
+    given = []
+    for field in dataclasses.fields(channel):
+        value = getattr(channel, field.name)
+        if field.name in SUGGESTED or value == field.default:
+            continue
+        if value is True:
+            given.append(field.name)
+        else:
+            text = value if isinstance(value, str) else format(value, "g")
+            given.append(f"{field.name}={text}")
     if given:
         return f"{joint}({','.join(given)})"
     return joint
@@ -121,18 +121,14 @@ def joints_of(channels: Pairs) -> list[str]:
 def channel(joint: object, value: object) -> Channel:
     """Coerce a Channel, a dict of its fields, or None to a Channel."""
     if isinstance(value, Mapping):
+        known = {field.name: None for field in dataclasses.fields(Channel)}
         for key in value:
-            find(
-                "field of a Channel",
-                key,
-                {field.name: None for field in dataclasses.fields(Channel)},
-            )
+            find("field of a Channel", key, known)
+    made = value
     if value is None:
         made = Channel()
     elif isinstance(value, Mapping):
         made = Channel(**value)
-    else:
-        made = value
     if not isinstance(made, Channel):
         raise ScenarioError(
             f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None"
@@ -350,10 +346,9 @@ class Motor(NamedTuple):
 def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
     """Return the motor that drives a joint."""
     joint_id = model.joint(joint).id
+    bounds = []
     if model.jnt_actfrclimited[joint_id]:
-        bounds = [tuple(map(float, model.jnt_actfrcrange[joint_id]))]
-    else:
-        bounds = []
+        bounds.append(tuple(map(float, model.jnt_actfrcrange[joint_id])))
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
     actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
     if channel.motor:
@@ -435,16 +430,15 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, f
     """
     if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
         return -math.inf, math.inf
-    ends = []
+    low = 0.0
+    high = 0.0
     for i in actuators:
-        ends.append(
-            sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i])
-        )
-    low = sum(low for low, _ in ends)
-    high = sum(high for _, high in ends)
+        ends = sorted(model.actuator_gear[i, 0] * model.actuator_forcerange[i])
+        low += float(ends[0])
+        high += float(ends[1])
     if low < 0.0 < high:
-        return (low, high)
-    return (-math.inf, math.inf)
+        return low, high
+    return -math.inf, math.inf
 
 
 def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
@@ -462,10 +456,7 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
             name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
         )
         made.set_to_motor()
-        if math.isfinite(motor.limit):
-            limit = motor.limit
-        else:
-            limit = 0.0
+        limit = motor.limit if math.isfinite(motor.limit) else 0.0
         made.gear = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         made.ctrllimited = False
         made.forcelimited = limit > 0.0

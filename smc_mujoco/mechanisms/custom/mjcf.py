@@ -35,13 +35,8 @@ DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
 RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
-RESERVED_KINDS = (
-    "BODY",
-    "JOINT",
-    "GEOM",
-    "TENDON",
-    "TEXT",
-)  # kinds of object that this package's parts add
+# kinds of object that this package's parts add
+RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 
@@ -220,15 +215,7 @@ def digest_of(spec: mujoco.MjSpec) -> str:
 def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
     """Return name -> content of each file that an MjSpec names, given its XML."""
     elements = _elements(text)
-    inner = {
-        "",
-        *(
-            element.get(name, "")
-            for element in elements
-            if element.tag == "compiler"
-            for name in FOLDERS
-        ),
-    }
+    inner = {"", *_folders(elements)}
     assets = dict(spec.assets)
     for name in _files(elements):
         places = [Path(spec.modelfiledir) / sub / name for sub in sorted(inner)]
@@ -268,11 +255,8 @@ def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
 
 def fields(model: mujoco.MjModel) -> list[str]:
     """Return the names of the model's arrays of numbers."""
-    return [
-        name
-        for name in dir(model)
-        if name[0] != "_" and isinstance(getattr(model, name), np.ndarray)
-    ]
+    names = [name for name in dir(model) if name[0] != "_"]
+    return [name for name in names if isinstance(getattr(model, name), np.ndarray)]
 
 
 def tried(source: Source, timeout: float) -> None:
@@ -306,9 +290,8 @@ def tried(source: Source, timeout: float) -> None:
 def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:
     """Return the error for a model, from its trial."""
     names = {-known.value: known.name for known in signal.Signals}
-    if failed.code is None:
-        cause = ""
-    else:
+    cause = ""
+    if failed.code is not None:
         cause = names.get(failed.code, f"exit code {failed.code}")
     too_much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
     if cause == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
@@ -318,10 +301,7 @@ def _complaint(source: Source, failed: guard.Failed, timeout: float) -> Scenario
     if not cause:
         slow = f"takes MuJoCo more than {timeout:g} s to compile"
         return ScenarioError(f"{source.label} {slow}: make it smaller, or give timeout=")
-    if cause == "SIGABRT":
-        hint = too_much
-    else:
-        hint = "a model that attaches itself"
+    hint = too_much if cause == "SIGABRT" else "a model that attaches itself"
     return ScenarioError(f"{source.label} ends MuJoCo with {cause}, as does {hint}: fix the model")
 
 
@@ -357,19 +337,12 @@ def digest(path: Path) -> str:
         folders[text.parent] = None
         elements = _elements(text)
         names += _files(elements)
-        inner |= {
-            element.get(name, ""): None
-            for element in elements
-            if element.tag == "compiler"
-            for name in FOLDERS
-        }
+        inner |= dict.fromkeys(_folders(elements))
         for place in [folder / sub / name for name in names for sub in inner for folder in folders]:
             if place.is_file() and place.resolve() not in files:
                 files[place.resolve()] = None
                 if place.suffix.lower() in XML:
-                    texts += [place]
-                else:
-                    texts += []
+                    texts.append(place)
     return _sha256(file.read_bytes() for file in files)
 
 
@@ -388,12 +361,19 @@ def _elements(model: Path | str | bytes) -> list[ET.Element]:
 
 def _files(elements: Iterable[ET.Element]) -> list[str]:
     """Return the names of files in the attributes of elements."""
-    return [
-        value
-        for element in elements
-        for key, value in element.attrib.items()
-        if key.startswith("file")
-    ]
+    names = []
+    for element in elements:
+        names += [value for key, value in element.attrib.items() if key.startswith("file")]
+    return names
+
+
+def _folders(elements: Iterable[ET.Element]) -> list[str]:
+    """Return the folders of files that the compiler elements name; "" for one that they do not."""
+    folders = []
+    for element in elements:
+        if element.tag == "compiler":
+            folders += [element.get(name, "") for name in FOLDERS]
+    return folders
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
@@ -408,11 +388,9 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
-        endless = field.endswith("range")  # ranges may be infinite
-        if endless:
+        wrong = ~(np.abs(values) <= MAX_PARAMETER)
+        if field.endswith("range"):  # ranges may be infinite
             wrong = np.isnan(values)
-        else:
-            wrong = ~(np.abs(values) <= MAX_PARAMETER)
         if wrong.any():
             cure = f"give finite numbers of at most {MAX_PARAMETER:g} in its MJCF"
             raise ScenarioError(

@@ -182,9 +182,8 @@ class NominalModel:
         """Return the model, its channels' indices, and an mjData for one simulation."""
         model, places, _, spare = prepared(self, frozen(parameters))
         try:
-            data = (
-                spare.pop()
-            )  # used before, but a simulation writes every field before it reads it
+            # used before, but a simulation writes every field before it reads it
+            data = spare.pop()
         except IndexError:
             data = mujoco.MjData(model)
         return model, places, BorrowedData(data, spare)

@@ -44,9 +44,8 @@ UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"
-DCMOTOR = (
-    mujoco.mjtDyn.mjDYN_DCMOTOR.value
-)  # dynamics of an actuator whose state changes even at ctrl = 0
+# dynamics of an actuator whose state changes even at ctrl = 0
+DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,35 +57,25 @@ class UserModel:
     channels: Pairs
     motors: tuple[Motor, ...]
     tip: str = ""
-    thrusters: tuple[
-        int, ...
-    ] = ()  # indices of the actuators of a free joint, which is then the only channel
+    # indices of the actuators of a free joint, which is then the only channel
+    thrusters: tuple[int, ...] = ()
 
     def __call__(self, n: int) -> mujoco.MjSpec:
         """Return the model with a motor and two sensors per channel."""
         spec = self.source.read()
-        while named := [
-            *spec.tuples,
-            *spec.sensors,
-        ]:  # tuples may name sensors and motors that are deleted
-            spec.delete(
-                named[0]
-            )  # MuJoCo 4 also deletes the tuples that name it, so list them again
+        # tuples may name sensors and motors that are deleted
+        while named := [*spec.tuples, *spec.sensors]:
+            # MuJoCo 4 also deletes the tuples that name it, so list them again
+            spec.delete(named[0])
         if self.thrusters:
             own.add_pose(spec, self.channels[0][0], self.thrusters)
         else:
             own.add_motors(spec, self.motors)
-        for joint in () if self.thrusters else own.joints_of(self.channels):
-            for letter, kind in (
-                ("x", mujoco.mjtSensor.mjSENS_JOINTPOS),
-                ("v", mujoco.mjtSensor.mjSENS_JOINTVEL),
-            ):
-                spec.add_sensor(
-                    name=f"{letter}:{joint}",
-                    type=kind,
-                    objtype=mujoco.mjtObj.mjOBJ_JOINT,
-                    objname=joint,
-                )
+            for joint in own.joints_of(self.channels):
+                on_joint = {"objtype": mujoco.mjtObj.mjOBJ_JOINT, "objname": joint}
+                kinds = mujoco.mjtSensor
+                spec.add_sensor(name=f"x:{joint}", type=kinds.mjSENS_JOINTPOS, **on_joint)
+                spec.add_sensor(name=f"v:{joint}", type=kinds.mjSENS_JOINTVEL, **on_joint)
         # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
         for part in (*spec.joints, *spec.tendons):
             if part.frictionloss > 0.0 and np.array_equal(part.solref_friction, SOFT_SOLREF):
@@ -140,9 +129,9 @@ class UserFields:
 
     def __call__(self, model, p):
         scale = np.ones(model.nbody)
-        scale[[not model.body(i).name.startswith(ROTOR) for i in range(model.nbody)]] = (
-            p.m / self.mass
-        )
+        for i in range(model.nbody):
+            if not model.body(i).name.startswith(ROTOR):
+                scale[i] = p.m / self.mass
         yield Field("body_mass", slice(None), model.body_mass * scale)
         yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
         if self.gravity:
@@ -187,9 +176,8 @@ def plant_from(
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, timeout)
-    if name is not None and catalogue().taken(
-        errors.name("name", name)
-    ):  # laws and gains refer to plants by name
+    # laws and gains refer to plants by name
+    if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     return _plant(source, own.coerce(channels), name, keyframe, tip)
 
@@ -214,47 +202,35 @@ def _plant(
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
     if tip is not None:
         mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
-    pose = own.is_free(model, joints[0])
-    if pose:
-        motors = ()
+    file = label.removesuffix(".xml")
+    if catalogue().taken(file):  # a plant of the library has this name
+        file = label
+    plant_name = file if name is None else name
+    motors = ()
+    thrusters = ()
+    if own.is_free(model, joints[0]):
+        if tip or scenarios:
+            cure = "leave the tip out" if tip else f"give {', '.join(scenarios)} to the scenario"
+            raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
+        thrusters = tuple(own.thrusters(model, joints[0]))
+        limits = own.reach_of(label, model, joints[0])
+        units = ("m",) * 3 + ("rad",) * 3
+        x0 = own.pose_at_start(model, joints[0], keyframe)
+        special = {"rest": x0, "pose": own.held_pose(label, model, joints[0])}
     else:
         motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
-    if pose:
-        thrusters = tuple(own.thrusters(model, joints[0]))
-    else:
-        thrusters = ()
+        limits = tuple(motor.limit for motor in motors)
+        kinds = [mujoco.mjtJoint(model.joint(joint).type[0]) for joint in joints]
+        units = tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
+        start, checked = own.starts(model, joints, pairs, keyframe)
+        check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
+        x0 = tuple(start.values())
+        special = {"ranges": own.ranges(model, joints)}
     build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
-    limits = tuple(motor.limit for motor in motors)
-    if pose and (tip or scenarios):
-        if tip:
-            cure = "leave the tip out"
-        else:
-            cure = f"give {', '.join(scenarios)} to the scenario"
-        raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
-    if pose:
-        limits = own.reach_of(label, model, joints[0])
-    kinds = [mujoco.mjtJoint(model.joint(joint).type[0]) for joint in joints]
-    if pose:
-        units = ("m",) * 3 + ("rad",) * 3
-    else:
-        units = tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
     why_not = missing(model, joints, motors)
-    file = label.removesuffix(".xml")
-    file = label if catalogue().taken(file) else file  # a plant of the library has this name
-    plant_name = file if name is None else name
-    if pose:
-        start = {}
-        checked = []
-    else:
-        start, checked = own.starts(model, joints, pairs, keyframe)
-    check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
-    if pose:
-        x0 = own.pose_at_start(model, joints[0], keyframe)
-    else:
-        x0 = tuple(start.values())
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -262,10 +238,8 @@ def _plant(
         unit=units[0],
         mixed=units if len(set(units)) > 1 else (),
         x0=x0,
-        rest=x0 if pose else (),
         n=len(x0),
         sizes=(len(x0), len(x0)),
-        pose=own.held_pose(label, model, joints[0]) if pose else "",
         build=build,
         fields=fields,
         nominal=without_model if why_not else NominalModel(build, fields),
@@ -275,10 +249,10 @@ def _plant(
         smooth=smooth(model),
         unmodelled=why_not,
         limits=limits if any(limit < math.inf for limit in limits) else (),
-        ranges=() if pose else own.ranges(model, joints),
         tip=tip or "",
         suggested=scenarios,
         label=title if plant_name == file and title != UNNAMED else "",
+        **special,
     )
 
 
@@ -308,12 +282,9 @@ def smooth(model: mujoco.MjModel) -> bool:
 def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
-        return (
-            "equality constraints hold its joints together, and a nominal model has none: "
-            + WITHOUT_MODEL
-        )
+        return f"equality constraints hold its joints together: {WITHOUT_MODEL}"
     if model.nplugin or model.nflex:
-        return "it has plugins or flexible bodies: " + WITHOUT_MODEL
+        return f"it has plugins or flexible bodies: {WITHOUT_MODEL}"
     channel_dofs = []
     for dof in range(model.nv):
         if model.joint(int(model.dof_jntid[dof])).name in joints:
@@ -323,24 +294,16 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
         idle[own.thrusters(model, joints[0])] = False
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
-        return (
-            "a dcmotor among its other actuators has a current that is not measured: "
-            + WITHOUT_MODEL
-        )
-    across = model.ntendon or np.any(
-        ~np.isin(model.actuator_trntype[idle], own.ONE_JOINT)
-    )  # may couple trees
-    if across:
+        return f"a dcmotor has a current that is not measured: {WITHOUT_MODEL}"
+    # what may couple trees
+    if model.ntendon or not np.all(np.isin(model.actuator_trntype[idle], own.ONE_JOINT)):
         near = range(model.nv)
     else:
         near = np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))
     loose = [model.joint(model.dof_jntid[dof]) for dof in near if dof not in channel_dofs]
     if not loose:
         return ""
-    if loose[0].name:
-        named = f"joint {loose[0].name!r}"
-    else:
-        named = "a joint without a name"
+    named = f"joint {loose[0].name!r}" if loose[0].name else "a joint without a name"
     cure = "make it a channel, or the partner of one if nothing drives it"
     return f"{named} moves with its channels and is not measured: {cure}, or {WITHOUT_MODEL}"
 

@@ -31,9 +31,8 @@ BUFFER_RADIUS = 0.030  # m
 STOP_DEPTH = 1.0  # m, depth of a stop behind its face, enough for a blow of 100 m/s
 FACE_X = HALF_BLOCK + BUFFER_RADIUS  # m, from the cart's middle to the face of its buffers
 POST_RADIUS = 0.020  # m
-SINK_DEPTH = (
-    (1 - SOFT_IMPEDANCE) * GRAVITY * SOLREF_RUB[0] ** 2 / 4
-)  # m, of the block's corners at rest
+# m, of the block's corners at rest
+SINK_DEPTH = (1 - SOFT_IMPEDANCE) * GRAVITY * SOLREF_RUB[0] ** 2 / 4
 
 
 def stops(spec: mujoco.MjSpec, x: float) -> None:

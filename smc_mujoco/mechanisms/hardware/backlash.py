@@ -108,9 +108,8 @@ def _add_rotor(
         if np.linalg.norm(arm) < MIN_ARM:  # a wheel: any direction across its axis does
             arm = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         away = arm / np.linalg.norm(arm)
-        face = axis * math.copysign(
-            0.045, -axis[1]
-        )  # in front of the hub, towards the camera at -y
+        # in front of the hub, towards the camera at -y
+        face = axis * math.copysign(0.045, -axis[1])
         ends = (*face, *(face + 0.16 * away))
     else:
         ends = (0.0, -0.05, 0.155, 0.0, 0.05, 0.155)  # across the cart's top

@@ -55,22 +55,15 @@ MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
 FIRM_IMPEDANCE = 0.95
 SOFT_IMPEDANCE = 0.01
 REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # no effect if d is constant
-SOLREF_RUB = (
-    0.008,
-    1.0,
-)  # s and damping ratio of the normal: 8 steps of 1 ms; with fewer the block trembles
+# s and damping ratio of the normal: 8 steps of 1 ms; with fewer the block trembles
+SOLREF_RUB = (0.008, 1.0)
 # 1/s, b: chosen; half doubles the creep of the block, twice varies friction 4 times as much
 STICKING_RATE = 200.0
-SOLREF_SLIDE = (
-    2.0 / (SOFT_IMPEDANCE * STICKING_RATE),
-    1.0,
-)  # s and damping ratio across the normal
+# s and damping ratio across the normal
+SOLREF_SLIDE = (2.0 / (SOFT_IMPEDANCE * STICKING_RATE), 1.0)
 IMPRATIO = 5e3 / SOFT_IMPEDANCE  # how much stiffer friction is than the normal
-TURNING_FRICTION = (
-    0.005,
-    0.0001,
-    0.0001,
-)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
+# MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
+TURNING_FRICTION = (0.005, 0.0001, 0.0001)
 SLIDING_FRICTION = slice(0, 2)  # of a pair's five friction coefficients
 
 
@@ -177,10 +170,7 @@ def solref(restitution: float, impedance: float) -> tuple[float, float]:
     e = max(restitution, MIN_RESTITUTION)
     zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
     share = 1.0 / (impedance + (1.0 - impedance) / 3.0)
-    if impedance == SOFT_IMPEDANCE:
-        depth = DEPTH_OF_BOBS
-    else:
-        depth = DEPTH
+    depth = DEPTH_OF_BOBS if impedance == SOFT_IMPEDANCE else DEPTH
     return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
 
 
@@ -191,10 +181,7 @@ def hit(
     spec: mujoco.MjSpec, geoms: tuple[str, str], restitution: float, both_move: bool = False
 ) -> None:
     """Let two geoms hit each other, without friction."""
-    if both_move:
-        impedance = SOFT_IMPEDANCE
-    else:
-        impedance = FIRM_IMPEDANCE
+    impedance = SOFT_IMPEDANCE if both_move else FIRM_IMPEDANCE
     _pair(spec, HIT, geoms, solref(restitution, impedance), impedance, 0.0)
 
 
@@ -248,10 +235,8 @@ def bar(
     round_ends: bool = False,
 ) -> None:
     """Add a round bar between two points, m in the body's frame."""
-    if round_ends:
-        kind = mujoco.mjtGeom.mjGEOM_CAPSULE
-    else:
-        kind = mujoco.mjtGeom.mjGEOM_CYLINDER
+    kinds = mujoco.mjtGeom
+    kind = kinds.mjGEOM_CAPSULE if round_ends else kinds.mjGEOM_CYLINDER
     body.add_geom(
         name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material
     )

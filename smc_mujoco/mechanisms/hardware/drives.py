@@ -38,9 +38,8 @@ from smc_mujoco.mechanisms.hardware.part import (
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
-WINDING = slice(
-    0, 2
-)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
+# of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
+WINDING = slice(0, 2)
 MIN_WINDING_TIME = 1e-12  # s: a winding with a shorter time constant counts as instantaneous
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
 MAX_TIME_CONSTANTS = 1e9  # of a lag in a physics step: more count as this many
@@ -48,9 +47,8 @@ SHORT_STEP = 1e-3  # time constants: the series in `winding_step` errs by less t
 MIN_SHARE = 1e-9  # of a winding's drag that MuJoCo gets, so that it does not divide by 0
 MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 COMMANDS = ("torque", "voltage")
-COGGING = slice(
-    0, 2
-)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
+# of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
+COGGING = slice(0, 2)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,10 +226,8 @@ class DCMotor(Actuator):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
         torque = self.constant * self.current
-        share, voltage = (
-            1.0,
-            math.inf if self.ripple else self.voltage,
-        )  # `rippled` bounds it before the ripple
+        # `rippled` bounds it before the ripple
+        share, voltage = (1.0, math.inf if self.ripple else self.voltage)
         if self.delay:  # the callback simulates the winding, and bounds its voltage
             rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
             share = winding_step(model.opt.timestep / self.delay, rk4)[1]
@@ -322,9 +318,8 @@ class DriveStep(NamedTuple):
                 u + self.second_first * a + self.second_left * b,
             )
         end = np.clip(first_after, second - self.reach, second + self.reach)
-        gap = np.clip(
-            u + self.lagged * a - second, -self.reach, self.reach
-        )  # closed at the limit's rate
+        # closed at the limit's rate
+        gap = np.clip(u + self.lagged * a - second, -self.reach, self.reach)
         passing = force - 0.5 * gap * np.abs(gap) / self.reach
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 

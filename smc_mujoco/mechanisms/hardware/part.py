@@ -28,13 +28,8 @@ PLAY = "play:"  # a tendon of length rotor - joint
 # The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two
 # steps.
 HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
-HARD_SOLIMP = (
-    0.9999,
-    0.9999,
-    0.001,
-    0.5,
-    2.0,
-)  # impedance at and away from zero; equal, so the rest has no effect
+# impedance at and away from zero; equal, so the rest has no effect
+HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
@@ -214,9 +209,8 @@ def moves_alone(plant: Plant) -> bool:
     )
     motors &= np.all(model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE)
     motors &= np.all(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE)
-    motors &= model.nactuator == plant.driven and not np.any(
-        model.jnt_actgravcomp
-    )  # u is within the motors' ranges
+    # u is within the motors' ranges
+    motors &= model.nactuator == plant.driven and not np.any(model.jnt_actgravcomp)
     alone = (
         model.nv == model.njnt == plant.n
         and np.all(model.dof_parentid < 0)

@@ -65,10 +65,8 @@ def fields(model, p):
     lower = model.body("lower").id
     dofs = [model.joint(name).dofadr[0] for name in ("shoulder", "elbow")]
     rotor = model.tendon("rotor").id
-    across = (
-        p.I1 - p.m1 * p.r1**2,
-        p.I2 - p.m2 * p.r2**2,
-    )  # of each link about its own centre of mass
+    # of each link about its own centre of mass
+    across = (p.I1 - p.m1 * p.r1**2, p.I2 - p.m2 * p.r2**2)
     yield Field("body_mass", [upper, lower], (p.m1, p.m2))
     yield Field("body_ipos", [upper, lower], [(0.0, 0.0, -p.r1), (0.0, 0.0, -p.r2)])
     yield Field("body_inertia", [upper, lower], [(inertia, inertia, inertia) for inertia in across])

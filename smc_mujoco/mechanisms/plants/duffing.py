@@ -21,10 +21,8 @@ from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
 # m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
 ANCHOR_Y = 1.5
 SPRING_Z = 0.45  # m, height of the springs above the floor, over the block and the landscape
-STOP_X, PEG_X = (
-    1.7,
-    0.5,
-)  # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
+# m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
+STOP_X, PEG_X = (1.7, 0.5)
 HALF_RAIL = 2.07  # m, half the length of the rail between its posts
 
 

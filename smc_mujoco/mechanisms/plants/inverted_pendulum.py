@@ -22,12 +22,8 @@ LENGTH, BOB_RADIUS, ROD_RADIUS, HINGE_Z = 0.5, 0.065, 0.012, 0.8  # m
 FLOOR_ANGLE, FLOOR_RESTITUTION = 2.44, 0.3  # rad (140 degrees), of the bob on the floor; chosen
 STOP_ANGLE, STOP_RESTITUTION = 1.0, 0.4  # rad; restitution of rubber; both chosen
 WALL_ANGLE, WALL_RESTITUTION = 0.7, 0.8  # rad; both chosen
-PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = (
-    0.2,
-    0.30,
-    0.020,
-    0.4,
-)  # rad; m from the hinge; m; chosen
+# rad; m from the hinge; m; chosen
+PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = (0.2, 0.30, 0.020, 0.4)
 
 
 def build(n):

@@ -58,25 +58,15 @@ from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 LINKS = tuple(f"link{i}" for i in range(1, 8))
-LINK_MASS = math.fsum(
-    (4.970684, 0.646926, 3.228604, 3.587895, 1.225946, 1.666555, 0.735522)
-)  # kg, of the links
+# kg, of the links
+LINK_MASS = math.fsum((4.970684, 0.646926, 3.228604, 3.587895, 1.225946, 1.666555, 0.735522))
 STEEL_DENSITY = 7850.0  # kg/m^3
 FLANGE_DISTANCE = 0.107  # m, from joint 7 to the flange
-TABLE_HEIGHT, WALL_DISTANCE = (
-    0.2,
-    0.65,
-)  # m: height of the table, and distance of the wall from the arm's first axis
+# m: height of the table, and distance of the wall from the arm's first axis
+TABLE_HEIGHT, WALL_DISTANCE = (0.2, 0.65)
 PROBE_FRICTION = 0.2  # coefficient of friction between the probe and table or wall: chosen
-READY_POSE = (
-    0.0,
-    -math.pi / 4,
-    0.0,
-    -3 * math.pi / 4,
-    0.0,
-    math.pi / 2,
-    math.pi / 4,
-)  # rad, the maker's
+# rad, the maker's
+READY_POSE = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)
 JOINT_RANGES = (
     (-2.8973, 2.8973),
     (-1.7628, 1.7628),

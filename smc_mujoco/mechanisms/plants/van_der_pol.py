@@ -21,10 +21,8 @@ DAMPER_Z = 0.45  # m, height of the damper above the floor, over the block
 POST_END, CART_END = 2.57, 0.175  # m, |x| of the springs' ends on the posts and on the cart
 REST_LENGTH = 0.35  # m, their rest length: chosen, so that both pull while |x| < 2.045 m
 SPRINGS = (("left_spring", -1), ("right_spring", 1))
-STOP_X, PEG_X = (
-    2.2,
-    0.5,
-)  # m, |x| at end stops and x at the post: chosen, outside the limit cycle, and between x0 and 0
+# m, |x| at end stops and x at the post: chosen, outside the limit cycle, and between x0 and 0
+STOP_X, PEG_X = (2.2, 0.5)
 
 
 def build(n):

@@ -71,9 +71,8 @@ def newton_euler(duration, period):
         Mx = 6e-4 * math.sin(5.0 * t)
         My = 3e-4 * math.cos(7.0 * t)
         Mz = 2e-4 * math.sin(3.0 * t + 1.0)
-        signs = np.array(
-            [(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)]
-        )  # as in the firmware's power distribution
+        # as in the firmware's power distribution
+        signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])
         asked = F / 4 + signs @ np.array([Mx / LEVER, My / LEVER, Mz / YAW]) / 4
         asked = np.clip(asked - max(0.0, asked.max() - MOST), 0.0, MOST)
 
@@ -400,9 +399,8 @@ def test_disturbances_are_forces_on_the_centre_of_mass_and_turn_nothing():
             seed=3,
         )
     ).d
-    assert (
-        np.abs(np.corrcoef(wind[:, :3].T)[np.triu_indices(3, 1)]).max() < 0.9
-    )  # each axis has its own
+    # each axis has its own
+    assert np.abs(np.corrcoef(wind[:, :3].T)[np.triu_indices(3, 1)]).max() < 0.9
     assert np.ptp(wind[:, 0]) > 0.01
 
 

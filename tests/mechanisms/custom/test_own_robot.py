@@ -75,10 +75,7 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
     model = plant.build(2).compile()
     plain = mujoco.MjSpec.from_file("arm.urdf").compile()
     assert (plain.ngeom, model.ngeom) == (1, 3)
-    assert sorted(model.geom_group.tolist()) == [
-        1,
-        1,
-        3,
-    ]  # the box, which is for contacts, is not seen
+    # the box, which is for contacts, is not seen
+    assert sorted(model.geom_group.tolist()) == [1, 1, 3]
     np.testing.assert_array_equal(model.body_mass, plain.body_mass)
     np.testing.assert_array_equal(model.body_inertia, plain.body_inertia)

@@ -125,11 +125,8 @@ FOREIGN = {
     "acrobot": acrobot,
     "reacher": reacher,
 }
-CTRL = {
-    "cartpole": 0.3,
-    "acrobot": 0.4,
-    "reacher": 0.002,
-}  # of each motor of the file
+# of each motor of the file
+CTRL = {"cartpole": 0.3, "acrobot": 0.4, "reacher": 0.002}
 
 
 @pytest.mark.slow
@@ -383,10 +380,8 @@ def test_a_mismatch_is_in_the_true_model_alone(arm):
 def test_u_is_the_force_on_the_joint_within_the_motor_s_limits(arm):
     plant = arm()
     assert isinstance(plant.build, UserModel)
-    assert plant.limits == (
-        4.0,
-        math.inf,
-    )  # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
+    # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
+    assert plant.limits == (4.0, math.inf)
 
     @smc.law_function
     def much(y, gains, memory):
@@ -1054,9 +1049,8 @@ def test_an_mjspec_keeps_all_its_digits_and_is_taken_as_it_is_now(meshed):
     assert plant.load().dof_damping[0] == 0.12345678901234567
     assert plant.limits == smc.plant_from(meshed[0], ["j"]).limits
     assert smc.plant_from(spec, ["j"]).load().dof_damping[0] == 9.0
-    assert (
-        "0.123457" in mujoco.MjSpec.from_file(str(meshed[0])).to_xml()
-    )  # for others MuJoCo writes as it did
+    # for others MuJoCo writes as it did
+    assert "0.123457" in mujoco.MjSpec.from_file(str(meshed[0])).to_xml()
 
 
 # kept

@@ -186,9 +186,8 @@ def test_a_rate_limit_follows_the_lag():
     trace = smc.run(scenario(smc.Lag(0.01), smc.hardware.RateLimit(20.0)))
     fine = np.linspace(0.0, 0.1, 100_001)
     lagged = 1.0 - np.exp(-fine / 0.01)
-    meets = np.argmax(
-        (lagged <= 20.0 * fine) & (fine > 0.0)
-    )  # the lag is steeper at first, and flatter in the end
+    # the lag is steeper at first, and flatter in the end
+    meets = np.argmax((lagged <= 20.0 * fine) & (fine > 0.0))
     force = np.concatenate((20.0 * fine[:meets], lagged[meets:]))
     total = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1])) * 1e-6))
     assert trace.force[1:, 0] == pytest.approx(
@@ -254,9 +253,8 @@ def moved(s, u):
     return np.array(x)
 
 
-WEAK = smc.DCMotor(
-    0.5, 4e-4, 0.4, 2.0, 1e-4, voltage=3.0, command="voltage"
-)  # L/R = 0.8 ms; 1.3 N m s/rad of back-EMF
+# L/R = 0.8 ms; 1.3 N m s/rad of back-EMF
+WEAK = smc.DCMotor(0.5, 4e-4, 0.4, 2.0, 1e-4, voltage=3.0, command="voltage")
 
 
 @pytest.mark.parametrize(

@@ -132,9 +132,8 @@ def test_the_rotors_inertia_is_reflected_to_the_joint(name):
     own = build(plant(name))
     reflected = MOTOR.gear**2 * MOTOR.rotor_inertia
     assert with_motor.dof_armature == pytest.approx(own.dof_armature + reflected, rel=1e-12)
-    assert with_motor.dof_M0 == pytest.approx(
-        own.dof_M0 + reflected, rel=1e-9
-    )  # mj_setConst saw it
+    # mj_setConst saw it
+    assert with_motor.dof_M0 == pytest.approx(own.dof_M0 + reflected, rel=1e-9)
 
 
 def test_a_motor_of_vanishing_constant_is_the_ideal_actuator():
@@ -174,9 +173,8 @@ def test_play_of_no_width_is_a_rigid_rotor(name):
     at_twice_the_step = home(rigid)
     rigid.opt.timestep = 2 * H
     driven(rigid, sine, seconds, at_twice_the_step)
-    assert (
-        deviation < 0.1 * np.abs(at_twice_the_step.qpos - b.qpos).max()
-    )  # a tenth of the step's own error
+    # a tenth of the step's own error
+    assert deviation < 0.1 * np.abs(at_twice_the_step.qpos - b.qpos).max()
     assert a.qpos[: rigid.nq] == pytest.approx(b.qpos, abs=1e-4)
 
 

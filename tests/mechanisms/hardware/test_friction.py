@@ -144,9 +144,8 @@ def test_lugre_breaks_away_at_its_static_level(h, part):
         mujoco.mj_step(model, data)
         most, speed = max(most, -data.actuator_force[friction]), data.qvel[0]
     assert most == pytest.approx(part.static, rel=0.02)
-    assert (
-        speed > 10 * part.static / 20.0 / part.stiffness
-    )  # it slides, far faster than bristles bend
+    # it slides, far faster than bristles bend
+    assert speed > 10 * part.static / 20.0 / part.stiffness
 
 
 @PLANTS

@@ -302,15 +302,8 @@ def scenarios():
             x0=start,
             **gust,
         )
-    at_a_stop = (
-        0.0,
-        0.0,
-        0.0,
-        -0.0750,
-        0.0,
-        1.5,
-        0.0,
-    )  # the elbow, which it then meets: the load has its force
+    # the elbow, which it then meets: the load has its force
+    at_a_stop = (0.0, 0.0, 0.0, -0.0750, 0.0, 1.5, 0.0)
     yield smc.Scenario(
         plant="panda", law="none", friction=frictions[2], x0=at_a_stop, v0=0.5, **common
     )
@@ -321,9 +314,8 @@ def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
     for scenario, trace in zip(several, smc.run(several), strict=True):
         assert trace.failure is None
         assert_same(trace, reference.run(scenario))
-        assert (
-            np.abs(np.diff(np.sign(trace.v), axis=0)).sum() >= 2
-        )  # a joint turned back, so it stuck
+        # a joint turned back, so it stuck
+        assert np.abs(np.diff(np.sign(trace.v), axis=0)).sum() >= 2
 
 
 def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():

@@ -253,9 +253,8 @@ def looped(one):
 @pytest.mark.parametrize("kind", ["slow", "fast", "each step when it is due", "turns at once"])
 def test_the_steps_are_those_of_an_event_integration(kind):
     motor, push = KINDS[kind]
-    one = scenario(
-        dataclasses.replace(motor, speed=400.0), push
-    )  # so that the queue has room for all
+    # so that the queue has room for all
+    one = scenario(dataclasses.replace(motor, speed=400.0), push)
     _, steps = by_events(one)
     state, queue = (own := looped(one).motors[0]).state, own.queue
     made = [(queue[2 * i], queue[2 * i + 1]) for i in range(int(state.tail))]
@@ -277,9 +276,8 @@ def test_the_joint_moves_as_behind_these_steps(kind):
     )
     trace, steps = by_events(one)
     x, v, force = moved(motor, steps, one.plant, 0.3, trace.t, motor.gear**2 * motor.rotor_inertia)
-    rough = (
-        5e3 if kind == "jumps" else 1.0
-    )  # RK4 gets the mean and the first moment of a jump within a step
+    # RK4 gets the mean and the first moment of a jump within a step
+    rough = 5e3 if kind == "jumps" else 1.0
     assert trace.x[:, 0] == pytest.approx(x, abs=rough * 1e-9)
     assert trace.v[:, 0] == pytest.approx(v, abs=rough * 1e-7)
     assert trace.force[1:, 0] == pytest.approx(force, abs=rough * 1e-8)
