@@ -50,7 +50,8 @@ def seen(shape=()):
     random = np.random.default_rng(7)
     sizes = 10.0 ** np.linspace(0.0, -3.0, COUNT).reshape(-1, *(1 for _ in shape))
     e, de, others = (random.normal(size=(COUNT, *shape)) for _ in range(3))
-    e, de = e * sizes, de * sizes
+    e = e * sizes
+    de = de * sizes
     e[20] = de[30] = e[40] = de[40] = 0.0
     return zip(e, de, others, strict=True)
 

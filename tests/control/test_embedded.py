@@ -79,7 +79,15 @@ def test_single_precision_rounds_every_operation_to_24_bits():
     for _ in range(2):
         T = (T + T) / (f(1.0) + T * T)
     assert T.dtype == f
-    found = forces(smc.law("observer_free_single", lam=LAM, k1=K1), e, de)
+    found = forces(
+        smc.law(
+            "observer_free_single",
+            lam=LAM,
+            k1=K1,
+        ),
+        e,
+        de,
+    )
     np.testing.assert_array_equal(found[:, 0], -(f(LAM) * T).astype(float))
     np.testing.assert_array_equal(found[:, 1], s.astype(float))
 
@@ -126,10 +134,21 @@ def firmware(e, de, lam=LAM, k1=K1, e_range=4.0, de_range=8.0, u_range=8.0):
 
 def test_fixed_point_is_what_16_bit_words_and_32_bit_sums_compute():
     rng = np.random.default_rng(0)
-    e, de = rng.normal(scale=(0.5, 3.0), size=(20_000, 2)).T
+    e, de = rng.normal(
+        scale=(0.5, 3.0),
+        size=(20_000, 2),
+    ).T
     e[:100], de[:100] = 1e4 * e[:100], 1e4 * de[:100]  # far out of range
     u, s = firmware(e, de)
-    found = forces(smc.law("observer_free_q15", lam=LAM, k1=K1), e, de)
+    found = forces(
+        smc.law(
+            "observer_free_q15",
+            lam=LAM,
+            k1=K1,
+        ),
+        e,
+        de,
+    )
     np.testing.assert_array_equal(found[:, 0], u)
     np.testing.assert_array_equal(found[:, 1], s)
 
@@ -138,7 +157,15 @@ def test_fixed_point_is_as_close_as_its_words_allow():
     rng = np.random.default_rng(1)
     e = rng.uniform(-1.2, 1.2, 40_000)
     de = rng.uniform(-4.0, 4.0, 40_000)
-    u = forces(smc.law("observer_free_q15", lam=LAM, k1=K1), e, de)[:, 0]
+    u = forces(
+        smc.law(
+            "observer_free_q15",
+            lam=LAM,
+            k1=K1,
+        ),
+        e,
+        de,
+    )[:, 0]
     error = np.abs(u + LAM * np.tanh(de + K1 * e)).max()
     bound = LAM * (1.6e-4 + (K1 * 4.0 + 8.0 + 16.0) / 2**16) + 8.0 / 2**16
     assert 0.3 * bound < error <= bound

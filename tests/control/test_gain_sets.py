@@ -43,17 +43,6 @@ def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_s
         assert all(set(one) == set(search_space.box(law, scales)) for one in known.sets), name
 
 
-@pytest.mark.parametrize(("gain_set", "plant"), SETS)
-def test_every_search_is_of_the_one_rule(gain_set, plant):
-    for name, known in shipped(gain_set, plant).items():
-        ranked = gain_set == "tuned" and name in gains.COMPARED
-        assert known.rule == search.RULE, name
-        assert len(known.sets) == len(known.objectives) == (search.SEARCHES if ranked else 3), name
-        assert known.evaluations <= len(known.sets) * search.BUDGET * len(known.best), name
-        assert known.first in known.front, name
-        assert known.sets[known.objectives.index(known.objective)] is known.best, name
-
-
 def test_run_i_of_a_law_has_gain_set_i():
     made = grid.grid("duffing", ["observer_free", "power_rate"], "nominal", 50)
     for name in ("observer_free", "power_rate"):

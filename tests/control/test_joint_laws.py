@@ -139,7 +139,11 @@ def test_observer_free_joint_rests_at_its_reference_where_gravity_is_compensated
     """
     lam = np.array([20.0, 6.0, 9.0])
     k1 = np.array([3.0, 2.0, 4.0])
-    law = smc.law("observer_free_joint", lam=lam, k1=k1)
+    law = smc.law(
+        "observer_free_joint",
+        lam=lam,
+        k1=k1,
+    )
     given = run(
         law,
         model="nominal",
@@ -219,9 +223,25 @@ def test_time_delay_sliding_is_stable_below_twice_the_inertia_and_not_above():
         "duration": 0.5,
         "u_max": 1e9,
     }
-    stable = run(smc.law("time_delay_sliding", m=1.9 * M, k=1.0), **common)
+    stable = run(
+        smc.law(
+            "time_delay_sliding",
+            m=1.9 * M,
+            k=1.0,
+        ),
+        **common,
+    )
     assert np.abs(np.diff(stable.u[-20:, 0])).max() < 1e-2
-    above = smc.run(smc.Scenario(law=smc.law("time_delay_sliding", m=2.1 * M, k=1.0), **common))
+    above = smc.run(
+        smc.Scenario(
+            law=smc.law(
+                "time_delay_sliding",
+                m=2.1 * M,
+                k=1.0,
+            ),
+            **common,
+        )
+    )
     assert not np.abs(np.diff(above.u[-20:, 0])).max() < 10.0
 
 

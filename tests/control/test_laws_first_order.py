@@ -9,7 +9,6 @@ import pytest
 from helpers.plants_ab import (
     called,
     constant,
-    measured,
     on_surface,
     one,
     plant_a,
@@ -236,13 +235,22 @@ def test_discrete_reaching_ends_in_its_quasi_sliding_band(q):
 def test_barrier_holds_its_bound_when_the_period_is_short_enough_and_a_constant_attains_it(d):
     eps = 0.1
     h = 0.9 * eps / (1 + d) ** 2 if d > 2 else 5e-3
-    law = smc.law("barrier_adaptive", eps=eps, k_max=50.0)
+    law = smc.law(
+        "barrier_adaptive",
+        eps=eps,
+        k_max=50.0,
+    )
     bound = eps * d / (1 + d)
     run = plant_a(law, sine(d, 3.0), h=h)
     assert run.residual() <= bound * (1 + 1e-9)
     entered = np.flatnonzero(np.abs(run.s) <= eps / 2)[0]
     assert np.abs(run.s[entered:]).max() <= max(bound, eps / 2)
-    assert plant_a(law, constant(d), h=h, duration=30.0).s[-1] == pytest.approx(bound, rel=1e-6)
+    assert plant_a(
+        law,
+        constant(d),
+        h=h,
+        duration=30.0,
+    ).s[-1] == pytest.approx(bound, rel=1e-6)
 
 
 def test_fuzzy_gain_interpolates_its_nine_rules():
@@ -419,21 +427,6 @@ def test_observer_free_adaptive_rests_where_its_docstring_says(d):
     run = plant_a(law, constant(d), duration=30.0)
     b = brentq(lambda b: (lam + gamma * max(b - zone, 0.0) / leak) * math.tanh(b) - d, 0.0, 5.0)
     assert run.s[-1] == pytest.approx(b, rel=1e-6)
-
-
-def test_observer_free_adaptive_is_the_plain_law_within_its_dead_zone_and_forgets():
-    law = smc.law(
-        "observer_free_adaptive",
-        lam=4.0,
-        leak=2.0,
-    )
-    base = smc.law("observer_free", lam=4.0)
-    y = measured(0.01, 0.02)
-    assert one(law, e=0.01, de=0.02) == one(base, e=0.01, de=0.02)
-    memory = np.array([30.0])
-    for _ in range(1000):
-        called(law, y, memory)
-    assert memory[0] == pytest.approx(30.0 * (1 - 2e-3) ** 1000, rel=1e-9)
 
 
 EXACT = (

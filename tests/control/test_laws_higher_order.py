@@ -101,7 +101,15 @@ def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_m
         "limit": 2.0,
     }
     run = plant_a(
-        law("conditioned_super_twisting", k1=1.5, k2=1.1), wave, s=-20.0, duration=20.0, **given
+        law(
+            "conditioned_super_twisting",
+            k1=1.5,
+            k2=1.1,
+        ),
+        wave,
+        s=-20.0,
+        duration=20.0,
+        **given,
     )
     assert run.residual() < 20 * 1e-3**2
     assert run.s.max() < 3.0**2 / (2 * 1.1)

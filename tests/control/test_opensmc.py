@@ -46,7 +46,11 @@ def own(component, **given):
 def along(ours, theirs, states=STATES, rtol=1e-12):
     """Fail unless two functions of (e, de) agree at one state after the other, memories and all."""
     for e, de in states.tolist():
-        assert ours(e, de) == pytest.approx(theirs(e, de), rel=rtol, abs=1e-12)
+        assert ours(e, de) == pytest.approx(
+            theirs(e, de),
+            rel=rtol,
+            abs=1e-12,
+        )
 
 
 def controlled(controller, **more):
@@ -94,7 +98,11 @@ def test_their_controller_is_a_law_in_one_line():
     [
         (smc.law("classical", k=2.0), lambda: reaching.ConstantRate(k=2.0)),
         (
-            smc.law("exponential_reaching", k=2.0, q=3.0),
+            smc.law(
+                "exponential_reaching",
+                k=2.0,
+                q=3.0,
+            ),
             lambda: reaching.ExponentialRate(k=2.0, q=3.0),
         ),
         (smc.law("power_rate", k=2.0, a=0.7), lambda: reaching.PowerRate(k=2.0, alpha=0.7)),
@@ -210,7 +218,11 @@ def test_controllers_agree(law, theirs):
             ),
         ),
         (
-            surface("nonsingular_terminal", B=2.0, p=7 / 5),
+            surface(
+                "nonsingular_terminal",
+                B=2.0,
+                p=7 / 5,
+            ),
             lambda: surfaces.NonsingularTerminalSurface(2.0, 5, 7),
         ),
     ],

@@ -179,7 +179,8 @@ def test_pd_observer_is_incremental_dynamic_inversion():
     for k in range(300):
         e, de = rng.normal(size=2)
         if k:
-            of_u, of_a = of_u + share * (u - of_u), of_a + share * ((de - last) / h - of_a)
+            of_u = of_u + share * (u - of_u)
+            of_a = of_a + share * ((de - last) / h - of_a)
         v = -(wc**2) * e - 2.0 * wc * de
         u = min(max(of_u + (v - of_a) / b, -5.0), 5.0)
         assert call(law, memory, e=e, de=de, limit=5.0) == pytest.approx(u, abs=1e-9)

@@ -101,7 +101,14 @@ def test_every_surface_is_odd_and_zero_at_rest(name):
     ours, mirrored, rest = (np.zeros(slid.memory) for _ in range(3))
     for k, (e, de, a) in enumerate(np.random.default_rng(0).normal(size=(200, 3))):
         s, eq = at(slid, ours, e, de, t=k * 1e-3, a=a)
-        assert at(slid, mirrored, -e, -de, t=k * 1e-3, a=-a) == (-s, -eq)
+        assert at(
+            slid,
+            mirrored,
+            -e,
+            -de,
+            t=k * 1e-3,
+            a=-a,
+        ) == (-s, -eq)
         assert at(slid, rest, 0.0, 0.0, t=k * 1e-3) == (0.0, 0.0)
 
 

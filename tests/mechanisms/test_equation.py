@@ -107,7 +107,8 @@ def oracle(scenarios, factor=1.0):
 
         def slope(t, y, p=p, u=u, slopes=slopes):
             d = sum(signal.amplitude * math.sin(signal.omega * t) for signal in s.disturbance)
-            slopes[0], slopes[1] = y[1], equation(p, y[0], y[1], u + d)
+            slopes[0] = y[1]
+            slopes[1] = equation(p, y[0], y[1], u + d)
             return slopes
 
         y = integrated(slope, y, step * h, h)

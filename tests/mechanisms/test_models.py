@@ -69,7 +69,9 @@ def within(p, x):
 
 def acceleration(model, data, x, v, u):
     joints = joint_ids(model)  # one coordinate each
-    data.qpos[joints], data.qvel[joints], data.ctrl[:] = x, v, u[: model.nu]
+    data.qpos[joints] = x
+    data.qvel[joints] = v
+    data.ctrl[:] = u[: model.nu]
     mujoco.mj_forward(model, data)
     return data.qacc[joints].copy()
 

@@ -133,7 +133,8 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
         if i < 6:
             moment = turns[i + 1] @ moment + cross(offsets[i + 1], turns[i + 1] @ force)
             force = turns[i + 1] @ force
-        force, moment = force + loads[i][0], moment + loads[i][1]
+        force = force + loads[i][0]
+        moment = moment + loads[i][1]
         found[i] = moment[2]
     return found
 
@@ -149,7 +150,9 @@ def test_a_thousand_states_obey_newton_and_euler(payload):
         q = rng.uniform(LOW, HIGH)
         v = rng.uniform(-2.5, 2.5, 7)
         u = rng.uniform(-1, 1, 7) * plant.limits
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        data.qpos[:] = q
+        data.qvel[:] = v
+        data.ctrl[:] = u
         mujoco.mj_forward(model, data)
         expected = torques(q, v, data.qacc, payload)
         worst = max(worst, np.abs(expected - u).max() / max(1.0, np.abs(data.qacc).max()))
@@ -177,7 +180,9 @@ def test_the_second_set_obeys_newton_and_euler():
         q = rng.uniform(LOW, HIGH)
         v = rng.uniform(-2.5, 2.5, 7)
         u = rng.uniform(-1, 1, 7) * plant.limits
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        data.qpos[:] = q
+        data.qvel[:] = v
+        data.ctrl[:] = u
         mujoco.mj_forward(model, data)
         expected = torques(q, v, data.qacc, links=DELTA)
         assert np.abs(expected - u).max() < 1e-10 * max(1.0, np.abs(data.qacc).max())
@@ -236,21 +241,6 @@ def test_the_flange_is_where_the_makers_frames_put_it():
         mujoco.mj_kinematics(model, data)
         np.testing.assert_allclose(data.site("flange").xpos, place + 0.107 * turn[:, 2], atol=1e-12)
         np.testing.assert_allclose(data.site("tip").xpos, place + 0.195 * turn[:, 2], atol=1e-12)
-
-
-def test_a_falling_arm_stays_within_its_ranges():
-    """Two seconds without a command: joints come to their stops, and go at most a degree beyond."""
-    trace = smc.run(
-        smc.Scenario(
-            plant="panda",
-            law="none",
-            duration=2.0,
-            control_period=2e-3,
-        )
-    )
-    assert trace.failure is None
-    beyond = np.maximum(LOW - trace.x, trace.x - HIGH).max()
-    assert 0.0 < beyond < math.radians(1.0)
 
 
 def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():

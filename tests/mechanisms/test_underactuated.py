@@ -87,11 +87,9 @@ def test_the_model_is_its_equation(name):
         values = SimpleNamespace(**p.parameters)
         data = mujoco.MjData(model)
         for _ in range(20):
-            data.qpos[:], data.qvel[:], data.ctrl[:] = (
-                rng.uniform(-2, 2, 2),
-                rng.uniform(-3, 3, 2),
-                rng.uniform(-6, 6),
-            )
+            data.qpos[:] = rng.uniform(-2, 2, 2)
+            data.qvel[:] = rng.uniform(-3, 3, 2)
+            data.ctrl[:] = rng.uniform(-6, 6)
             mujoco.mj_forward(model, data)
             expected = acceleration(name, values, data.qpos, data.qvel, data.ctrl[0])
             assert np.abs(data.qacc - expected).max() < 1e-9 * max(1.0, np.abs(expected).max())
@@ -120,7 +118,9 @@ def test_every_parameter_is_felt_by_both_joints(name):
     before = acceleration(name, SimpleNamespace(**base.parameters), (0.3, 1.2), (1.0, 2.0), 3.0)
     for key, value in base.parameters.items():
         data = mujoco.MjData(model := smc.plant(name, **{key: 1.25 * value or 0.1}).load())
-        data.qpos[:], data.qvel[:], data.ctrl[:] = (0.3, 1.2), (1.0, 2.0), 3.0
+        data.qpos[:] = (0.3, 1.2)
+        data.qvel[:] = (1.0, 2.0)
+        data.ctrl[:] = 3.0
         mujoco.mj_forward(model, data)
         assert np.all(np.abs(data.qacc - before) > 1e-6), key
 
@@ -132,7 +132,8 @@ def energies(p, trace):
     data = mujoco.MjData(model)
     found = []
     for x, v in zip(trace.x, trace.v, strict=True):
-        data.qpos[:], data.qvel[:] = x, v
+        data.qpos[:] = x
+        data.qvel[:] = v
         mujoco.mj_forward(model, data)
         found.append(data.energy.sum())
     return np.array(found)
@@ -157,23 +158,6 @@ def test_a_free_plant_keeps_its_energy_and_its_momentum_along_the_rail(name):
     momentum = (values["M"] + values["m"]) * v + up * values["m"] * values["l"] * np.cos(q) * dq
     assert np.ptp(momentum) < 1e-10
     assert np.ptp(q) > 1.0
-
-
-@PLANTS
-def test_only_the_cart_is_driven_and_disturbed(name):
-    force = smc.Sine(0.5, omega=3.0)
-    trace = smc.run(scenario(name, disturbance=force, duration=1.0))
-    for array in (trace.u, trace.applied, trace.s, trace.d):
-        assert array[:, 0].any()
-        assert not array[:, 1].any()
-    gust = smc.run(
-        scenario(
-            name,
-            disturbance=smc.signals.Gust(0.5, time=0.1, width=0.2),
-            duration=0.5,
-        )
-    )
-    assert gust.d[:, 1].any()  # the wind meets the pole, too
 
 
 @PLANTS
@@ -290,32 +274,6 @@ def test_s_is_zero_in_the_time_of_its_reaching_law_and_stays(name):
 
 
 @PLANTS
-def test_s_chatters_in_proportion_to_the_control_period(name):
-    runs = []
-    for h in (8e-3, 2e-3):
-        runs.append(
-            scenario(
-                name,
-                u_max=math.inf,
-                control_period=h,
-                physics_step=2e-4,
-                duration=4.0,
-            )
-        )
-    coarse, fine = (np.abs(surface(trace)[trace.t > 3.0]).max() for trace in smc.run(runs))
-    assert coarse / fine == pytest.approx(4.0, rel=0.2)
-
-
-@PLANTS
-def test_both_joints_come_to_rest_within_6_newton(name):
-    trace = smc.run(scenario(name))
-    assert np.abs(trace.u).max() <= 6.0
-    assert np.abs(trace.x[:, 0]).max() < 1.7  # inside the stops
-    assert bound(trace) <= 0.01
-    assert np.all(np.abs(trace.v[-1]) < 1e-2)
-
-
-@PLANTS
 def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_rate(name):
     p = smc.plant(name)
     values = SimpleNamespace(**p.parameters)
@@ -382,15 +340,3 @@ def test_the_motion_on_the_surface_is_stable_exactly_where_its_roots_say(name, g
     assert late < 0.2 if stable else late > 5.0
     S = surface(trace, SimpleNamespace(**gains))
     assert np.abs(S).max() < 0.01 * max(np.abs(trace.x).max(), np.abs(trace.v).max())
-
-
-def test_a_reference_moves_the_cart_and_the_joint_that_goes_with_it_stays():
-    for name in NAMES:
-        trace = smc.run(
-            scenario(
-                name,
-                x0=0.0,
-                reference=smc.Constant(0.5),
-            )
-        )
-        np.testing.assert_allclose(trace.x[-1], (0.5, 0.0), atol=5e-3)

@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import reference as plain
-from helpers.episodes import dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
 from smc_mujoco.common.frozen import frozen
@@ -155,7 +154,8 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
     trace = smc.run(scenario)
     joints = joints_of(plant, raw)
     places = [j.qposadr[0] for j in joints]
-    data.qpos[places], data.ctrl[:] = 0.3, CTRL[name]
+    data.qpos[places] = 0.3
+    data.ctrl[:] = CTRL[name]
     energies, built = [], plant.load()  # our model's energy at our state, the file's at its own
     built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
     ours = mujoco.MjData(built)
@@ -164,8 +164,10 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
         np.testing.assert_allclose(trace.x[k], data.qpos[places], atol=1e-11)
         np.testing.assert_allclose(trace.v[k], data.qvel[dofs], atol=1e-10)
         if k % 20 == 0:
-            ours.qpos[:], ours.qvel[:] = data.qpos, data.qvel
-            ours.qpos[places], ours.qvel[dofs] = trace.x[k], trace.v[k]
+            ours.qpos[:] = data.qpos
+            ours.qvel[:] = data.qvel
+            ours.qpos[places] = trace.x[k]
+            ours.qvel[dofs] = trace.v[k]
             mujoco.mj_forward(built, ours)
             mujoco.mj_forward(raw, data)
             energies.append((ours.energy.sum(), data.energy.sum()))
@@ -187,7 +189,8 @@ def test_f_and_g_are_the_accelerations_of_the_file(name):
     for _ in range(20):
         x, v, u = rng.uniform(-1, 1, (3, plant.n))
         u[plant.driven :] = 0.0
-        data.qpos[[j.qposadr[0] for j in joints]], data.qvel[dofs] = x, v
+        data.qpos[[j.qposadr[0] for j in joints]] = x
+        data.qvel[dofs] = v
         data.qfrc_applied[:] = 0.0
         data.qfrc_applied[dofs] = u
         mujoco.mj_forward(raw, data)
@@ -692,22 +695,6 @@ def test_twice_the_mass_is_twice_all_masses_and_inertias_and_no_armature(arm):
     assert np.abs(heavy.x[-1] - light.x[-1]).max() > 1e-3
 
 
-def test_a_law_as_an_agent_moves_the_model_as_its_run(arm):
-    environment = dm_control_suite().load(
-        arm(),
-        changes={
-            "duration": 0.3,
-            "u_max": 30.0,
-            "x0": (0.4, -0.3),
-        },
-    )
-    law = smc.law("observer_free", lam=60.0, k1=3.0)
-    trace = smc.run(run_of(environment.task.setting, law))
-    states = driven_by_dm(environment, smc.envs.agent(law, environment))
-    assert np.abs(states[:, :4] - np.hstack((trace.x, trace.v))).max() < 1e-9
-    assert np.abs(trace.u).max(axis=0).tolist() == [4.0, 30.0]
-
-
 # joints without an actuator
 
 
@@ -726,9 +713,6 @@ def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
 
 def acrobot_alone() -> Plant:
     return smc.plant_from(suite("acrobot"), {"elbow": None})
-
-
-# starts
 
 
 # swing-ups
@@ -771,9 +755,6 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tm
         )
         scenario = episode.Setting(plant, "swing_up").scenario
         assert scenario.resolved.u_max == pytest.approx(0.5 * 2.0 * 9.81)
-
-
-# conditions
 
 
 # errors
@@ -855,9 +836,6 @@ def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
         smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*\): fix the file$"
     ):
         arm(rest='<include file="part.xml"/>')
-
-
-# names
 
 
 # models that harm

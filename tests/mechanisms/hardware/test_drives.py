@@ -307,7 +307,9 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
         x = rng.uniform(-1, 1, kind.n)
         v = rng.uniform(-3, 3, kind.n)
         u = rng.uniform(-9, 9)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u
+        data.qpos[:] = x
+        data.qvel[:] = v
+        data.ctrl[:] = u
         mujoco.mj_forward(model, data)
         for i in range(kind.n):
             f, g = Controller(scenario).model_at(x, v, i, 0)

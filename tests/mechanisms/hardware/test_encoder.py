@@ -89,23 +89,6 @@ def test_a_bias_is_added_before_the_rounding():
     np.testing.assert_array_equal(x, trace.x - 0.3)
 
 
-def test_a_bias_moves_where_the_law_settles():
-    gains = smc.paper.GAINS["inverted_pendulum"]["observer_free"]
-    common = {
-        "plant": "inverted_pendulum",
-        "law": smc.law("observer_free", **gains),
-        "duration": 5.0,
-    }
-    unbiased, biased = smc.run(
-        [smc.Scenario(**common, sensor=smc.Encoder(math.inf, bias=bias)) for bias in (0.0, 0.01)]
-    )
-    assert abs(unbiased.x[-1, 0]) < 1e-4
-    x = biased.x[-1, 0]
-    weight = 0.5 * 9.81 * 0.5 * math.sin(x)
-    assert weight == pytest.approx(gains["lam"] * math.tanh(gains["k1"] * (x + 0.01)), abs=1e-4)
-    assert x < -0.01
-
-
 def test_noise_comes_before_the_rounding():
     """Noise of more than a count dithers: the mean of the error then is far below a count."""
     noise = smc.Noise(position=0.2)
@@ -147,11 +130,6 @@ def test_the_velocity_is_the_filtered_difference_of_the_readings():
         rtol=1e-12,
         atol=1e-12,
     )
-
-
-def test_a_tachometer_beside_the_encoder_is_not_rounded():
-    trace, _, v = read(smc.Encoder(counts=10, bias=0.3), velocity="measured")
-    np.testing.assert_array_equal(v, trace.v)
 
 
 # loss
@@ -366,6 +344,3 @@ def test_a_skew_reads_each_channel_earlier_than_the_channel_before():
         np.testing.assert_array_equal(x[:, i], late)
     with pytest.raises(smc.ScenarioError, match=r"period 0\.01 and skew 0\.003"):
         smc.Encoder(period=0.01, skew=3e-3)
-
-
-# bad values

@@ -48,10 +48,8 @@ def by_events(scenario, u, level, d=lambda t: 0.0):
                 times = np.linspace(t, end, 101)  # it breaks away at the first of them, if it does
                 loads = np.array([others(x, 0.0, time, held)[0] for time in times])
                 count = int(np.argmax(np.abs(loads) > level)) or 100
-                rest, pushed = (
-                    rest + times[count] - t,
-                    pushed - np.trapezoid(loads[: count + 1], times[: count + 1]),
-                )
+                rest = rest + times[count] - t
+                pushed = pushed - np.trapezoid(loads[: count + 1], times[: count + 1])
                 t = times[count]
                 continue
             way = np.sign(v or load)

@@ -142,7 +142,8 @@ def test_lugre_breaks_away_at_its_static_level(h, part):
     while data.time < 21.0:  # a ramp of static / 20 a second
         data.ctrl[0] = part.static * data.time / 20.0
         mujoco.mj_step(model, data)
-        most, speed = max(most, -data.actuator_force[friction]), data.qvel[0]
+        most = max(most, -data.actuator_force[friction])
+        speed = data.qvel[0]
     assert most == pytest.approx(part.static, rel=0.02)
     # it slides, far faster than bristles bend
     assert speed > 10 * part.static / 20.0 / part.stiffness
@@ -161,7 +162,8 @@ def test_lugre_is_the_formula_of_its_docstring():
     for v in (-2.0, -0.02, 0.003, 0.0, 0.01, 1.0):
         model = bare("duffing", LUGRE)
         data = mujoco.MjData(model)
-        data.qvel[0], data.act[0] = v, 4e-5
+        data.qvel[0] = v
+        data.act[0] = 4e-5
         mujoco.mj_forward(model, data)
         g = LUGRE.coulomb + (LUGRE.static - LUGRE.coulomb) * math.exp(-((v / LUGRE.stribeck) ** 2))
         rate = v - LUGRE.stiffness * abs(v) / g * 4e-5
@@ -175,7 +177,8 @@ def test_lugre_is_the_formula_of_its_docstring():
 def test_friction_is_on_every_joint_of_a_network(part):
     model = build(plant("pendulum_network", n=4), part)
     data = mujoco.MjData(model)
-    model.opt.gravity[:], model.tendon_stiffness[:] = 0.0, 0.0
+    model.opt.gravity[:] = 0.0
+    model.tendon_stiffness[:] = 0.0
     data.qvel[:] = 1.0
     for _ in range(1000):
         mujoco.mj_step(model, data)

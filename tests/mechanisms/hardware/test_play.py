@@ -56,14 +56,18 @@ def between_plastic_stops(scenario, parts):
         s = v + gains["c"] * x
         u = integral - gains["k1"] * math.copysign(math.sqrt(abs(s)), s)
         integral -= scenario.control_period * math.copysign(gains["k2"], s)
-        integral, u = min(max(integral, -bound), bound), min(max(u, -bound), bound)
+        integral = min(max(integral, -bound), bound)
+        u = min(max(u, -bound), bound)
         for _ in range(parts):
-            v, w = v + h * ((1.0 - x * x) * v - x), w + h * u / inertia
+            v = v + h * ((1.0 - x * x) * v - x)
+            w = w + h * u / inertia
             apart = y - x + h * (w - v)
             if abs(apart) > play:
                 blow = (apart - math.copysign(play, apart)) / h / (1.0 + 1.0 / inertia)
-                v, w = v + blow, w - blow / inertia
-            x, y = x + h * v, y + h * w
+                v = v + blow
+                w = w - blow / inertia
+            x = x + h * v
+            y = y + h * w
         positions.append(x)
     return np.array(positions)
 

@@ -530,6 +530,3 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
         assert driving == pytest.approx(driven_back, rel=0.05)
     else:
         assert driving > 1.3 * driven_back
-
-
-# bad input
