@@ -8,7 +8,9 @@ ANNEXES = ("exchange", "evidence", "benchmark")
 
 
 def module(name: str, what: str) -> ModuleType:
-    """Return a module of the package; `what` needs it, as the error says if its annex is missing."""
+    """Return a module of the package; `what` needs it, as the error says if its annex is
+    missing.
+    """
     annex = name.split(".")[1]
     if annex in ANNEXES and not installed(annex):
         from smc_mujoco.common.extras import MissingPackageError

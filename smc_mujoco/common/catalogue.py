@@ -77,7 +77,10 @@ class Added(Generic[T_co]):
         return self.point.module.partition(".")[0]
 
     def __str__(self) -> str:
-        return f"package {self.package!r}: its {KINDS[self.point.group][0]} {self.point.name!r} ({self.point.value})"
+        return (
+            f"package {self.package!r}: its {KINDS[self.point.group][0]} {self.point.name!r} "
+            f"({self.point.value})"
+        )
 
     @property
     def value(self) -> T_co:
@@ -136,7 +139,8 @@ class Catalogue(Mapping[str, T_co]):
         if name in self.own:
             for entry in self.added.get(name, ()):
                 warn(
-                    f"{entry} has the name of an entry of the library, which is used instead: give it another name"
+                    f"{entry} has the name of an entry of the library, which is used instead: give "
+                    "it another name"
                 )
             return self.own[name]
         first, *others = self.added[name]
@@ -144,7 +148,8 @@ class Catalogue(Mapping[str, T_co]):
             kind = KINDS[first.point.group][0]
             packages = " and ".join(repr(entry.package) for entry in (first, *others))
             raise ScenarioError(
-                f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename it"
+                f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename "
+                "it"
             )
         return first.value
 
@@ -187,7 +192,8 @@ class Catalogue(Mapping[str, T_co]):
             other = Catalogue(other)
         names = {*self.added, *other.added}
         both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
-        own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]  # it is only read
+        # it is only read
+        own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]
         return Catalogue(own, both)
 
     def taken(self, name: str) -> bool:

@@ -47,7 +47,12 @@ class Number(Constraint):
 
     def __call__(self, what: str, value: Any) -> float:
         return number(
-            what, value, above=self.above, low=self.low, high=self.high, infinite=self.infinite
+            what,
+            value,
+            above=self.above,
+            low=self.low,
+            high=self.high,
+            infinite=self.infinite,
         )
 
 
@@ -157,7 +162,9 @@ Timeout = Annotated[float, Number(above=0.0, high=86_400.0)]  # s, a day at most
 
 
 def of_type(kind: Any) -> Constraint | None:
-    """Return the constraint in a type, which lets None pass if the type names it; None without one."""
+    """Return the constraint in a type, which lets None pass if the type names it; None without
+    one.
+    """
     if typing.get_origin(kind) is Annotated:
         return next(
             (note for note in typing.get_args(kind)[1:] if isinstance(note, Constraint)), None

@@ -203,7 +203,9 @@ def items_of(what: str, values: Iterable[T]) -> list[T]:
 
 
 def words(error: BaseException) -> str:
-    """Return type and message of an exception, which another package may have raised, on one line."""
+    """Return type and message of an exception, which another package may have raised, on one
+    line.
+    """
     try:
         return one_line(f"{type(error).__name__}: {error}")
     except Exception:

@@ -35,7 +35,9 @@ def extra(name: str, what: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def package(name: str, what: str) -> Iterator[None]:
-    """Say how to install a package that belongs to no extra if an import in the with block fails."""
+    """Say how to install a package that belongs to no extra if an import in the with block
+    fails.
+    """
     try:
         yield
     except ImportError as error:
@@ -43,7 +45,9 @@ def package(name: str, what: str) -> Iterator[None]:
 
 
 def missing(name: str, what: str, *packages: str) -> str | None:
-    """Return None if packages of an extra are installed, else a sentence that says which are not."""
+    """Return None if packages of an extra are installed, else a sentence that says which are
+    not.
+    """
     absent = [package for package in packages if importlib.util.find_spec(package) is None]
     if absent:
         return f"{what} needs {' and '.join(absent)}: {cure(name)}"

@@ -181,7 +181,8 @@ def _bounded(file: Path) -> None:
     unpacked = sum(member.file_size for member in members)
     if unpacked > max(MAX_UNPACKED, MAX_RATIO * size) or len(members) > MAX_MEMBERS:
         raise ScenarioError(
-            f"it unpacks from {size / 1e6:,.0f} MB to {len(members):,} files of {unpacked / 1e6:,.0f} MB in all, and "
+            f"it unpacks from {size / 1e6:,.0f} MB to {len(members):,} files of "
+            f"{unpacked / 1e6:,.0f} MB in all, and "
             f"{MAX_MEMBERS:,} files and {MAX_UNPACKED / 1e6:,.0f} MB are allowed"
         )
 

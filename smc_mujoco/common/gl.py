@@ -112,7 +112,10 @@ def note() -> str | None:
         why = "does not load here"
     else:
         why = "is not a backend of MuJoCo"
-    return f"MUJOCO_GL={wish} {why}: {'films are off' if backend in OFF_VALUES else f'{backend} is used instead'}"
+    return (
+        f"MUJOCO_GL={wish} {why}: "
+        f"{'films are off' if backend in OFF_VALUES else f'{backend} is used instead'}"
+    )
 
 
 @functools.cache
@@ -127,7 +130,10 @@ def missing() -> str | None:
         unusable = ""
     if backend in OFF_VALUES:
         if platform := os.environ.get("PYOPENGL_PLATFORM"):
-            return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: unset it"
+            return (
+                f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: "
+                "unset it"
+            )
         return f"no film: neither libEGL with libGL nor libOSMesa is here{unusable}: {CURE}"
     error = probe(backend)
     if error is None:
@@ -151,7 +157,12 @@ def probe(backend: str, code: str = PROBE) -> str | None:
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
         done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False
+            command,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+            check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"a trial failed: {error}"

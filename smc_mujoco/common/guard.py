@@ -61,7 +61,13 @@ def run_isolated(module: str, job: Mapping[str, Any], timeout: float) -> Any:
     with files.scratch() as folder:
         path = [os.path.abspath(place) for place in sys.path]
         with files.no_room():
-            task = json.dumps({"module": module, "job": job, "path": path})
+            task = json.dumps(
+                {
+                    "module": module,
+                    "job": job,
+                    "path": path,
+                }
+            )
             (folder / "job").write_text(task, encoding="utf-8")
         command = [sys.executable, "-P", __file__, str(folder)]
         try:
@@ -110,7 +116,9 @@ class Arithmetic:
         self.results = computed(self.numbers)
 
     def changed(self) -> bool:
-        """Return whether this thread computes differently from before, and restore it if it does."""
+        """Return whether this thread computes differently from before, and restore it if it
+        does.
+        """
         if self.traps() == self.state and computed(self.numbers) == self.results:
             return False
         self.library.fesetenv(self.environment)

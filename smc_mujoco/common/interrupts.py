@@ -1,4 +1,6 @@
-"""Ctrl-C, delayed while something must not stop halfway: a library that loads, numba that compiles."""
+"""Ctrl-C, delayed while something must not stop halfway: a library that loads, numba that
+compiles.
+"""
 
 import contextlib
 import signal

@@ -315,7 +315,14 @@ def _within_bounds(kernel, prepare, context, builder, sig, args, ufunc, kind):
                 context.call_conv.return_user_exc(
                     builder, ValueError, ("operands could not be broadcast",)
                 )
-    return kernel(context, builder, sig, args, ufunc, kind)
+    return kernel(
+        context,
+        builder,
+        sig,
+        args,
+        ufunc,
+        kind,
+    )
 
 
 def _load_numba() -> None:
@@ -489,16 +496,3 @@ def jit(function: Callable) -> Callable:
             if (original.__module__ or "").startswith("smc_mujoco."):
                 _shared[original] = copy
         return made
-
-
-def compiled_for(function: Callable, types: tuple[Any, ...]) -> Any:
-    """Return numba's result for a function that `jit` compiles for arguments of these types; raises
-    NotCompilable.
-    """
-    made: Any = jit(function)
-    try:
-        with _compiling():
-            made.compile(types)
-    except Exception as error:  # numba raises many types
-        raise NotCompilable(reason(error)) from None
-    return made.overloads[types]

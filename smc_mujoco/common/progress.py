@@ -112,7 +112,12 @@ def bar(
             yield Bar(what, whole, counted, draw)
     else:
         yield Bar(
-            what, whole, counted, lambda bar: print(bar, file=sys.stderr), LINE_PERIOD, LINE_PERIOD
+            what,
+            whole,
+            counted,
+            lambda bar: print(bar, file=sys.stderr),
+            LINE_PERIOD,
+            LINE_PERIOD,
         )
 
 

@@ -31,7 +31,11 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH_HINT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
-TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+TEX |= {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
 TEX |= {
     "–": "--",
     "·": r"$\cdot$",
@@ -42,7 +46,10 @@ TEX |= {
     "″": "$''$",
 }
 LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
-LETTER_NAMES = "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon"
+LETTER_NAMES = (
+    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
+    "upsilon"
+)
 LETTER_NAMES += " varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
 TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, LETTER_NAMES.split(), strict=True)}
 TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {
@@ -84,7 +91,12 @@ class Tabular:
         if self.title:
             yield Text(self.title, "bold")
         for part in _parts([_widest(column) for column in columns], options.max_width, self.left):
-            table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False, show_edge=False)
+            table = Table(
+                box=box.SIMPLE_HEAD,
+                padding=0,
+                pad_edge=False,
+                show_edge=False,
+            )
             lines = max(columns[i][0].plain.count("\n") for i in part)
             for i in part:
                 head = Text("\n" * (lines - columns[i][0].plain.count("\n"))).append_text(
@@ -159,7 +171,14 @@ class Tabular:
         note = html.Html("<br>".join(map(html.text, self.notes)))
         numbers = range(self.left, len(self.headings))
         heads = [heading.replace("^2", "²") for heading in self.headings]
-        return html.table(heads, lines, self.title, note, numbers, max_rows=MAX_HTML_ROWS)
+        return html.table(
+            heads,
+            lines,
+            self.title,
+            note,
+            numbers,
+            max_rows=MAX_HTML_ROWS,
+        )
 
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the title and the

@@ -31,7 +31,9 @@ def joined(parts: Iterable[str]) -> str:
 
 
 def capital(text: str) -> str:
-    """Return the text with a capital first letter, as at the start of a sentence; the others stay."""
+    """Return the text with a capital first letter, as at the start of a sentence; the others
+    stay.
+    """
     return text[:1].upper() + text[1:]
 
 

@@ -108,7 +108,11 @@ def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
     read = []
     for i, name in enumerate(names or ("unused",)):
         read.append((vector + "[0]" * (name in shared)).format(i))
-    space = {"carray": carray, "pointer": pointer, "Gains": named(names)}
+    space = {
+        "carray": carray,
+        "pointer": pointer,
+        "Gains": named(names),
+    }
     exec(f"def gains_at(address, n): return Gains({', '.join(read)})", space)
     return checked(space["gains_at"])
 
@@ -230,8 +234,22 @@ def compile_component(c: Component) -> Function | AtAddress:
     if isinstance(c.function, Uncompiled):
         raise NotCompilable(f"{name} {c.function.why}")
     if c.joint:
-        return _compile(name, _compile_joint_law, c.function, tuple(c.gains), c.shared, c.memory)
-    return _compile(name, _compile_pair, c.function, c.kind, tuple(c.gains), c.memory)
+        return _compile(
+            name,
+            _compile_joint_law,
+            c.function,
+            tuple(c.gains),
+            c.shared,
+            c.memory,
+        )
+    return _compile(
+        name,
+        _compile_pair,
+        c.function,
+        c.kind,
+        tuple(c.gains),
+        c.memory,
+    )
 
 
 def compile_signal(s: Signal) -> Function:
@@ -277,7 +295,8 @@ def signal_values(s: Signal) -> tuple[float, ...]:
         or not data.flags.c_contiguous
     ):
         raise ScenarioError(
-            f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, ({s.rows}, N), "
+            f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, "
+            f"({s.rows}, N), "
             "C-contiguous"
         )
     return (*values, float(data.ctypes.data), float(data.shape[1]))

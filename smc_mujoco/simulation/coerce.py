@@ -117,7 +117,8 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
         return [value[joint] for joint in joints]
     if len(value) != plant.driven:
         raise ScenarioError(
-            f"{name} has {len(value)} values for the {plant.driven} driven channels of {plant.name}: give one, or "
+            f"{name} has {len(value)} values for the {plant.driven} driven channels of "
+            f"{plant.name}: give one, or "
             f"{plant.driven}"
         )
     return list(value)
@@ -171,7 +172,8 @@ def physics_step(name: str, value: float | None, s: Any) -> float | None:
     count = period / h
     if not 1.0 - 1e-9 <= count < math.inf or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(
-            f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N"
+            f"physics_step {h:g} s does not divide the control period {period:g} s: give "
+            f"{period:g}/N"
         )
     return period / round(count)
 
@@ -227,7 +229,9 @@ def suggested_reference(plant: Plant) -> Signal:
 
 
 def reference(name: str, value: Signal | ByChannel[Signal] | None, s: Any) -> Signal | None:
-    """Return the reference of a plant's driven channels, from one signal or one for each channel."""
+    """Return the reference of a plant's driven channels, from one signal or one for each
+    channel.
+    """
     if value is None:
         return None
     return _reference(value, s.plant)

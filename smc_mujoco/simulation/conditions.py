@@ -114,7 +114,8 @@ class Condition:
         fields = dict(self.fields(plant, length) if callable(self.fields) else self.fields)
         if plant.pose and (refused := [name for name in NOT_OF_FREE_BODIES if fields.get(name)]):
             raise ScenarioError(
-                f"condition {self.name!r} sets {refused[0]}, and {plant.name} is a free body, which takes none: choose "
+                f"condition {self.name!r} sets {refused[0]}, and {plant.name} is a free body, "
+                "which takes none: choose "
                 "another condition"
             )
         return fields
@@ -165,7 +166,8 @@ def condition(name: str, **fields: Any) -> Condition:
     """
     if errors.name("a condition's name", name) in NAMED or set(":+,") & set(name):
         raise ScenarioError(
-            f"condition {shown(name)} is a name of the suite, or has one of : + , in it: give another"
+            f"condition {shown(name)} is a name of the suite, or has one of : + , in it: give "
+            "another"
         )
     if not fields:
         raise ScenarioError(
@@ -193,7 +195,8 @@ def find_condition(value: Condition | str) -> Condition:
         return parse(value)
     if set("=(") & set(value):
         raise ScenarioError(
-            f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3"
+            f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: "
+            "x0=0.3"
         )
     if (count := value.count("+") + 1) > MAX_JOINED:
         raise ScenarioError(
@@ -282,7 +285,8 @@ def _parsed(node: ast.expr) -> Any:
         case ast.Call():
             return _call(node)
     raise ScenarioError(
-        f"condition has {shown(ast.unparse(node))}: give numbers, texts and parts such as Coulomb(0.05)"
+        f"condition has {shown(ast.unparse(node))}: give numbers, texts and parts such as "
+        "Coulomb(0.05)"
     )
 
 
@@ -382,7 +386,9 @@ def _joined_fields(
 
 
 def _jump(size: str) -> Recipe:
-    """Return a parameter jump at half time, with the sine disturbance; `size` is "mild" or "hard"."""
+    """Return a parameter jump at half time, with the sine disturbance; `size` is "mild" or
+    "hard".
+    """
 
     def fields(plant: Plant, duration: float) -> Fields:
         if size not in plant.jumps:
@@ -421,7 +427,9 @@ def _stepper(plant: Plant, duration: float) -> Fields:
 
 
 def _sized(signal: Signal, plant: Plant) -> Signal:
-    """Return a disturbance of the study's plants; for a free body that share of its largest force."""
+    """Return a disturbance of the study's plants; for a free body that share of its largest
+    force.
+    """
     if not plant.pose:
         return signal
     if isinstance(signal, OrnsteinUhlenbeck):

@@ -267,7 +267,13 @@ def _measure(address, sim, data, k, t):
         position = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
         velocity = data.sensordata[channel.v_sensor] + v_error
         reading.x, reading.v = _read_sensor(
-            sim, state, i, position, velocity, j, channel.hinge_body >= 0
+            sim,
+            state,
+            i,
+            position,
+            velocity,
+            j,
+            channel.hinge_body >= 0,
         )
         sim.seen.i = i
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
@@ -359,7 +365,12 @@ def _mix(sim, u, controls):
     for j in range(sim.n):
         controls[j] = 0.0
     rotation.mix(
-        pointer(sim.seen.x), u, pointer(sim.mixer), sim.actuators, sim.keeps_torques, controls
+        pointer(sim.seen.x),
+        u,
+        pointer(sim.mixer),
+        sim.actuators,
+        sim.keeps_torques,
+        controls,
     )
 
 
@@ -482,7 +493,12 @@ def _measure_joints(address, sim, k, t):
         )
     if sim.mixer != 0:
         rotation.put_attitude_error(
-            pointer(y.x), pointer(y.v), pointer(y.r), pointer(y.dr), pointer(y.e), pointer(y.de)
+            pointer(y.x),
+            pointer(y.v),
+            pointer(y.r),
+            pointer(y.dr),
+            pointer(y.e),
+            pointer(y.de),
         )
     return _measure_dynamics(address, sim)
 
@@ -542,7 +558,9 @@ def _separate_equations(address, sim, M, h, g):
 
 @njit(error_model="numpy", inline="always")
 def _actuate(sim, data, step):
-    """Give the actuators the command whose delay has passed at this physics step, if there is one."""
+    """Give the actuators the command whose delay has passed at this physics step, if there is
+    one.
+    """
     past = step - sim.delay
     if past >= 0 and past % sim.steps == _late(sim, past // sim.steps):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
@@ -833,7 +851,14 @@ def _apply_disturbances(address, sim, data, t, k):
         for i in range(sim.n):
             channel = channel_at(sim.channels, i)
             if signal.sees != 0:
-                raised = _evaluate_feedback(address, sim, data, signal, i, k)
+                raised = _evaluate_feedback(
+                    address,
+                    sim,
+                    data,
+                    signal,
+                    i,
+                    k,
+                )
             elif (
                 signal.stream != 0.0 or i == 0
             ):  # without random numbers it is the same in every channel
@@ -872,7 +897,9 @@ def lever(channel, xipos, xanchor, xaxis):
 
 @njit(error_model="numpy", inline="always")
 def _generalised_disturbance(data, channel):
-    """Return the generalised force on a channel's joint of the disturbances that act on its body."""
+    """Return the generalised force on a channel's joint of the disturbances that act on its
+    body.
+    """
     if channel.qfrc >= 0:
         return data.qfrc_applied[channel.qfrc]
     d = channel.sign * data.xfrc_applied[channel.xfrc]

@@ -194,7 +194,12 @@ def grid(
         return [lambda seed, law=law: _law(plant, law, gains, seed) for law in laws]
 
     return all_combinations(
-        [as_plant(plant) for plant in plants], laws_on, conditions, seeds, duration, starts
+        [as_plant(plant) for plant in plants],
+        laws_on,
+        conditions,
+        seeds,
+        duration,
+        starts,
     )
 
 
@@ -217,7 +222,14 @@ def all_combinations(
             for law in laws(plant):
                 runs.append(
                     [
-                        case(plant, law(seed), condition, duration, seed=seed, starts=starts)
+                        case(
+                            plant,
+                            law(seed),
+                            condition,
+                            duration,
+                            seed=seed,
+                            starts=starts,
+                        )
                         for seed in seeds
                     ]
                 )
@@ -269,7 +281,8 @@ def check_moving(runs: Sequence[Scenario]) -> None:
     if all(map(_stays_at_rest, runs)):
         first = runs[0]
         raise ScenarioError(
-            f"{first.plant.name} starts at rest at 0 and nothing moves it under condition {first.condition!r}: give "
+            f"{first.plant.name} starts at rest at 0 and nothing moves it under condition "
+            f"{first.condition!r}: give "
             "another start, with starts=smc.starts(x0=0.5) or --x0 0.5"
         )
 
@@ -343,7 +356,8 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
             if v != standard.parameters[name]:
                 changed.append(f"{name} = {v:g}")
         warnings.warn(
-            f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and this one has "
+            f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and "
+            "this one has "
             f"{', '.join(changed)}: tune the law on it, or give the law's gains yourself",
             ScenarioWarning,
             users_stacklevel(),

@@ -141,7 +141,8 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
             or model.actuator_gear[i, 0] != 1.0
         ):
             raise ScenarioError(
-                f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one"
+                f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it "
+                "one"
             )
     joints = joint_ids(model).tolist()
     drives = drive_ids(model).tolist()
@@ -463,7 +464,8 @@ def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
     if overlap := inside or beyond:
         raise ScenarioError(
             f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {overlap[0]} "
-            f"{'inside' if inside else 'beyond'} {overlap[1]} of contact {scenario.contact.kind!r}: give another x0"
+            f"{'inside' if inside else 'beyond'} {overlap[1]} of contact "
+            f"{scenario.contact.kind!r}: give another x0"
         )
 
 

@@ -232,7 +232,11 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(
-        numbers, **arrays, python=buffer.python, nominal=nominal, mixer=rows
+        numbers,
+        **arrays,
+        python=buffer.python,
+        nominal=nominal,
+        mixer=rows,
     )
 
 
@@ -321,7 +325,12 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
         "frictions": _frictions(prepared, buffer),
         "disturbances": [
             {"function": _signal(d, buffer, n), "stream": s.noise_stream(i)}
-            | {"cartesian": d.cartesian, "sees": d.sees, "air": d.air, "peak": d.along}
+            | {
+                "cartesian": d.cartesian,
+                "sees": d.sees,
+                "air": d.air,
+                "peak": d.along,
+            }
             | {"body": 6 * prepared.mechanism.model.body(d.body).id if isinstance(d, Push) else -1}
             for i, d in enumerate(s.disturbance)
         ],
@@ -387,7 +396,9 @@ def _settings(s: Resolved) -> dict[str, Any]:
 
 
 def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, Any]:
-    """Return the arrays of a record in which the callback keeps measurements, commands and states."""
+    """Return the arrays of a record in which the callback keeps measurements, commands and
+    states.
+    """
     n = s.plant.n
     width = s.plant.n if s.law.joint else 1
     late = not s.clock.regular  # a late command may take effect after the next sample began
@@ -427,7 +438,9 @@ def known_values(s: Resolved) -> list[float]:
 
 
 def pause_phase(s: Resolved) -> int:
-    """Return by how many samples the first pause of the controller comes earlier than the others."""
+    """Return by how many samples the first pause of the controller comes earlier than the
+    others.
+    """
     samples = s.clock.pauses(s.control_period, s.physics_step)[1]
     return int(philox.random_words(s.seed, 0, philox.PAUSE, 0)[0] * 2.0**-53 * samples)
 
@@ -489,6 +502,10 @@ def _frictions(prepared: Prepared, buffer: Functions) -> list[dict[str, int]]:
     for i, a in enumerate(inertia):
         numbers.append((buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))))
     return [
-        {"address": compiled.address, "parameters": first, "memory": second}
+        {
+            "address": compiled.address,
+            "parameters": first,
+            "memory": second,
+        }
         for first, second in numbers
     ]

@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
-from smc_mujoco.control.law import Law, Measurement
+from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Dynamics, Values
 from smc_mujoco.simulation import philox
@@ -42,7 +42,8 @@ class Controller:
         n = scenario.plant.n
         if scenario.plant.pose:
             raise ScenarioError(
-                f"{scenario.plant.name} is a free body, which only smc.run moves: give it to smc.run"
+                f"{scenario.plant.name} is a free body, which only smc.run moves: give it to "
+                "smc.run"
             )
         self.law = PythonComponent(self.scenario.law, n)
         self.estimator = PythonComponent(self.scenario.velocity, n)
@@ -73,10 +74,6 @@ class Controller:
         """
         u, self.s = self.command(*self.measure(k, t, x, v), t)
         return u, self.s
-
-    def set_gains(self, law: Law) -> None:
-        """Go on with the gains of another law of the same function; all memories stay."""
-        self.law.gains = PythonComponent(law, len(self.last_u)).gains
 
     def measure(
         self, k: int, t: float, x: np.ndarray, v: np.ndarray
@@ -174,10 +171,20 @@ class Controller:
         j = i + len(scenario.limits)
         if j < len(x):  # a joint without actuator, which moves with channel i
             fq, gq = self.model_at(x, v, j, i)
-            y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
+            y = y._replace(
+                q=float(x[j]),
+                dq=float(v[j]),
+                fq=float(fq),
+                gq=float(gq),
+            )
         if scenario.stepper is not None:  # u is the acceleration x''
             gq = y.gq / y.g
-            y = y._replace(f=0.0, g=1.0, fq=y.fq - gq * y.f, gq=gq)
+            y = y._replace(
+                f=0.0,
+                g=1.0,
+                fq=y.fq - gq * y.f,
+                gq=gq,
+            )
         if self.surface:
             sliding, v_eq = self.surface(i, y)
             y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
@@ -220,7 +227,14 @@ class Controller:
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
         """Return nominal f and g of channel i, for the u of a driven channel."""
-        f, g = evaluate_nominal(self.scenario.plant, x, v, i, self.values, self.last_u + self.told)
+        f, g = evaluate_nominal(
+            self.scenario.plant,
+            x,
+            v,
+            i,
+            self.values,
+            self.last_u + self.told,
+        )
         gain, drag = self.scenario.nominal_drive
         return f - drag * v[driven] * g + self.told[i] * g, gain * g
 
@@ -241,8 +255,28 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
             raise failure_of(f"the nominal model of {plant.name}", error) from error
     else:
         rest = np.zeros(n)
-        moving = [evaluate_nominal(plant, x, v, i, values, rest) for i in range(n)]
-        resting = [evaluate_nominal(plant, x, rest, i, values, rest) for i in range(n)]
+        moving = [
+            evaluate_nominal(
+                plant,
+                x,
+                v,
+                i,
+                values,
+                rest,
+            )
+            for i in range(n)
+        ]
+        resting = [
+            evaluate_nominal(
+                plant,
+                x,
+                rest,
+                i,
+                values,
+                rest,
+            )
+            for i in range(n)
+        ]
         f, per_u = np.array(moving).T
         f_at_rest, per_u_at_rest = np.array(resting).T
         M = np.diag(1.0 / per_u)

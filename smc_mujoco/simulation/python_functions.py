@@ -197,7 +197,15 @@ def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
     if not (signal.random or signal.sees):
         inputs = (signal.data,) if signal.series else ()
     kind = type(signal)
-    return called(kind.__name__, "a value and two derivatives", 3, kind.value, t, signal, *inputs)
+    return called(
+        kind.__name__,
+        "a value and two derivatives",
+        3,
+        kind.value,
+        t,
+        signal,
+        *inputs,
+    )
 
 
 def evaluate_nominal(
@@ -221,7 +229,16 @@ def evaluate_friction(
     rest.
     """
     name = f"friction {type(formula).__name__}"
-    return called(name, "a force and two bounds", 3, type(formula).value, v, motor, load, numbers)
+    return called(
+        name,
+        "a force and two bounds",
+        3,
+        type(formula).value,
+        v,
+        motor,
+        load,
+        numbers,
+    )
 
 
 class PythonFunction:
@@ -333,7 +350,14 @@ def of_signal(signal: Signal) -> PythonFunction:
     def body(inputs, _, memory):
         t, seed, channel, stream, *loop = inputs[:7]
         if signal.random:
-            return evaluate(signal, t, memories[memory], int(seed), int(channel), stream)
+            return evaluate(
+                signal,
+                t,
+                memories[memory],
+                int(seed),
+                int(channel),
+                stream,
+            )
         if signal.sees:
             return evaluate(signal, t, memories[memory], *loop)
         return evaluate(signal, t)
@@ -351,7 +375,14 @@ def of_nominal(plant: Plant) -> PythonFunction:
         arrays = [np.array(pointer(int(seen[name]))[:n]) for name in ("x", "v", "u")]
         values = Values(**dict(zip(names, parameters[: len(names)], strict=True)))
         x, v, u = arrays
-        return evaluate_nominal(plant, x, v, int(seen["i"]), values, u)
+        return evaluate_nominal(
+            plant,
+            x,
+            v,
+            int(seen["i"]),
+            values,
+            u,
+        )
 
     return PythonFunction(body)
 

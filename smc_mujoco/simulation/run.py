@@ -41,7 +41,8 @@ from mujoco.batch import Batch, SimulationError  # by now imported by callback
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system
 SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
-# physics steps in a slice of a user's model, which with contacts takes 0.1 s and more a step once it
+# physics steps in a slice of a user's model, which with contacts takes 0.1 s and more a step once
+# it
 # has diverged
 USER_MODEL_STEPS = 200
 PYTHON_STEPS = 20_000  # in a slice where a function is called in Python
@@ -301,7 +302,9 @@ class ScenarioBatch:
         return False
 
     def reset(self) -> None:
-        """Put MuJoCo's states at the model's defaults, and tell the callback which record is whose."""
+        """Put MuJoCo's states at the model's defaults, and tell the callback which record is
+        whose.
+        """
         count = len(self.scenarios)
         self.step = 0  # physics steps done
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
@@ -465,7 +468,9 @@ class ScenarioBatch:
         return again.failure(0, int(again.records["failure"][0]))
 
     def python_failure(self, i: int) -> str:
-        """Return what a function of simulation i that is called in Python raised; "" if none did."""
+        """Return what a function of simulation i that is called in Python raised; "" if none
+        did.
+        """
         for function in self.packed[i].python:
             if function.error is not None:
                 return told(function.error, int(self.records["seen"]["i"][i]))

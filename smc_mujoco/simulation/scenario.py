@@ -294,7 +294,9 @@ class Scenario:
         return resolved
 
     def _repr_html_(self) -> html.Html:
-        """Return plant, law, duration and the fields that differ from their defaults, in SI units."""
+        """Return plant, law, duration and the fields that differ from their defaults, in SI
+        units.
+        """
         parameters = ", ".join(
             f"{name} = {value:g}" for name, value in self.plant.parameters.items()
         )
@@ -473,7 +475,9 @@ class Scenario:
         return self.samples * self.steps * self.plant.n
 
     def noise_stream(self, i: int) -> int:
-        """The number of the random stream of disturbance i; 0 for a disturbance without randomness."""
+        """The number of the random stream of disturbance i; 0 for a disturbance without
+        randomness.
+        """
         random = [d.random for d in self.disturbance]
         return PROCESS + sum(random[:i]) if random[i] else 0
 
@@ -647,22 +651,26 @@ def check_clock(s: Resolved) -> None:
     delay = s.input_delay / s.physics_step
     if abs(delay - round(delay)) > 1e-6:
         raise ScenarioError(
-            f"input_delay {s.input_delay:g} s is not a whole number of physics steps of {s.physics_step:g} s: "
+            f"input_delay {s.input_delay:g} s is not a whole number of physics steps of "
+            f"{s.physics_step:g} s: "
             "give a physics_step that divides it"
         )
     if s.samples < 1:
         raise ScenarioError(
-            f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} s: give a longer one"
+            f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} "
+            "s: give a longer one"
         )
     if s.samples * s.steps > MAX_STEPS or (s.samples + 1) * s.plant.n > MAX_VALUES:
         raise ScenarioError(
-            f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels and "
+            f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels "
+            "and "
             f"{s.samples * s.steps:.3g} physics steps: give a shorter duration or longer periods "
             f"(at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
         )
     if s.jump is not None and s.jump.time >= s.duration:
         raise ScenarioError(
-            f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s: give an earlier time"
+            f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s: give "
+            "an earlier time"
         )
     if s.sensor is not None:
         s.sensor.check(s.physics_step)
@@ -679,7 +687,8 @@ def check_signals(s: Resolved) -> None:
         )  # s between knots, of all channels
         if isinstance(d, OrnsteinUhlenbeck | Dryden) and d.dt < shortest:
             raise ScenarioError(
-                f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s or more"
+                f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s "
+                "or more"
             )
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(
@@ -692,7 +701,8 @@ def check_signals(s: Resolved) -> None:
     winds = [d for d in s.disturbance if d.air]
     if winds and not flies(s.plant):
         raise ScenarioError(
-            f"disturbance {shown(winds[0])} is a wind, and {s.plant.name} has no drag: give a force, or plant "
+            f"disturbance {shown(winds[0])} is a wind, and {s.plant.name} has no drag: give a "
+            "force, or plant "
             "'quadrotor'"
         )
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
@@ -700,7 +710,8 @@ def check_signals(s: Resolved) -> None:
     forces = [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]
     if forces and s.plant.direct and not s.plant.pose:
         raise ScenarioError(
-            f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
+            f"disturbance {shown(forces[0])} is a force on a body, and disturbances of "
+            f"{s.plant.name} act on its "
             "joints: give another signal"
         )
     functions_of_time = [
@@ -734,7 +745,8 @@ def check_law(s: Resolved) -> None:
     check_free_body(s)
     if s.model == "true" and (s.law.joint or s.jump or s.stepper or s.clock.jitter):
         raise ScenarioError(
-            "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave that out, or give "
+            "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave "
+            "that out, or give "
             "model='nominal'"
         )
     for law in s.law.parts:
@@ -746,7 +758,8 @@ def check_law(s: Resolved) -> None:
             else:
                 cure = listed
             raise ScenarioError(
-                f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}"
+                f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: "
+                f"{cure}"
             )
     if s.model != "none" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
@@ -756,7 +769,8 @@ def check_law(s: Resolved) -> None:
         period = getattr(law.function, "control_period", None)  # of a discrete controller
         if period is not None and abs(s.control_period - period) > 1e-9 * period:
             raise ScenarioError(
-                f"law {law.name!r} is discretised for {period:g} s, and control_period is {s.control_period:g} s: give "
+                f"law {law.name!r} is discretised for {period:g} s, and control_period is "
+                f"{s.control_period:g} s: give "
                 f"control_period={period:g}, or the controller of continuous time"
             )
 
@@ -765,8 +779,10 @@ def check_surface(surface: Surface, law: Law) -> None:
     """Check that surface and law both have a sliding variable of relative degree 1."""
     if not law.relative_degree == surface.relative_degree == 1:
         raise ScenarioError(
-            f"surface {surface.name!r} has relative degree {surface.relative_degree}, and law {law.name!r} "
-            f"{law.relative_degree}: leave the surface out, or give a surface and a law of relative degree 1"
+            f"surface {surface.name!r} has relative degree {surface.relative_degree}, and law "
+            f"{law.name!r} "
+            f"{law.relative_degree}: leave the surface out, or give a surface and a law of "
+            "relative degree 1"
         )
 
 
@@ -777,7 +793,8 @@ def check_channels(s: Resolved) -> None:
     for name, value in s.law.gains.items():
         if isinstance(value, tuple) and len(value) != s.plant.driven:
             raise ScenarioError(
-                f"gain {name} of {s.law.name} has {len(value)} values, {gain_text(value)}, and {s.plant.name} has "
+                f"gain {name} of {s.law.name} has {len(value)} values, {gain_text(value)}, and "
+                f"{s.plant.name} has "
                 f"{s.plant.driven} driven channels: give one number, or {s.plant.driven}"
             )
     if not s.law.joint:
@@ -814,7 +831,8 @@ def check_free_body(s: Resolved) -> None:
         not s.law.joint and s.law.name != "none" and s.law.function is not None
     ):  # else of a trace, without code
         raise ScenarioError(
-            f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose channels turn together: "
+            f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose "
+            "channels turn together: "
             "give a law of many joints, such as 'geometric'"
         )
     given = {name: (words, getattr(s, name)) for name, words in NOT_OF_FREE_BODIES.items()}
@@ -836,7 +854,8 @@ def check_inertia(s: Resolved) -> None:
         M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
         if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(
-                f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two joints move the same "
+                f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two "
+                "joints move the same "
                 "bodies in the same way: drive one of them, or give another x0"
             )
 
@@ -847,7 +866,8 @@ def check_names(s: Resolved) -> None:
         if s.plant.mass != "mass" and {"mass", s.plant.mass} <= factors.keys():
             both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
             raise ScenarioError(
-                f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them"
+                f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of "
+                "them"
             )
 
 
@@ -857,7 +877,8 @@ def check_mechanism(s: Resolved) -> None:
     """
     if s.integrator == "RK4" and (states := [p for p in s.friction if p.bristles]):
         raise ScenarioError(
-            f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
+            f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the "
+            "integrator out"
         )
     if len(s.actuator) > 1 and any(
         isinstance(part, DCMotor) and part.ripple for part in s.actuator
@@ -880,7 +901,8 @@ def check_mechanism(s: Resolved) -> None:
         for name, value in s.plant.placed.items() if s.contact.kind != "none" else ():
             if (present := getattr(values, name)) != value:
                 raise ScenarioError(
-                    f"the obstacles of contact {s.contact.kind!r} of {s.plant.name} are placed for {name} = {value:g}, "
+                    f"the obstacles of contact {s.contact.kind!r} of {s.plant.name} are placed for "
+                    f"{name} = {value:g}, "
                     f"and {name} is {present:g}: leave {name} as it is"
                 )
 
@@ -891,11 +913,13 @@ def check_stepper(s: Resolved) -> None:
     """
     if len([part for part in s.actuator if part.drives]) > 1:
         raise ScenarioError(
-            f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that out"
+            f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that "
+            "out"
         )
     if s.law.joint and s.model != "none":
         raise ScenarioError(
-            f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a Stepper's u is an "
+            f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a "
+            "Stepper's u is an "
             "acceleration: give model='none', a law of one channel, or another actuator"
         )
 
@@ -909,7 +933,9 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
 
 
 def _doubts(s: Resolved) -> Iterator[str]:
-    """Yield a sentence about each number that may be in degrees, and each motor that is too weak."""
+    """Yield a sentence about each number that may be in degrees, and each motor that is too
+    weak.
+    """
     # ramps may have many turns
     amplitudes = []
     for signal in s.references:
@@ -925,7 +951,10 @@ def _doubts(s: Resolved) -> Iterator[str]:
                 f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
             need = abs(f) / abs(g) if g else 0.0
             if motor.stall < need and (need <= limit or not s.force_command):
-                fact = f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and "
+                fact = (
+                    f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} "
+                    "at rest, and "
+                )
                 fact += f"channel {i} of {s.plant.name} needs {need:.3g} to hold its start"
                 yield f"{fact}: give the motor more {'torque' if s.stepper else 'gear, voltage or current'}"
 
@@ -955,7 +984,10 @@ def _made_up_bound(s: Scenario) -> str:
     bounds = list(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
     verb = "are" if len(bounds) > 1 else "is"
     number = f"{taken[free[0]]:g}"
-    fact = f"nothing bounds the force on {joints} of {s.plant.name}, so that |u| <= {' and '.join(bounds)} {verb} taken"
+    fact = (
+        f"nothing bounds the force on {joints} of {s.plant.name}, so that |u| <= "
+        f"{' and '.join(bounds)} {verb} taken"
+    )
     if len(driven) == 1:
         example = f"u_max={number}"
     else:

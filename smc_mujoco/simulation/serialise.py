@@ -46,9 +46,11 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
     """Return the value of a scenario's field as plain data."""
     match value:
         case Plant():
-            data = {"name": value.name, "n": value.n, "module": value.build.__module__} | dict(
-                value.parameters
-            )
+            data = {
+                "name": value.name,
+                "n": value.n,
+                "module": value.build.__module__,
+            } | dict(value.parameters)
             about = getattr(value.build, "about", None)  # of a user's model
             return data | ({"mjcf": about()} if about else {})
         case Component():
@@ -145,7 +147,8 @@ def _restore_plant(data: dict) -> Plant:
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
     if module != find_plant(name).build.__module__:
         raise ScenarioError(
-            f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it"
+            f"plant {name!r} is not one of the library's: import {module}, which defines it, to "
+            "run it"
         )
     return find_plant(name, **plant)
 

@@ -340,7 +340,20 @@ class Dryden(Signal):
         length = p.height
         if channel < 2.0:
             size, length = size / b**0.4, length / b**1.2
-        return _dryden(t, size, length / p.speed, p.dt, memory, seed, channel, stream), 0.0, 0.0
+        return (
+            _dryden(
+                t,
+                size,
+                length / p.speed,
+                p.dt,
+                memory,
+                seed,
+                channel,
+                stream,
+            ),
+            0.0,
+            0.0,
+        )
 
 
 @njit(error_model="numpy")
@@ -443,7 +456,20 @@ class OrnsteinUhlenbeck(Signal):
 
     @staticmethod
     def value(t, p, memory, seed, channel, stream):
-        return _ornstein_uhlenbeck(t, p.sigma, p.tau, p.dt, memory, seed, channel, stream), 0.0, 0.0
+        return (
+            _ornstein_uhlenbeck(
+                t,
+                p.sigma,
+                p.tau,
+                p.dt,
+                memory,
+                seed,
+                channel,
+                stream,
+            ),
+            0.0,
+            0.0,
+        )
 
 
 @njit(error_model="numpy")
@@ -490,7 +516,20 @@ class BandLimited(Signal):
 
     @staticmethod
     def value(t, p, memory, seed, channel, stream):
-        return _band_limited(t, p.sigma, p.low, p.high, memory, seed, channel, stream), 0.0, 0.0
+        return (
+            _band_limited(
+                t,
+                p.sigma,
+                p.low,
+                p.high,
+                memory,
+                seed,
+                channel,
+                stream,
+            ),
+            0.0,
+            0.0,
+        )
 
 
 @njit(error_model="numpy")
@@ -573,7 +612,8 @@ def parameter_factors(name: str, value: object) -> Frozen[float]:
     """Return parameter name -> factor, checked; `name` is for errors."""
     if not isinstance(value, Mapping):
         raise ScenarioError(
-            f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}"
+            f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': "
+            "1.3}"
         )
     return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})
 
@@ -668,9 +708,13 @@ class Clock:
             if room:
                 finer = ""
             else:
-                finer = f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter of "
+                finer = (
+                    f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter "
+                    "of "
+                )
             raise ScenarioError(
                 f"Clock's jitter is {self.jitter:g} s: {finer or 'give '}at least a physics step"
-                f"{f', {physics_step:g} s' * room}, and less than the control period, {control_period:g} s, and "
+                f"{f', {physics_step:g} s' * room}, and less than the control period, "
+                f"{control_period:g} s, and "
                 "missed=... for samples that do not run"
             )

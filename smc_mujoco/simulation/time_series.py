@@ -67,14 +67,16 @@ class TimeSeries(Signal):
             object.__setattr__(self, name, _floats(f"{kind}'s {name}", getattr(self, name)))
         if len(self.times) != len(self.values):
             raise ScenarioError(
-                f"{kind} has {len(self.times)} times and {len(self.values)} values: give as many of each"
+                f"{kind} has {len(self.times)} times and {len(self.values)} values: give as many "
+                "of each"
             )
         _check(kind, self.times, "item {}".format)
         with np.errstate(all="ignore"):
             curvature = np.diff(self.values) / np.diff(self.times) ** 2
         if not np.isfinite(curvature).all():
             raise ScenarioError(
-                f"{kind} is too steep for a float: give longer steps of time or smaller ones of value"
+                f"{kind} is too steep for a float: give longer steps of time or smaller ones of "
+                "value"
             )
         object.__setattr__(self, "data", self._data())
         self.data.flags.writeable = False
@@ -84,7 +86,10 @@ class TimeSeries(Signal):
         return np.array([self.times, self.values])
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
+        return (
+            f"{type(self).__name__}({len(self.times)} points, {self.times[0]:g} to "
+            f"{self.times[-1]:g} s)"
+        )
 
     def __reduce__(self):  # a copy has separate data, also read-only
         return type(self), (self.times, self.values)
@@ -140,7 +145,8 @@ class TimeSeries(Signal):
         )  # of two steps the shorter, because the other has the gap
         for i in np.flatnonzero(steps > MAX_GAP_STEPS * median)[:1]:
             raise ScenarioError(
-                f"{path} has a gap after line {rows[i][0]}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
+                f"{path} has a gap after line {rows[i][0]}, from {times[i]:g} s to "
+                f"{times[i + 1]:g} s, where rows are "
                 f"{median:g} s apart: fill it in, or cut the file there"
             )
         return cls(times, values)
@@ -246,7 +252,8 @@ def _check(what: str, times: Sequence[float], where: Callable[[int], str]) -> No
         raise ScenarioError(f"{what} has {len(times)} points: give at least two")
     for i in np.flatnonzero(np.diff(times) <= 0.0)[:1] + 1:
         raise ScenarioError(
-            f"{what}, {where(i)}: {times[i]:.12g} s comes after {times[i - 1]:.12g} s: give times that increase"
+            f"{what}, {where(i)}: {times[i]:.12g} s comes after {times[i - 1]:.12g} s: give times "
+            "that increase"
         )
 
 
@@ -316,7 +323,8 @@ def cartesian_path(
         array = np.empty(0)
     if array.shape != (len(times), 3):
         raise ScenarioError(
-            f"points are {shown(points)}: give a position (x, y, z) in m for each of {len(times)} times"
+            f"points are {shown(points)}: give a position (x, y, z) in m for each of {len(times)} "
+            "times"
         )
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
     first = path[0].times[0]

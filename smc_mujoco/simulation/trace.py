@@ -125,12 +125,19 @@ class Trace:
         else:
             end = f", {self.failure}"
         law = self.scenario.law
-        return f"Trace({self.scenario.plant.name}, {law}, gains: {law.source}, {len(self.t)} samples{end})"
+        return (
+            f"Trace({self.scenario.plant.name}, {law}, gains: {law.source}, {len(self.t)} "
+            f"samples{end})"
+        )
 
     def _repr_html_(self) -> html.Html:
         """Return what was run, how it failed if it did, and the range of x and u in each unit."""
         s = self.scenario
-        rows = {"plant": s.plant.name, "law": s.law, "gains": s.law.source}
+        rows = {
+            "plant": s.plant.name,
+            "law": s.law,
+            "gains": s.law.source,
+        }
         if s.exact_friction:
             rows["dry friction"] = "its mean and first moment in each step"
         rows["samples"] = f"{len(self.t)}, every {s.control_period:g} s"
@@ -162,7 +169,8 @@ class Trace:
         )
         if len(about) > MAX_TEXT:
             raise ScenarioError(
-                f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MAX_TEXT:,} "
+                f"cannot save {path}: its scenario is a text of {len(about):,} characters and more "
+                f"than {MAX_TEXT:,} "
                 "are not read back: give it shorter time series"
             )
         arrays: dict[str, Any] = {"about": np.array(about)} | self.arrays()
@@ -214,7 +222,16 @@ class Trace:
         pairs = zip(self.scenario.plant.units, self.scenario.efforts, strict=True)
         of_channels = []
         for x, u in pairs:
-            of_channels.append({"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""})
+            of_channels.append(
+                {
+                    "x": x,
+                    "r": x,
+                    "v": f"{x}/s",
+                    "u": u,
+                    "applied": u,
+                    "s": "",
+                }
+            )
         return [units.get(name, EFFORT[units["x"]]) for units in of_channels]
 
     def _unit(self, name: str) -> str:
@@ -336,7 +353,11 @@ def _write_parquet(trace: Trace, file: Path) -> None:
         )
 
 
-_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".parquet": _write_parquet}
+_WRITERS = {
+    ".csv": _write_csv,
+    ".mat": _write_mat,
+    ".parquet": _write_parquet,
+}
 EXPORT_FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
 
 
@@ -379,7 +400,13 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
             values[end:] = np.nan
         diverged_at = failed_step * scenario.resolved.physics_step
         failure = f"{one_line(failure, MAX_FAILURE)}, at t = {diverged_at:.6g} s"
-    return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
+    return Trace(
+        **arrays,
+        t=t,
+        scenario=scenario,
+        diverged_at=diverged_at,
+        failure=failure,
+    )
 
 
 def load(path: str | os.PathLike[str]) -> Trace:

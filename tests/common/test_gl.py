@@ -134,7 +134,8 @@ BACKENDS = {
         None,
         "disabled",
         "MUJOCO_GL=egl does not load here: films are off",
-        "no film: PYOPENGL_PLATFORM=glx rules out what is installed (and MUJOCO_GL=egl cannot be used): unset it",
+        "no film: PYOPENGL_PLATFORM=glx rules out what is installed (and MUJOCO_GL=egl cannot be "
+        "used): unset it",
     ),
     "a broken driver": (
         "",

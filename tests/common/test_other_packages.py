@@ -315,7 +315,8 @@ def test_a_name_of_the_library_is_not_taken_over(install):
     )
     (sentence,) = said(lambda: smc.law("classical"))
     assert sentence.startswith(
-        "package 'grab': its law 'classical' (grab_laws:classical) has the name of an entry of the library"
+        "package 'grab': its law 'classical' (grab_laws:classical) has the name of an entry of the "
+        "library"
     )
     assert smc.law("classical").function is law.catalogue().own["classical"].function
     assert "grab_laws" not in sys.modules

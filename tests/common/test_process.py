@@ -17,7 +17,10 @@ pytestmark = pytest.mark.quick
 
 
 def test_a_command_has_no_input_plain_words_and_its_folder(tmp_path):
-    code = "import os, sys; print(os.environ['LC_ALL'], os.getcwd(), sys.stdin.read() == ''); sys.exit('ä\\udc80')"
+    code = (
+        "import os, sys; print(os.environ['LC_ALL'], os.getcwd(), sys.stdin.read() == ''); "
+        "sys.exit('ä\\udc80')"
+    )
     done = timed([sys.executable, "-X", "utf8", "-c", code], 20.0, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (1, f"C {tmp_path} True\n")
     assert done.stderr.endswith("\n")

@@ -1,4 +1,6 @@
-"""Numbers and lists in words, and a table for every reader: terminal, plain text, notebook, LaTeX."""
+"""Numbers and lists in words, and a table for every reader: terminal, plain text, notebook,
+LaTeX.
+"""
 
 import math
 import re

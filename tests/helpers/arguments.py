@@ -42,7 +42,8 @@ def told_scenario(scenario: Scenario) -> str:
 TEXTS: dict[Any, Callable[[Any], str]] = {
     Scenario: told_scenario,
     Scene: lambda scene: (
-        f"Scene({scene.title}, camera={scene.camera}, seeds={ {s.seed for _, _, s in scene.runs()} })"
+        f"Scene({scene.title}, camera={scene.camera}, "
+        f"seeds={ {s.seed for _, _, s in scene.runs()} })"
     ),
     Plant: lambda plant: f"plant {plant.name}",
     Component: lambda one: (

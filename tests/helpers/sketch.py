@@ -48,7 +48,9 @@ def failed(trace: smc.Trace, at: int, failure: str = "") -> smc.Trace:
 
 
 class Pen(ImageDraw.ImageDraw):
-    """A pen of Pillow that also notes what it draws, in `notes`; in the place of `ImageDraw.Draw`."""
+    """A pen of Pillow that also notes what it draws, in `notes`; in the place of
+    `ImageDraw.Draw`.
+    """
 
     notes: ClassVar[list[str]] = []
     busy: ClassVar[bool] = False  # within a shape, which is made of others

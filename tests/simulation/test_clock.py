@@ -207,6 +207,8 @@ def test_a_jitter_where_a_period_has_one_step_is_told_of_a_shorter_step():
             clock=smc.Clock(jitter=0.0005),
         )
     assert str(error.value) == (
-        "Clock's jitter is 0.0005 s: give a physics_step of 0.00025 s, for example, and a jitter of at least a physics "
-        "step, and less than the control period, 0.001 s, and missed=... for samples that do not run"
+        "Clock's jitter is 0.0005 s: give a physics_step of 0.00025 s, for example, and a jitter "
+        "of at least a physics "
+        "step, and less than the control period, 0.001 s, and missed=... for samples that do not "
+        "run"
     )

@@ -180,7 +180,9 @@ def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
 
 
 def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
-    """M a + h is the force that MuJoCo's inverse dynamics ask for at random states; g is h at rest."""
+    """M a + h is the force that MuJoCo's inverse dynamics ask for at random states; g is h at
+    rest.
+    """
     rng = np.random.default_rng(1)
     model = arm.load()
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
@@ -301,7 +303,8 @@ def test_a_failing_law_ends_its_own_run_with_the_reason():
         (beyond, "law 'beyond' raised IndexError"),
         (
             tipped,
-            "law 'tipped' raised ValueError (there is no tip, or the law has no model: give the plant a tip",
+            "law 'tipped' raised ValueError (there is no tip, or the law has no model: give the "
+            "plant a tip",
         ),
     ]
     common = {"plant": "double_pendulum", "duration": 0.03}

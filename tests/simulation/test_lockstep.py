@@ -351,9 +351,14 @@ def test_batches_and_slices_change_no_bit(together, monkeypatch, batch_bytes, sl
 def test_another_process_gives_the_same_bits_and_a_python_law_may_simulate_a_model_of_its_own(
     together,
 ):
-    """A predictive law steps MuJoCo inside the callback: the worst case is an abort of the process."""
+    """A predictive law steps MuJoCo inside the callback: the worst case is an abort of the
+    process.
+    """
     here = Path(__file__).parent
-    code = "import smc_mujoco as smc, test_lockstep as t; print(t.digest(smc.run(t.batch()))); t.predict()"
+    code = (
+        "import smc_mujoco as smc, test_lockstep as t; print(t.digest(smc.run(t.batch()))); "
+        "t.predict()"
+    )
     assert python(
         "-c", code, path=f"{here.parent}{os.pathsep}{here}{os.pathsep}{ROOT}"
     ).stdout.strip() == digest(together)

@@ -53,24 +53,6 @@ def test_it_gives_the_u_and_s_of_the_run_from_the_positions_and_velocities_of_th
     np.testing.assert_allclose([s for _, s in found], trace.s, rtol=1e-12, atol=1e-12)
 
 
-def test_new_gains_leave_the_memory_and_a_new_controller_has_none():
-    law = smc.law("super_twisting")
-    scenario = smc.Scenario(plant="duffing", law=law)
-    more = dataclasses.replace(law, gains=dict(law.gains) | {"k1": 9.0})
-    x = np.array([0.3])
-    v = np.array([-0.1])
-    first = Controller(scenario)
-    other = Controller(scenario)
-    for controller in (first, other):
-        controller(0, 0.0, x, v)
-    other.set_gains(more)
-    memory = first.law.memory.copy()
-    assert memory.any()
-    assert np.array_equal(other.law.memory, memory)
-    assert other(1, 1e-3, x, v)[0] != first(1, 1e-3, x, v)[0]
-    assert not Controller(scenario).law.memory.any()
-
-
 def test_what_the_sensors_read_is_not_written_to():
     x = np.array([0.3])
     v = np.array([-0.1])

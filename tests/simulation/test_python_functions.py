@@ -1,4 +1,6 @@
-"""Functions that do not compile: the callback calls them in Python, and gives the oracle's trace."""
+"""Functions that do not compile: the callback calls them in Python, and gives the oracle's
+trace.
+"""
 
 import dataclasses
 import json

@@ -444,7 +444,9 @@ WEAK = {
 
 
 def resting(name):
-    """Scenarios of smooth laws, strong and weak, from near and far, under little and much friction."""
+    """Scenarios of smooth laws, strong and weak, from near and far, under little and much
+    friction.
+    """
     plant = small(name)
     found = []
     for law, weak in WEAK.items():

@@ -1,4 +1,6 @@
-"""What a hostile review broke, and what must stay mended: memory, processes, names, signs, clocks."""
+"""What a hostile review broke, and what must stay mended: memory, processes, names, signs,
+clocks.
+"""
 
 # pyright: reportOptionalMemberAccess=false, reportOperatorIssue=false
 import contextlib
@@ -649,7 +651,9 @@ def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(be
 
 @dataclasses.dataclass(frozen=True)
 class Sine(smc.Signal):
-    """A user's signal that is named as one of the library, with other parameters and another shape."""
+    """A user's signal that is named as one of the library, with other parameters and another
+    shape.
+    """
 
     amplitude: float
     omega: float

@@ -123,7 +123,10 @@ def test_one_parameter_under_two_names_is_refused(refused):
     for name in ["duffing", "pendulum_network"]:
         plant = smc.plant(name)
         both = {"mass": 1.2, plant.mass: 1.5}
-        words = f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of them"
+        words = (
+            f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of "
+            "them"
+        )
         for fields, said in (
             ({"mismatch": both}, "mismatch has"),
             ({"jump": smc.Jump(0.5, both)}, "Jump has"),

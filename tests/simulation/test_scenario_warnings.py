@@ -80,7 +80,10 @@ def test_a_motor_too_weak_for_gravity_at_the_start_says_so():
     """m g l sin 0.5 = 1.176 N m; gear 1 gives 30 A times 0.0302 N m/A, 1 V at gear 12.25 gives
     0.3699/0.299 N m.
     """
-    words = "DCMotor gives at most 0.906 N m at rest, and channel 0 of inverted_pendulum needs 1.18 to hold its start"
+    words = (
+        "DCMotor gives at most 0.906 N m at rest, and channel 0 of inverted_pendulum needs 1.18 to "
+        "hold its start"
+    )
     with pytest.warns(smc.errors.ScenarioWarning, match=words):
         dataclasses.replace(PENDULUM, actuator=smc.DCMotor(gear=1.0))
     for fields in (

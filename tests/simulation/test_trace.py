@@ -202,7 +202,10 @@ def test_a_file_brings_the_parts_and_signals_that_nothing_has_used(tmp_path):
         reference=smc.signals.TimeSeries((0.0, 1.0), (0.0, 0.1)),
     )
     path = smc.run(made).save(tmp_path / "a.npz")
-    code = f"import smc_mujoco as smc; s = smc.load({str(path)!r}).scenario; print(s.reference, s.friction)"
+    code = (
+        f"import smc_mujoco as smc; s = smc.load({str(path)!r}).scenario; print(s.reference, "
+        "s.friction)"
+    )
     done = python("-c", code)
     assert done.stdout.strip() == f"{made.reference} {made.friction}"
 

@@ -149,7 +149,8 @@ def test_bad_input_is_one_sentence(refused):
 def test_a_point_beyond_reach_is_named_with_its_distance(refused):
     points = [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)]
     said = (
-        "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
+        "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: "
+        "it stays 8.",
         "m away; give points within reach, or another x0",
     )
     refused(
