@@ -1,6 +1,6 @@
 """Hashes of code: of a user's functions, of this package, and of the machine's arithmetic.
 
-    of(my_law.function)        # "5f0c..."; it changes with the function, and with every helper that the function calls
+    of(my_law.function)  # "5f0c..."; it changes with the function, and with every helper
 
 A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches
 by a global name: constants by value, functions by their own code, objects by their class and by

@@ -41,10 +41,9 @@ def table(
     max_rows: int = MAX_ROWS,
 ) -> Html:
     """Return a table: caption above, note below, the columns `numbers` aligned to the right."""
+    width = 1
     if headings or rows:
         width = len(headings or rows[0])
-    else:
-        width = 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
     parts = [
         '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">'
@@ -82,10 +81,9 @@ def fields(values: Mapping[str, object], caption: str) -> Html:
 
 def embedded(content: bytes, kind: str, width: float | None = None) -> Html:
     """Return a picture or a film, kept in the page itself and no wider than the page."""
-    source = f'src="data:{kind};base64,{base64.b64encode(content).decode()}" style="max-width:100%;height:auto"'
-    if width is None:
-        source += ""
-    else:
+    data = base64.b64encode(content).decode()
+    source = f'src="data:{kind};base64,{data}" style="max-width:100%;height:auto"'
+    if width is not None:
         source += f' width="{width:.0f}"'
     if kind.startswith("video/"):
         return Html(f"<video {source} controls autoplay muted loop playsinline></video>")

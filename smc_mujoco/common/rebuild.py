@@ -70,9 +70,9 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
     if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():
-            if name in names.attributes:
-                thing = _swapped(thing, Names(set(), set()), finish, copies)
             vars(copy)[name] = thing
+            if name in names.attributes:
+                vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, copies)
         return copy
     return value
 

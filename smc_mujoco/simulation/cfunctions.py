@@ -216,9 +216,8 @@ def _key(function: Callable, body: Callable) -> Key | None:
     function_name = getattr(function, "__qualname__", function.__name__)
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function_name}")
     try:
-        if not fingerprint.ours(function):
-            if fingerprint.of(function) != fingerprint.now(function):
-                return None
+        if not fingerprint.ours(function) and fingerprint.of(function) != fingerprint.now(function):
+            return None
         return Key(name, fingerprint.now(body))
     except ScenarioError:
         return None

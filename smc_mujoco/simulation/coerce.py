@@ -86,7 +86,9 @@ def _component(kind: str, value: object) -> Component:
         return value
     field = "velocity" if kind == "estimator" else kind
     if callable(value):
-        made = ", or smc.law_from(function) for a policy of an observation" * (kind == "law")
+        made = ""
+        if kind == "law":
+            made = ", or smc.law_from(function) for a policy of an observation"
         raise ScenarioError(
             f"{field} is a bare {type(value).__name__}: give smc.{kind}_function(function){made}"
         )
@@ -118,8 +120,7 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     if len(value) != plant.driven:
         raise ScenarioError(
             f"{name} has {len(value)} values for the {plant.driven} driven channels of "
-            f"{plant.name}: give one, or "
-            f"{plant.driven}"
+            f"{plant.name}: give one, or {plant.driven}"
         )
     return list(value)
 
@@ -132,10 +133,9 @@ def bound(
         value = value.tolist()
     if value is None:
         return None
+    items: list[Any] = [value]
     if isinstance(value, Mapping | list | tuple):
         items = one_per_channel(name, value, s.plant)
-    else:
-        items = [value]
     bounds = tuple(number(name, item, above=0.0, infinite=True) for item in items)
     return bounds[0] if len(set(bounds)) == 1 else bounds
 
@@ -149,10 +149,9 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[flo
         value = value.tolist()
     if value is None:
         return None
+    values: list[Any] = [value]
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         values = items_of(name, value)
-    else:
-        values = [value]
     n = s.plant.n
     if len(values) not in (1, n):
         raise ScenarioError(
@@ -246,18 +245,14 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
         value = value.signals
     if isinstance(value, list | tuple) and len(value) == 1:
         value = value[0]
-    several = isinstance(value, Mapping | list | tuple)
-    items: list[Any]
-    if several:
+    items: list[Any] = [value]
+    if isinstance(value, Mapping | list | tuple):
         items = one_per_channel("reference", value, plant)
-    else:
-        items = [value]
     for item in items:
         if not isinstance(item, Signal):
+            amplitude = "0.0"
             if isinstance(item, int | float):
                 amplitude = shown(item)
-            else:
-                amplitude = "0.0"
             cure = f"give one signal, such as smc.Constant({amplitude})"
             if callable(item):
                 cure = "give its samples, smc.signals.TimeSeries(times, values)"
@@ -269,16 +264,15 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
 
 def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
     """Return a contact that the plant offers, from itself or its kind; None means "none"."""
-    value = "none" if value is None else value
+    if value is None:
+        value = "none"
     if isinstance(value, str):
-        contact = Contact(value)
-    else:
-        contact = value
-    if not isinstance(contact, Contact):
+        value = Contact(value)
+    if not isinstance(value, Contact):
         kinds = ", ".join(["none", *s.plant.contacts])
-        raise ScenarioError(f"{name} is {shown(contact)}: give smc.Contact(...) or one of {kinds}")
-    contact.check(s.plant)
-    return contact
+        raise ScenarioError(f"{name} is {shown(value)}: give smc.Contact(...) or one of {kinds}")
+    value.check(s.plant)
+    return value
 
 
 def friction(

@@ -15,7 +15,6 @@ start inwards, and pendulums that may touch each other ("bobs") start in order f
 """
 
 import dataclasses
-import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, Any
@@ -75,11 +74,8 @@ class Starts:
         middle = scenario.resolved.x0 if self.x0 is None else self.x0
         plant = scenario.plant
         if plant.pose:
-            return (
-                max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False))
-                + self.spread
-                + self.by
-            )
+            far = max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False))
+            return far + self.spread + self.by
         return max(abs(x) for x in middle) or self.by
 
     def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
@@ -99,18 +95,16 @@ class Starts:
         z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
         if kind != "none":
             z = [-abs(factor) for factor in z]
-        if scenario.plant.pose:
-            moved = [
-                x + (self.spread + self.by) * factor
-                for x, factor in zip(scenario.resolved.x0, z, strict=True)
-            ]
-            return dataclasses.replace(scenario, seed=seed, x0=moved)
         x0 = []
         for x, factor in zip(scenario.resolved.x0, z, strict=True):
-            x0.append(
-                x * (1.0 + self.spread * factor) + (self.by if x >= 0.0 else -self.by) * factor
-            )
-        return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
+            if scenario.plant.pose:
+                x0.append(x + (self.spread + self.by) * factor)
+            else:
+                away = self.by if x >= 0.0 else -self.by
+                x0.append(x * (1.0 + self.spread * factor) + away * factor)
+        if kind == "bobs":
+            x0.sort()
+        return dataclasses.replace(scenario, seed=seed, x0=x0)
 
 
 @constrained
@@ -129,14 +123,11 @@ def starts(
     Raises:
       ScenarioError: a number out of its range.
     """
+    middle = None
     if isinstance(x0, Sequence) and not isinstance(x0, str):
-        items = items_of("x0", x0)
-    else:
-        items = [x0]
-    if x0 is None:
-        middle = None
-    else:
-        middle = tuple(number("x0", item) for item in items)
+        middle = tuple(number("x0", item) for item in items_of("x0", x0))
+    elif x0 is not None:
+        middle = (number("x0", x0),)
     return Starts(x0=middle, spread=spread, by=by)
 
 
@@ -174,15 +165,12 @@ def grid(
     Warns:
       ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
-    seeds = listed(
-        "seeds",
-        seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)),
-    )
-    plants, laws, conditions = (
-        listed("plants", plants),
-        listed_laws(laws),
-        listed("conditions", conditions),
-    )
+    if not isinstance(seeds, Iterable):
+        seeds = range(whole("seeds", seeds, 1, MAX_ITEMS))
+    seeds = listed("seeds", seeds)
+    plants = listed("plants", plants)
+    laws = listed_laws(laws)
+    conditions = listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(seeds)) > MAX_ITEMS:
         raise ScenarioError(
             f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most"
@@ -220,21 +208,11 @@ def all_combinations(
         for condition in conditions:
             runs = []
             for law in laws(plant):
-                runs.append(
-                    [
-                        case(
-                            plant,
-                            law(seed),
-                            condition,
-                            duration,
-                            seed=seed,
-                            starts=starts,
-                        )
-                        for seed in seeds
-                    ]
-                )
-            check_moving(runs[0])
-            scenarios += itertools.chain.from_iterable(runs)
+                for seed in seeds:
+                    run = case(plant, law(seed), condition, duration, seed=seed, starts=starts)
+                    runs.append(run)
+            check_moving(runs[: len(seeds)])
+            scenarios += runs
     return scenarios
 
 
@@ -250,7 +228,8 @@ def case(
     changes: Mapping[str, Any] = frozen({}),
 ) -> Scenario:
     """Return one run of a grid, with `changes` of the fields that its condition sets."""
-    plant, condition = as_plant(plant), find_condition(condition)
+    plant = as_plant(plant)
+    condition = find_condition(condition)
     fields: dict[str, Any] = {
         "plant": plant,
         "law": _law(plant, law, gains, seed),
@@ -258,10 +237,8 @@ def case(
     }
     if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}
-    of_condition, starts = (
-        condition.on(plant, duration),
-        checked_starts(Starts() if starts is None else starts),
-    )
+    of_condition = condition.on(plant, duration)
+    starts = checked_starts(Starts() if starts is None else starts)
     starts.check_condition(condition.name, of_condition)
     scenario = Scenario(**fields | of_condition | dict(changes))
     return starts.place(scenario, seed).named(condition.name)

@@ -38,18 +38,14 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.state import CHANNEL
 
-USERDATA = (
-    2  # numbers in mjData.userdata: callback.MAGIC and the address of the simulation's record
-)
+USERDATA = 2  # numbers in mjData.userdata: callback.MAGIC and the address of the record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
 SENSORS = {
     "x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS,
     "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL,
 }
-POSE_SENSORS = {
-    "x_sensor": (":x", ":q"),
-    "v_sensor": (":v", ":w"),
-}  # ends of the names of a free body's sensors
+# ends of the names of a free body's sensors
+POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
 # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 MAX_OVERLAP = 1e-3
@@ -57,16 +53,14 @@ MAX_OVERLAP = 1e-3
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
-    if scenario.contact.kind == "none":
-        contact = ()
-    else:
-        contact = (scenario.contact,)
-    if scenario.sensor is None:
-        sensor = ()
-    else:
-        sensor = (scenario.sensor,)
-    actuator = tuple(part for part in scenario.actuator if not part.in_callback)
-    return (*contact, *scenario.friction, *actuator, *sensor)
+    added: list[Part] = []
+    if scenario.contact.kind != "none":
+        added.append(scenario.contact)
+    added += scenario.friction
+    added += [part for part in scenario.actuator if not part.in_callback]
+    if scenario.sensor is not None:
+        added.append(scenario.sensor)
+    return tuple(added)
 
 
 def structure(scenario: Scenario) -> Hashable:
@@ -98,14 +92,12 @@ class Mechanism:
 
     model: mujoco.MjModel  # the base model, without the values of a scenario and without scenery
     channels: np.ndarray  # the indices of the channels in it, (n,) CHANNEL
-    free_starts: set[Hashable] = dataclasses.field(
-        default_factory=set
-    )  # those that `check_start` has passed
+    # those that `check_start` has passed
+    free_starts: set[Hashable] = dataclasses.field(default_factory=set)
 
 
-_mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = (
-    weakref.WeakValueDictionary()
-)  # by structure
+# by structure
+_mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()
 _recent: collections.deque[Mechanism] = collections.deque(maxlen=MAX_RECENT)
 
 
@@ -150,53 +142,51 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     rows = []
     for drive, joint in zip(drives, joints, strict=True):
         rows.append(_channel(model, data, drive, joint))
-    return np.array([tuple(one[name] for name in CHANNEL.names or ()) for one in rows], CHANNEL)
+    return np.array([tuple(row.values()) for row in rows], CHANNEL)
 
 
 def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
     """Return the fields of a CHANNEL; `drive` is -1 for a joint without an actuator."""
     body = int(model.jnt_bodyid[joint])
+    name = f"sensor of joint {model.joint(joint).name!r}"
     if drive >= 0:
         name = f"actuator {model.actuator(drive).name!r}"
-    else:
-        name = f"sensor of joint {model.joint(joint).name!r}"
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
         raise ScenarioError(f"{name} is not on a hinge or slide joint: give it one")
     direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECT_TEXT) >= 0
-    # a direct channel may have any axis
-    if direct:
+    axis = data.xaxis[joint].round(12)
+    if direct:  # it may have any axis
         axis = np.array([0.0, 0.0, 1.0])
-    else:
-        axis = data.xaxis[joint].round(12)
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))
     friction = mujoco.mj_name2id(
         model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name
     )
-    computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
     xfrc = 6 * body + component + 3 * hinge
-    sign = int(np.sign(axis[component]))
-    indices = {
-        "turn": -1,
-        "gathered": -1,
+    indices = dict.fromkeys(CHANNEL.names or (), -1) | {
         "qpos": model.jnt_qposadr[joint],
         "qvel": model.jnt_dofadr[joint],
         "xfrc": xfrc,
-        "sign": sign,
-        "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
-        "force": model.actuator_outadr[drive] if drive >= 0 else -1,
-        "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
-        "shaft_qpos": model.jnt_qposadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
+        "sign": int(np.sign(axis[component])),
         "horizontal": xfrc,
         "axis": 0,
-        "hinge_body": -1,
-        "anchor": -1,
-        "friction_force": -1 if friction < 0 else model.actuator_outadr[friction],
-        "friction_ctrl": model.actuator_ctrladr[friction] if computed else -1,
-        "qfrc": model.jnt_dofadr[joint] if direct else -1,
     }
+    if drive >= 0:
+        driven = model.actuator_trnid[drive, 0]
+        indices |= {
+            "ctrl": model.actuator_ctrladr[drive],
+            "force": model.actuator_outadr[drive],
+            "shaft": model.jnt_dofadr[driven],
+            "shaft_qpos": model.jnt_qposadr[driven],
+        }
+    if friction >= 0:
+        indices["friction_force"] = model.actuator_outadr[friction]
+        if model.actuator_ctrlnum[friction] > 0:  # by a formula
+            indices["friction_ctrl"] = model.actuator_ctrladr[friction]
+    if direct:
+        indices["qfrc"] = model.jnt_dofadr[joint]
     if hinge:
         across = int(component == 0)  # a horizontal axis across that of the hinge
         indices |= {
@@ -230,14 +220,16 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
     turns = np.arange(len(PLACES)) - 3
     for name, kinds in POSE_SENSORS.items():
         first, second = (int(model.sensor_adr[model.sensor(POSE + kind).id]) for kind in kinds)
-        table[name] = np.where(turns < 0, first + at, second + (turns if name == "v_sensor" else 0))
+        if name == "v_sensor":
+            second = second + turns
+        table[name] = np.where(turns < 0, first + at, second)
     table["qpos"] = model.jnt_qposadr[joint] + np.minimum(at, 3)
     table["qvel"] = table["gathered"] = model.jnt_dofadr[joint] + at
     table["xfrc"] = 6 * model.jnt_bodyid[joint] + at
-    table["horizontal"] = np.where(
-        at == 0, table["xfrc"], 0
-    )  # 0 is of the world, which no force moves
-    table["turn"], table["sign"] = np.where(turns < 0, -1, turns), np.where(turns < 0, 1, 0)
+    # 0 is of the world, which no force moves
+    table["horizontal"] = np.where(at == 0, table["xfrc"], 0)
+    table["turn"] = np.where(turns < 0, -1, turns)
+    table["sign"] = np.where(turns < 0, 1, 0)
     table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
     return table.astype(CHANNEL)
 
@@ -285,15 +277,16 @@ def without_scenery(spec: mujoco.MjSpec, pushed: Collection[str] = ()) -> None:
     """
     needed = set()
     for pair in spec.pairs:
-        for name in (pair.geomname1, pair.geomname2):
-            needed.add(name)
-    needed |= {name for sensor in spec.sensors for name in (sensor.objname, sensor.refname)}
-    needed |= {wrap.target.name for tendon in spec.tendons for wrap in tendon.path if wrap.target}
-    untouched = []
+        needed |= {pair.geomname1, pair.geomname2}
+    for sensor in spec.sensors:
+        needed |= {sensor.objname, sensor.refname}
+    for tendon in spec.tendons:
+        needed |= {wrap.target.name for wrap in tendon.path if wrap.target}
+    scenery = []
     for geom in spec.geoms:
-        if not geom.contype and not geom.conaffinity and geom.name not in needed:
-            untouched.append(geom)
-    scenery = [geom for geom in untouched if geom.parent.explicitinertial or _is_fixed(geom.parent)]
+        untouched = not geom.contype and not geom.conaffinity and geom.name not in needed
+        if untouched and (geom.parent.explicitinertial or _is_fixed(geom.parent)):
+            scenery.append(geom)
     for element in (*spec.cameras, *spec.lights, *spec.skins, *scenery):
         spec.delete(element)
     needed.update(pushed)
@@ -365,14 +358,12 @@ def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[st
     """
     plant = scenario.plant
     written = {}
-    if scenario.mechanism == "equation":
-        fields = plant.fields
-    else:
+    fields = plant.fields
+    if scenario.mechanism != "equation":
         fields = plant.mechanisms[scenario.mechanism].fields
+    of_plant = fields(base, plant.values(scenario.factors(step)))
     of_parts = (part.fields(base) for part in parts(scenario))
-    for name, index, value, adds in itertools.chain(
-        fields(base, plant.values(scenario.factors(step))), *of_parts
-    ):
+    for name, index, value, adds in itertools.chain(of_plant, *of_parts):
         values = written.setdefault(name, field_array(base, name).copy())
         if adds:
             values[index] = values[index] + value
@@ -408,9 +399,11 @@ def state_with(
     if (free := free_joint(model)) >= 0:
         first = model.jnt_qposadr[free]
         dof = model.jnt_dofadr[free]
-        qpos[first : first + 7], qvel[dof : dof + 6] = [*x[:3], *rotation.quaternion(*x[3:])], v
+        qpos[first : first + 7] = [*x[:3], *rotation.quaternion(*x[3:])]
+        qvel[dof : dof + 6] = v
         return qpos, qvel
-    qpos[model.jnt_qposadr[joints]], qvel[model.jnt_dofadr[joints]] = x, v
+    qpos[model.jnt_qposadr[joints]] = x
+    qvel[model.jnt_dofadr[joints]] = v
     return qpos, qvel
 
 
@@ -449,18 +442,14 @@ def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
     qpos = initial_state(model, scenario)[0]
     inside = _overlap(model, data, qpos)
     beyond = None
-    moves_around = (
-        scenario.plant.tip
-    )  # an arm: the straight line in its joints may cross what the arm goes around
+    # an arm: the straight line in its joints may cross what the arm goes around
+    moves_around = scenario.plant.tip
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:
         free = initial_state(model, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
         if _overlap(model, data, free):
             free = model.qpos0
-        path = (
-            _overlap(model, data, (1 - part) * free + part * qpos)
-            for part in np.linspace(0, 1, PATH_POINTS)
-        )
-        beyond = next(filter(None, path), None)
+        for part in np.linspace(0, 1, PATH_POINTS):
+            beyond = beyond or _overlap(model, data, (1 - part) * free + part * qpos)
     if overlap := inside or beyond:
         raise ScenarioError(
             f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {overlap[0]} "

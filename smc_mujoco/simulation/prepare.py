@@ -51,13 +51,10 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
 IDEAL_SENSOR = Encoder(counts=math.inf)
-DATA_BYTES, CHANNEL_BYTES = (
-    176 * 2**10,
-    2 * 2**10,
-)  # of an mjData without channels, and per channel; measured
-RETURNS_OTHERS = re.compile(
-    r"it returns (\d+) numbers instead of"
-)  # of numba, and of jit.attempting
+DATA_BYTES = 176 * 2**10  # of an mjData without channels; measured
+CHANNEL_BYTES = 2 * 2**10  # of an mjData per channel; measured
+# of jit.attempting, and of numba
+RETURNS_OTHERS = re.compile(r"it returns (\d+) numbers instead of")
 UNKNOWN_FIELD = re.compile(
     r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b"
 )
@@ -79,13 +76,11 @@ class Prepared:
     def bytes(self) -> int:
         """Memory of its simulation: log, mjData, record, and the history of a delayed sensor."""
         s = self.scenario.resolved
-        surface = 0 if s.surface is None else s.surface.memory
-        memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
+        users = (s.law, s.velocity, *filter(None, (s.surface,)), *s.disturbance)
+        memories = sum(user.memory for user in users)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
         if s.law.joint:
             numbers += joint_law.stored_dtype(s.plant.n).itemsize / 8
-        else:
-            numbers += 0
         per_channel = (
             state.LOG.itemsize * (s.samples + 1) + CHANNEL_BYTES + READING_BYTES * s.readings
         )
@@ -198,22 +193,21 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     buffer = Functions(s, python)
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
-    values = (
-        _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, mechanism.model, buffer)
-    )
+    values = _shared_functions(s, nominal, buffer)
+    values |= _settings(s)
+    values |= _arrays(s, mechanism.model, buffer)
     if s.law.joint:
         values |= _joint_measurement(s, nominal, values, buffer)
     for name, shared in (("laws", "law"), ("references", "reference")):
         values[shared] = tables[name][0]
-        if not (len(tables[name]) > 1):
+        if len(tables[name]) == 1:
             tables[name] = []
     numbers = buffer.array()
     arrays = {}
     for name, rows in tables.items():
+        kind = state.FUNCTION
         if name == "disturbances":
             kind = state.DISTURBANCE
-        else:
-            kind = state.FUNCTION
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {
@@ -222,11 +216,10 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
         "nq": mechanism.model.nq,
         "nv": mechanism.model.nv,
     }
+    rows = np.zeros((0, 8))
     if s.plant.pose:
         rows = mixer(s.plant)
-    else:
-        rows = np.zeros((0, 8))
-    values |= {"actuators": len(rows), "mixer": state.address(rows) if len(rows) else 0}
+        values |= {"actuators": len(rows), "mixer": state.address(rows)}
     values["keeps_torques"] = keeps_torques(rows)
     values |= {"rotors": has_rotors(mechanism.model)}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
@@ -310,30 +303,34 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
     s = prepared.scenario.resolved
     n = s.plant.n
     memory = {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
-    each = range(n if s.law.joint else 1)  # numbers of a gain
+    size = n if s.law.joint else 1  # numbers of a gain
     laws = []
     for law in buffer.laws():
-        laws.append(
-            (
-                buffer.component(law),
-                [gain_at(value, i) for value in law.gains.values() for i in each],
-            )
-        )
-    return {
-        "laws": [_function(compiled, gains, buffer) | memory for compiled, gains in laws],
-        "references": [_signal(signal, buffer) for signal in references(s)],
-        "frictions": _frictions(prepared, buffer),
-        "disturbances": [
-            {"function": _signal(d, buffer, n), "stream": s.noise_stream(i)}
-            | {
+        gains = []
+        for value in law.gains.values():
+            gains += [gain_at(value, i) for i in range(size)]
+        laws.append(_function(buffer.component(law), gains, buffer) | memory)
+    disturbances = []
+    for i, d in enumerate(s.disturbance):
+        body = -1
+        if isinstance(d, Push):
+            body = 6 * prepared.mechanism.model.body(d.body).id
+        disturbances.append(
+            {
+                "function": _signal(d, buffer, n),
+                "stream": s.noise_stream(i),
                 "cartesian": d.cartesian,
                 "sees": d.sees,
                 "air": d.air,
                 "peak": d.along,
+                "body": body,
             }
-            | {"body": 6 * prepared.mechanism.model.body(d.body).id if isinstance(d, Push) else -1}
-            for i, d in enumerate(s.disturbance)
-        ],
+        )
+    return {
+        "laws": laws,
+        "references": [_signal(signal, buffer) for signal in references(s)],
+        "frictions": _frictions(prepared, buffer),
+        "disturbances": disturbances,
     }
 
 
@@ -406,8 +403,9 @@ def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, 
     states = np.zeros(n, state.CHANNEL_STATE)  # at the start of a run
     motors = {}
     if s.stepper is not None:
-        each = [[*motor.values(), *(0.0,) * (2 * s.stepper.queued)] for motor in motors_at_start(s)]
-        motors = {"motors": buffer.put(itertools.chain(*each)), "motor_stride": 8 * len(each[0])}
+        queue = [0.0] * (2 * s.stepper.queued)
+        rows = [[*motor.values(), *queue] for motor in motors_at_start(s)]
+        motors = {"motors": buffer.put(itertools.chain(*rows)), "motor_stride": 8 * len(rows[0])}
     if s.drive_step is not None:
         states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
     if has_rotors(model):
@@ -430,9 +428,8 @@ def known_values(s: Resolved) -> list[float]:
     """Return the values of the plant's parameters as the law's model has them: true ones in the
     model "true".
     """
-    if s.model != "true":
-        known = s.plant.parameters
-    else:
+    known = s.plant.parameters
+    if s.model == "true":
         known = vars(s.plant.values(s.factors(0)))
     return [known[name] for name in s.plant.parameters]
 
@@ -466,11 +463,12 @@ def _joint_measurement(
         arrays[name] = state.Index(head + offset // 8)
     fields: dict[str, Any] = {"joint": arrays | {"head": head}}
     if nominal is not None:
-        shared = {"parameters": functions["dynamics"]["parameters"], "unit": s.nominal_drive.gain}
         fields["handle"] = {
             "coriolis": native_coriolis().address,
             "jacobian": native_jacobian().address,
-        } | shared
+            "parameters": functions["dynamics"]["parameters"],
+            "unit": s.nominal_drive.gain,
+        }
     return fields
 
 
@@ -498,14 +496,13 @@ def _frictions(prepared: Prepared, buffer: Functions) -> list[dict[str, int]]:
     compiled = buffer.friction(friction)
     shared = prepared.mechanism
     inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
-    numbers = []
+    functions = []
     for i, a in enumerate(inertia):
-        numbers.append((buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))))
-    return [
-        {
-            "address": compiled.address,
-            "parameters": first,
-            "memory": second,
-        }
-        for first, second in numbers
-    ]
+        functions.append(
+            {
+                "address": compiled.address,
+                "parameters": buffer.put(friction.parameters(i)),
+                "memory": buffer.put(friction.bristle(i, a)),
+            }
+        )
+    return functions
