@@ -285,10 +285,7 @@ def _warn_of_unknown_groups() -> None:
     """Warn of entry points in groups that do not exist."""
     for group, (point, *_) in _points().items():
         if group not in KINDS:
-            if point.dist:
-                package = point.dist.name
-            else:
-                package = point.value
+            package = point.dist.name if point.dist else point.value
             warn(f"package {package!r}: {unknown('group of entry points', group, KINDS)}")
 
 
@@ -305,12 +302,9 @@ def discover(package: str, kind: type[T]) -> dict[str, T]:
     """Return name -> object, of every object of a kind at the top level of a package's modules,
     sorted by name.
     """
-    values = [
-        value
-        for module in modules(package)
-        for value in vars(module).values()
-        if isinstance(value, kind)
-    ]
+    values = []
+    for module in modules(package):
+        values += [value for value in vars(module).values() if isinstance(value, kind)]
     return {NAME(value): value for value in sorted(values, key=NAME)}
 
 

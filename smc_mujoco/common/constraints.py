@@ -99,11 +99,8 @@ class Each(Constraint):
     one: Constraint
 
     def __call__(self, what: str, value: Any) -> Any:
-        if (
-            not isinstance(value, Sequence | np.ndarray)
-            or isinstance(value, str | bytes)
-            or not getattr(value, "ndim", 1)
-        ):
+        is_list = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
+        if not is_list or not getattr(value, "ndim", 1):
             return self.one(what, value)
         if not (listed := items_of(what, value)):
             raise ScenarioError(
@@ -166,9 +163,8 @@ def of_type(kind: Any) -> Constraint | None:
     one.
     """
     if typing.get_origin(kind) is Annotated:
-        return next(
-            (note for note in typing.get_args(kind)[1:] if isinstance(note, Constraint)), None
-        )
+        notes = typing.get_args(kind)[1:]
+        return next((note for note in notes if isinstance(note, Constraint)), None)
     options = typing.get_args(kind)
     found = next(filter(None, map(of_type, options)), None)
     if found and type(None) in options:
@@ -180,41 +176,46 @@ def of_type(kind: Any) -> Constraint | None:
 def of_fields(kind: type) -> dict[str, Constraint]:
     """Return the constraint of each field of a class of data that declares one."""
     types = {field.name: field.type for field in dataclasses.fields(kind)}
-    if any(
-        isinstance(one, str) for one in types.values()
-    ):  # under `from __future__ import annotations`
+    if any(isinstance(declared, str) for declared in types.values()):
         with contextlib.suppress(NameError):  # names that only a type checker imports
             hints = typing.get_type_hints(kind, include_extras=True)
             types = {name: hints[name] for name in types}
-    return {name: found for name, one in types.items() if (found := of_type(one))}
+    return _declared(types)
 
 
 @functools.cache
 def of_parameters(function: Callable) -> dict[str, Constraint]:
     """Return the constraint of each parameter that declares one."""
-    return {
-        name: found for name, one in function.__annotations__.items() if (found := of_type(one))
-    }
+    return _declared(function.__annotations__)
+
+
+def _declared(types: dict[str, Any]) -> dict[str, Constraint]:
+    found = {}
+    for name, declared in types.items():
+        if constraint := of_type(declared):
+            found[name] = constraint
+    return found
 
 
 def constrain(data: Any) -> None:
     """Replace the fields of frozen data that declare a constraint by what it makes of them."""
     for name, constraint in of_fields(type(data)).items():
-        object.__setattr__(
-            data, name, constraint(f"{type(data).__name__}'s {name}", getattr(data, name))
-        )
+        value = constraint(f"{type(data).__name__}'s {name}", getattr(data, name))
+        object.__setattr__(data, name, value)
 
 
 def suggesting(kind: type[T]) -> type[T]:
     """Make the TypeError for a field that a class of data does not have say which may be meant."""
-    make, names = kind.__init__, [one.name for one in dataclasses.fields(kind) if one.init]  # pyright: ignore[reportArgumentType] a class of data
+    make = kind.__init__
+    names = [field.name for field in dataclasses.fields(kind) if field.init]  # pyright: ignore[reportArgumentType] a class of data
 
     def made(self: T, *args: Any, **fields: Any) -> None:
-        if foreign := next((name for name in fields if name not in names), ""):
-            hint = str(unknown("field", foreign, names)).partition(": ")[2]
-            raise TypeError(
-                f"{kind.__name__}() got an unexpected keyword argument {foreign!r}: {hint}"
-            )
+        for name in fields:
+            if name not in names:
+                hint = str(unknown("field", name, names)).partition(": ")[2]
+                raise TypeError(
+                    f"{kind.__name__}() got an unexpected keyword argument {name!r}: {hint}"
+                )
         make(self, *args, **fields)
 
     vars(made)["__signature__"] = inspect.signature(make)

@@ -19,9 +19,7 @@ MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: 
 # characters of the names to choose from; chosen: all laws, and the sentence stays below 1250
 MAX_LISTED = 1100
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path: chosen
-END_OF_MESSAGE = (
-    500  # characters of a longer message that are kept at its end, where the cure is: chosen
-)
+END_OF_MESSAGE = 500  # characters of a longer message that are kept at its end, with the cure
 MAX_SHOWN = 60  # characters of a value in a message: chosen
 
 
@@ -29,9 +27,10 @@ class ScenarioError(ValueError):
     """Bad input. The message is one sentence on one line: the thing, its value, the cure."""
 
     def __init__(self, message: str):
-        long = len(message) > MAX_MESSAGE
-        start = message[: MAX_MESSAGE - END_OF_MESSAGE - len("...")]
-        super().__init__(printable(f"{start}...{message[-END_OF_MESSAGE:]}" if long else message))
+        if len(message) > MAX_MESSAGE:
+            start = message[: MAX_MESSAGE - END_OF_MESSAGE - len("...")]
+            message = f"{start}...{message[-END_OF_MESSAGE:]}"
+        super().__init__(printable(message))
 
 
 class BrokenLawError(ScenarioError):
@@ -60,7 +59,7 @@ def shown(value: object) -> str:
         text = " ".join(_brief(value).split())
     except Exception:  # from a __repr__ of the user's; RecursionError in deeply nested lists
         text = f"<{type(value).__name__}>"
-    if not (len(text) <= MAX_SHOWN):
+    if len(text) > MAX_SHOWN:
         text = f"{text[: MAX_SHOWN - 3]}..."
     return printable(text)
 
@@ -81,14 +80,12 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
 
     It suggests the nearest name, or lists all names.
     """
-    names = sorted(
-        known, key=lambda text: (int(text) if text.isdecimal() else -1, text)
-    )  # claims have numbers
+    # claims have numbers
+    names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))
+    hint = "there are none"
     if names:
         hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}"
-    else:
-        hint = "there are none"
-    if near := _nearest(name, names) if isinstance(name, str) else []:
+    if isinstance(name, str) and (near := _nearest(name, names)):
         hint = f"did you mean {' or '.join(map(repr, near))}?"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
@@ -99,14 +96,14 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     """
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
-    if name.isupper() and (
-        abbreviated := [known for known in names if _abbreviates(wanted, known.split("_"))]
-    ):
-        return abbreviated
+    if name.isupper():
+        abbreviated = [known for known in names if _abbreviates(wanted, known.split("_"))]
+        if abbreviated:
+            return abbreviated
     close = difflib.get_close_matches(wanted, list(plain), n=1)
-    return [
-        plain[near] for near in close or [known for known in plain if wanted and wanted in known]
-    ][:1]
+    if not close and wanted:
+        close = [known for known in plain if wanted in known]
+    return [plain[near] for near in close[:1]]
 
 
 def _abbreviates(short: str, words: list[str]) -> bool:
@@ -114,10 +111,7 @@ def _abbreviates(short: str, words: list[str]) -> bool:
     super_twisting.
     """
     initials = "".join(word[:1] for word in words)
-    if len(words) == 1:
-        ending = "smc?"
-    else:
-        ending = "(a|c|sm|smc)?"
+    ending = "smc?" if len(words) == 1 else "(a|c|sm|smc)?"
     return re.fullmatch(re.escape(initials) + ending, short) is not None
 
 
@@ -182,10 +176,9 @@ def _real(value: Any) -> Any:
     """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    is_real = isinstance(value, numbers.Real) and not isinstance(
-        value, bool | np.bool_ | np.timedelta64
-    )
-    return value if is_real else None
+    if isinstance(value, bool | np.bool_ | np.timedelta64) or not isinstance(value, numbers.Real):
+        return None
+    return value
 
 
 def items_of(what: str, values: Iterable[T]) -> list[T]:
@@ -232,8 +225,9 @@ def users_stacklevel() -> int:
     frame = sys._getframe(1)
     level = 1
     inner = "smc_mujoco", "dataclasses"
-    while (
-        frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in inner
-    ):
-        frame, level = frame.f_back, level + 1
+    while frame.f_back is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] not in inner:
+            break
+        frame = frame.f_back
+        level += 1
     return level

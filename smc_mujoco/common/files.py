@@ -21,16 +21,11 @@ from smc_mujoco.common.errors import ScenarioError, shown
 
 MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
-MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = (
-    500_000_000,
-    20,
-    10_000,
-)  # of an archive: bytes, per byte packed, files; chosen
-NON_FINITE = {
-    "NaN": math.nan,
-    "Infinity": math.inf,
-    "-Infinity": -math.inf,
-}  # numbers that JSON lacks
+MAX_UNPACKED = 500_000_000  # bytes of an archive
+MAX_RATIO = 20  # of them per byte packed
+MAX_MEMBERS = 10_000  # files of an archive
+# numbers that JSON lacks
+NON_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
 
 def shipped(folder: str) -> Path:
@@ -161,11 +156,9 @@ def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path
     except UnicodeError:
         raise ScenarioError(f"{path} is not a {kind} (it is not text): {cure}") from None
     except Exception as error:  # damaged bytes raise any exception there is
-        explained = isinstance(error, ScenarioError)
-        if explained:
-            why = str(error)
-        else:
-            why = ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+        why = " ".join(str(error).split())
+        if not isinstance(error, ScenarioError):
+            why = ", ".join(filter(None, (type(error).__name__, why)))
         raise ScenarioError(f"{path} is not a {kind} ({why}): {cure}") from None
 
 
@@ -182,8 +175,8 @@ def _bounded(file: Path) -> None:
     if unpacked > max(MAX_UNPACKED, MAX_RATIO * size) or len(members) > MAX_MEMBERS:
         raise ScenarioError(
             f"it unpacks from {size / 1e6:,.0f} MB to {len(members):,} files of "
-            f"{unpacked / 1e6:,.0f} MB in all, and "
-            f"{MAX_MEMBERS:,} files and {MAX_UNPACKED / 1e6:,.0f} MB are allowed"
+            f"{unpacked / 1e6:,.0f} MB in all, and {MAX_MEMBERS:,} files and "
+            f"{MAX_UNPACKED / 1e6:,.0f} MB are allowed"
         )
 
 
@@ -203,7 +196,7 @@ def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
             for row in reader:
                 if len(row) > 1 or any(row):
                     rows.append((reader.line_num, [cell.strip() for cell in row]))
-        if any("\0" in cell for _, row in rows for cell in row):
+        if any("\0" in "".join(row) for _, row in rows):
             raise ScenarioError("it is not text")
     if semicolons:
         rows = [(line, [cell.replace(",", ".") for cell in row]) for line, row in rows]

@@ -33,10 +33,8 @@ from smc_mujoco.common.numba_internals import builtin_registry
 from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]
-BESIDE_PACKAGE = (
-    "models",
-    "scenes",
-)  # folders that are in the package in a wheel, and beside it in a checkout
+# folders that are in the package in a wheel, and beside it in a checkout
+BESIDE_PACKAGE = ("models", "scenes")
 PRESENTATION = (
     "evidence/report",
     "evidence/commands",
@@ -83,10 +81,11 @@ def package(*without: str) -> str:
     folders.
     """
     left_out = (*BESIDE_PACKAGE, *PRESENTATION, *without)
-    files = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*")}
-    files = {
-        name: path for name, path in files.items() if not any(map(name.is_relative_to, left_out))
-    }
+    files = {}
+    for path in PACKAGE.rglob("*"):
+        name = path.relative_to(PACKAGE)
+        if not any(map(name.is_relative_to, left_out)):
+            files[name] = path
     files |= {Path("models") / path.name: path for path in shipped("models").rglob("*")}
     digest = hashlib.sha256()
     for name, path in sorted(files.items()):

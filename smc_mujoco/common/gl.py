@@ -23,22 +23,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import mujoco
 
-OFF_VALUES = (
-    "disable",
-    "disabled",
-    "off",
-    "false",
-    "0",
-)  # values of MUJOCO_GL that turn rendering off
-DISPLAY_VALUES = (
-    "enable",
-    "enabled",
-    "on",
-    "true",
-    "1",
-    "glfw",
-    "glx",
-)  # values for a backend that needs a display
+OFF_VALUES = ("disable", "disabled", "off", "false", "0")  # of MUJOCO_GL: no rendering
+DISPLAY_VALUES = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # a display is needed
 LIBRARIES = {  # backend -> groups of libraries; mujoco loads one of each group
     "egl": (
         ("libEGL.so.1",),

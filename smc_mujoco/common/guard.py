@@ -26,8 +26,8 @@ BLOCK_SIZE = 2**16  # bytes; no file system gives a file more at once
 FAULT = "Fault"  # begins a line that names a fault
 END = "unloading"  # the last line of a job that passes
 ALTERS = (
-    "changes the arithmetic of its thread (rounding, flush-to-zero, traps), "
-    "by which other simulations compute too"
+    "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other "
+    "simulations compute too"
 )
 # Signal -> its usual cause. The causes of other signals are reads, writes and divisions.
 CAUSES = {

@@ -46,10 +46,7 @@ def shelf(package: str) -> Shelf:
         with delay_ctrl_c():
             what = f"{package.replace('smc_mujoco', 'smc', 1)}.{name}"
             module = annexes.module(modules.get(name) or origins[name], what)
-        if name in modules:
-            value = module
-        else:
-            value = getattr(module, name)
+        value = module if name in modules else getattr(module, name)
         setattr(own, name, value)
         return value
 

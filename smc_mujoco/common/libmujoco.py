@@ -12,11 +12,9 @@ from smc_mujoco.common.errors import ScenarioError
 def path() -> Path:
     """Return the path of the library's file."""
     folder = Path(mujoco.__file__).parent
-    files = [
-        path
-        for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll")
-        for path in folder.glob(pattern)
-    ]
+    files = []
+    for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
+        files += folder.glob(pattern)
     if not files:
         raise ScenarioError(f"no MuJoCo library in {folder}: reinstall mujoco")
     return files[0]

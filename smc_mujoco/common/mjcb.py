@@ -45,7 +45,7 @@ warnings.filterwarnings("ignore", category=UserWarning, module=re.escape(__name_
 
 def _after_fork() -> None:
     """Free the lock and remove our callbacks: a child process has none of its parent's threads."""
-    global _lock
+    global _lock  # noqa: PLW0603
     _lock = threading.RLock()
     mujoco.set_mjcb_control(None)
     # else it is None or a user's

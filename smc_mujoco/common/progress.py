@@ -17,16 +17,11 @@ from smc_mujoco.common.html import in_notebook
 if TYPE_CHECKING:
     from rich.console import Console
 
-Report = Callable[
-    [float, float], None
-]  # called with the work done and the whole work, which may be an estimate
-SPEED_WINDOW = (
-    120.0  # s over which the terminal's bar averages its speed, for the time left: chosen
-)
-DRAWING_PERIOD, LINE_PERIOD = (
-    0.2,
-    10.0,
-)  # s between two drawings of a notebook's bar, and two lines of a log: chosen
+# called with the work done and the whole work, which may be an estimate
+Report = Callable[[float, float], None]
+SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left
+DRAWING_PERIOD = 0.2  # s between two drawings of a notebook's bar
+LINE_PERIOD = 10.0  # s between two lines of a log
 
 
 class Bar:
@@ -77,15 +72,13 @@ class Bar:
     def __str__(self) -> str:
         if not self.whole:
             return self.what
+        text = f"{self.what} {100 * self.share:.0f} %"
         if self.counted:
-            size = f"{self.done:g}/{self.whole:g}"
-        else:
-            size = f"{100 * self.share:.0f} %"
+            text = f"{self.what} {self.done:g}/{self.whole:g}"
         if self.share:
             left = (time.monotonic() - self.start) * (1.0 / self.share - 1.0)
-        else:
-            left = math.inf
-        return f"{self.what} {size}" + (f", {left:.0f} s left" if left < math.inf else "")
+            text += f", {left:.0f} s left"
+        return text
 
 
 @contextlib.contextmanager
@@ -151,10 +144,9 @@ def _in_cell() -> Iterator[Callable[[Bar], None]]:
     cell: Any = display(HTML(""), display_id=True)
 
     def draw(bar: Bar) -> None:
+        value = ""
         if bar.whole:
             value = f' value="{bar.share:.3f}" max="1"'
-        else:
-            value = ""
         cell.update(HTML(f"<progress{value}></progress> {html.escape(str(bar))}"))
 
     try:
@@ -170,10 +162,7 @@ def _on_terminal(
     """Yield what draws a bar with rich."""
     from rich import progress
 
-    if counted:
-        share = progress.MofNCompleteColumn()
-    else:
-        share = progress.TaskProgressColumn()
+    share = progress.MofNCompleteColumn() if counted else progress.TaskProgressColumn()
     text = progress.TextColumn("{task.description}", markup=False)
     columns = text, progress.BarColumn(), share, progress.TimeRemainingColumn()
     with progress.Progress(

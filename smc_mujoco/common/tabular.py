@@ -22,10 +22,8 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 PLAIN_WIDTH = 80  # characters of a line of plain text
-NAME_WIDTH, HEADING_WIDTH = (
-    20,
-    8,
-)  # characters: of names before they are broken, and of headings at least
+NAME_WIDTH = 20  # characters of a name before it is broken
+HEADING_WIDTH = 8  # characters of a heading at least
 MAX_HTML_ROWS = 40
 NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH_HINT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
@@ -36,15 +34,8 @@ TEX |= {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
 }
-TEX |= {
-    "–": "--",
-    "·": r"$\cdot$",
-    "×": r"$\times$",
-    "±": r"$\pm$",
-    "−": "$-$",
-    "′": "$'$",
-    "″": "$''$",
-}
+TEX |= {"–": "--", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$", "−": "$-$"}
+TEX |= {"′": "$'$", "″": "$''$"}
 LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
 LETTER_NAMES = (
     "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
@@ -52,9 +43,9 @@ LETTER_NAMES = (
 )
 LETTER_NAMES += " varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
 TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, LETTER_NAMES.split(), strict=True)}
-TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {
-    c: f"$^{i}$" for i, c in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")
-}
+for digit, (lower, upper) in enumerate(zip("₀₁₂₃₄₅₆₇₈₉", "⁰¹²³⁴⁵⁶⁷⁸⁹", strict=True)):
+    TEX[lower] = f"$_{digit}$"
+    TEX[upper] = f"$^{digit}$"
 
 
 class Cell(NamedTuple):
@@ -97,14 +88,12 @@ class Tabular:
                 pad_edge=False,
                 show_edge=False,
             )
-            lines = max(columns[i][0].plain.count("\n") for i in part)
-            for i in part:
-                head = Text("\n" * (lines - columns[i][0].plain.count("\n"))).append_text(
-                    columns[i][0]
-                )
-                table.add_column(
-                    head, justify="left" if i < self.left else "right", overflow="fold"
-                )
+            heads = [columns[i][0] for i in part]
+            lines = max(head.plain.count("\n") for head in heads)
+            for i, head in zip(part, heads, strict=True):
+                above = Text("\n" * (lines - head.plain.count("\n")))
+                side = "left" if i < self.left else "right"
+                table.add_column(above.append_text(head), justify=side, overflow="fold")
             for row in zip(*(columns[i][1:] for i in part), strict=True):
                 table.add_row(*row)
             yield table
@@ -134,11 +123,12 @@ class Tabular:
         from rich.text import Text
 
         texts = [Text(self.headings[i])]
-        for cell in (_cell(row[i]) for row in self.rows):
+        for row in self.rows:
+            cell = _cell(row[i])
             name = Text(folded(cell.text, NAME_WIDTH), cell.colour)
-            texts.append(
-                name.append("".join(f"\n{line}" for line in cell.below.splitlines()), "dim")
-            )
+            if cell.below:
+                name.append(f"\n{cell.below}", "dim")
+            texts.append(name)
         return texts
 
     def _column(self, i: int, narrow: bool = False) -> "list[Text]":
@@ -287,14 +277,9 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
 
 def _html(cell: Cell) -> html.Html:
     """Return a cell as HTML, with the lines below in smaller letters."""
-    if cell.strong:
-        text = html.strong(cell.text)
-    else:
-        text = html.text(cell.text)
-    below = "<br>".join(
-        html.text(line) for part in (cell.below, cell.alarm) for line in part.splitlines()
-    )
-    if below:
+    text = html.strong(cell.text) if cell.strong else html.text(cell.text)
+    lines = [*cell.below.splitlines(), *cell.alarm.splitlines()]
+    if below := "<br>".join(map(html.text, lines)):
         return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>')
     return text
 
@@ -305,23 +290,26 @@ def _tex_line(cells: Iterable[str]) -> str:
 
 def _tex_cell(cell: Cell) -> str:
     """Return a cell as LaTeX, with the line below in brackets beside it."""
-    text, below = (
-        re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", line) for line in (cell.text, cell.below)
-    )
-    below, alarm = (", ".join(lines.splitlines()) for lines in (below, cell.alarm))
+    power = re.compile(r"([\d.]+)e(-?\d+)")
+    text = tex(power.sub(r"\1·10^\2", cell.text))
     if cell.strong:
-        strong = f"\\textbf{{{tex(text)}}}"
-    else:
-        strong = tex(text)
-    return (f"{strong} [{tex(below)}]" if below else strong) + (f", {tex(alarm)}" if alarm else "")
+        text = f"\\textbf{{{text}}}"
+    if cell.below:
+        below = power.sub(r"\1·10^\2", ", ".join(cell.below.splitlines()))
+        text += f" [{tex(below)}]"
+    if cell.alarm:
+        text += f", {tex(', '.join(cell.alarm.splitlines()))}"
+    return text
 
 
 def tex(text: str) -> str:
     """Return text with LaTeX's special characters escaped, and powers, Greek letters and dashes in
     its notation.
     """
-    return re.sub(
-        r"\^(-?\d+)|(.)",
-        lambda match: TEX.get(match[2], match[2]) if match[2] else f"$^{{{match[1]}}}$",
-        text,
-    )
+
+    def written(match: re.Match[str]) -> str:
+        if match[2]:
+            return TEX.get(match[2], match[2])
+        return f"$^{{{match[1]}}}$"
+
+    return re.sub(r"\^(-?\d+)|(.)", written, text)

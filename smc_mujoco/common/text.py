@@ -44,4 +44,4 @@ def every(count: int) -> str:
 
 def counted(count: int, noun: str) -> str:
     """Return "1 run" or "3 runs"."""
-    return f"{count} {noun}{'s' * (count != 1)}"
+    return f"1 {noun}" if count == 1 else f"{count} {noun}s"

@@ -295,7 +295,6 @@ def signal_values(s: Signal) -> tuple[float, ...]:
     ):
         raise ScenarioError(
             f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, "
-            f"({s.rows}, N), "
-            "C-contiguous"
+            f"({s.rows}, N), C-contiguous"
         )
     return (*values, float(data.ctypes.data), float(data.shape[1]))

@@ -66,18 +66,14 @@ from smc_mujoco.simulation.signals import (
 )
 
 Fields = Mapping[str, Any]
-Recipe = (
-    Fields | Callable[[Plant, float], Fields]
-)  # fields, or a function of plant and duration that returns them
+# fields, or a function of plant and duration that returns them
+Recipe = Fields | Callable[[Plant, float], Fields]
 
 MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
-ADDITIVE_FIELDS = (
-    "disturbance",
-    "friction",
-    "actuator",
-)  # their values add up when conditions are joined
+# their values add up when conditions are joined
+ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")
 ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
@@ -99,11 +95,8 @@ class Condition:
 
     def __post_init__(self):
         if not callable(self.fields):
-            object.__setattr__(
-                self,
-                "fields",
-                frozen({name: _frozen(value) for name, value in self.fields.items()}),
-            )
+            fields = {name: _frozen(value) for name, value in self.fields.items()}
+            object.__setattr__(self, "fields", frozen(fields))
 
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
         """Return the Scenario fields for a plant and a duration, s.
@@ -115,8 +108,7 @@ class Condition:
         if plant.pose and (refused := [name for name in NOT_OF_FREE_BODIES if fields.get(name)]):
             raise ScenarioError(
                 f"condition {self.name!r} sets {refused[0]}, and {plant.name} is a free body, "
-                "which takes none: choose "
-                "another condition"
+                "which takes none: choose another condition"
             )
         return fields
 
@@ -237,11 +229,9 @@ def read_fields(text: str) -> dict[str, Any]:
         call = ast.parse(f"_({text})", mode="eval").body
     except (ValueError, RecursionError, MemoryError):
         call = None
-    if (
-        not isinstance(call, ast.Call)
-        or call.args
-        or any(word.arg is None for word in call.keywords)
-    ):
+    if not isinstance(call, ast.Call) or call.args:
+        raise SyntaxError
+    if any(word.arg is None for word in call.keywords):
         raise SyntaxError
     return _keywords(call)
 
@@ -257,9 +247,7 @@ def from_file(path: Path) -> list[Condition]:
     for count, line in enumerate(lines, 1):
         try:
             if line and not line.startswith("#"):
-                conditions += [find_condition(line)]
-            else:
-                conditions += []
+                conditions.append(find_condition(line))
         except ScenarioError as error:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
     return conditions
@@ -299,10 +287,9 @@ def _call(node: ast.Call) -> Any:
     try:
         return kind(*values, **keywords)
     except TypeError:
+        parameters = kind.defaults
         if isinstance(kind, type):
-            parameters = list(inspect.signature(kind).parameters)
-        else:
-            parameters = list(kind.defaults)
+            parameters = inspect.signature(kind).parameters
         cure = f"it takes {', '.join(parameters) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
 
@@ -335,13 +322,14 @@ def _kinds() -> dict[str, Any]:
 def _as_text(value: Any, defaults: bool = True) -> str:
     """Return a value as `parse` reads it, with or without fields that have their default."""
     if isinstance(value, Component):
-        return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
+        gains = ", ".join(f"{gain}={number!r}" for gain, number in value.gains.items())
+        return f"{value.name}({gains})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
-        written = []
+        texts = []
         for f in dataclasses.fields(value):
-            if f.init and (defaults or getattr(value, f.name) != f.default):
-                written.append(f)
-        texts = [f"{f.name}={_as_text(getattr(value, f.name), defaults)}" for f in written]
+            content = getattr(value, f.name)
+            if f.init and (defaults or content != f.default):
+                texts.append(f"{f.name}={_as_text(content, defaults)}")
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
         return f"({', '.join(_as_text(one, defaults) for one in value)},)"
@@ -363,9 +351,7 @@ def _differ(first: Any, second: Any) -> bool:
     """Return whether two values of a field differ, as those do that cannot be compared."""
     try:
         return bool(first != second)
-    except (
-        Exception
-    ):  # no scenario takes a value whose comparison fails; the caller's sentence names the field
+    except Exception:  # no scenario takes such a value; the caller's sentence names the field
         return True
 
 
@@ -432,13 +418,9 @@ def _sized(signal: Signal, plant: Plant) -> Signal:
     """
     if not plant.pose:
         return signal
-    if isinstance(signal, OrnsteinUhlenbeck):
-        name = "sigma"
-    else:
-        name = "amplitude"
-    return dataclasses.replace(
-        signal, **{name: getattr(signal, name) * default_u_max(plant) / U_MAX}
-    )
+    name = "sigma" if isinstance(signal, OrnsteinUhlenbeck) else "amplitude"
+    size = getattr(signal, name) * default_u_max(plant) / U_MAX
+    return dataclasses.replace(signal, **{name: size})
 
 
 def _disturbed(make: Callable[[float], Signal]) -> Recipe:

@@ -259,8 +259,7 @@ def check_moving(runs: Sequence[Scenario]) -> None:
         first = runs[0]
         raise ScenarioError(
             f"{first.plant.name} starts at rest at 0 and nothing moves it under condition "
-            f"{first.condition!r}: give "
-            "another start, with starts=smc.starts(x0=0.5) or --x0 0.5"
+            f"{first.condition!r}: give another start, with starts=smc.starts(x0=0.5) or --x0 0.5"
         )
 
 
@@ -334,8 +333,8 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
                 changed.append(f"{name} = {v:g}")
         warnings.warn(
             f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and "
-            "this one has "
-            f"{', '.join(changed)}: tune the law on it, or give the law's gains yourself",
+            f"this one has {', '.join(changed)}: tune the law on it, or give the law's gains "
+            "yourself",
             ScenarioWarning,
             users_stacklevel(),
         )

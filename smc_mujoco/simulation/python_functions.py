@@ -173,8 +173,8 @@ class NominalDynamics:
         nominal = self.nominal
         if nominal is None or not plant.tip:
             raise ValueError(
-                "there is no tip, or the law has no model: "
-                "give the plant a tip, and the law the model"
+                "there is no tip, or the law has no model: give the plant a tip, and the law the "
+                "model"
             )
         return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
 

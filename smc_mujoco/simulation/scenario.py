@@ -20,6 +20,7 @@ from smc_mujoco.common import html
 from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, suggesting
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.text import joined
 from smc_mujoco.control import design
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
@@ -245,8 +246,9 @@ class Scenario:
         check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
         check_inertia(self.resolved)
         check_names(self.resolved)
-        for doubt in filter(None, (next(_doubts(self.resolved), None), _made_up_bound(self))):
-            warnings.warn(doubt, ScenarioWarning, users_stacklevel())
+        for doubt in (next(_doubts(self.resolved), ""), _made_up_bound(self)):
+            if doubt:
+                warnings.warn(doubt, ScenarioWarning, users_stacklevel())
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
@@ -254,9 +256,8 @@ class Scenario:
         than the run.
         """
         scenario = object.__new__(cls)
-        vars(scenario).update(
-            {f.name: fields.get(f.name, f.default) for f in dataclasses.fields(cls)}
-        )
+        for f in dataclasses.fields(cls):
+            vars(scenario)[f.name] = fields.get(f.name, f.default)
         scenario._convert()
         check(scenario.resolved)
         return scenario
@@ -282,9 +283,8 @@ class Scenario:
         return tuple(getattr(self, name) for name in self.fields())
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            f.name: getattr(self, f.name) for f in dataclasses.fields(self)
-        }  # a copy resolves again
+        # a copy resolves again
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
 
     @functools.cached_property
     def resolved(self) -> "Resolved":
@@ -305,19 +305,12 @@ class Scenario:
             "law": self.law,
             "gains": self.law.source,
         }
-        absent = (
-            None,
-            (),
-            {},
-            Noise(),
-            Clock(),
-            Contact("none"),
-        )  # values of fields that were left out
+        # values of fields that were left out
+        absent = (None, (), {}, Noise(), Clock(), Contact("none"))
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
-            if f.name == "duration" or (
-                f.name not in rows and value != f.default and value not in absent
-            ):
+            given = f.name not in rows and value != f.default and value not in absent
+            if f.name == "duration" or given:
                 rows[f.name.replace("_", " ")] = shown(value)
         return html.fields(rows, "Scenario")
 
@@ -343,10 +336,9 @@ class Scenario:
     @property
     def plain_equation(self) -> bool:
         """Whether MuJoCo integrates only the plant's equation, with or without drives."""
-        without_parts = (
-            not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
-        )
-        return without_parts and self.plant.smooth and all(part.drives for part in self.actuator)
+        if self.friction or self.contact.kind != "none" or self.mechanism != "equation":
+            return False
+        return self.plant.smooth and all(part.drives for part in self.actuator)
 
     @property
     def exact_friction(self) -> bool:
@@ -357,25 +349,21 @@ class Scenario:
         limits. In other scenarios Coulomb friction is MuJoCo's.
         """
         parts = {type(part) for part in self.friction}
-        without_parts = self.contact.kind == "none" and self.mechanism == "equation"
-        known = all(part.in_callback for part in self.actuator) and not any(
-            isinstance(d, Push) for d in self.disturbance
-        )
-        rk4 = self.integrator in (None, "RK4")
-        return (
-            rk4
-            and Coulomb in parts <= {Coulomb, Viscous}
-            and without_parts
-            and known
-            and moves_alone(self.plant)
-        )
+        if not Coulomb in parts <= {Coulomb, Viscous} or self.integrator not in (None, "RK4"):
+            return False
+        if self.contact.kind != "none" or self.mechanism != "equation":
+            return False
+        if any(isinstance(d, Push) for d in self.disturbance):
+            return False
+        return all(part.in_callback for part in self.actuator) and moves_alone(self.plant)
 
     @property
     def voltage_motor(self) -> DCMotor | None:
         """The DC motor that has its voltage as u; None if u is a force."""
-        return next(
-            (part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None
-        )
+        for part in self.actuator:
+            if isinstance(part, DCMotor) and part.unit:
+                return part
+        return None
 
     @property
     def stepper(self) -> Stepper | None:
@@ -403,11 +391,9 @@ class Scenario:
         """The bound on |u| of each driven channel, in the unit of u: the lesser of u_max and the
         motor's limit.
         """
-        u_max = self.resolved.u_max
-        if isinstance(u_max, tuple):
-            bounds = u_max
-        else:
-            bounds = (u_max,) * self.plant.driven
+        bounds = self.resolved.u_max
+        if not isinstance(bounds, tuple):
+            bounds = (bounds,) * self.plant.driven
         if self.voltage_motor is not None:
             return tuple(min(bound, self.voltage_motor.voltage) for bound in bounds)
         if self.stepper is not None:  # the plant's limits are of a force
@@ -495,8 +481,7 @@ class Scenario:
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
             for name, factor in self.jump.factors.items():
-                added = name in self.plant.added
-                if added:
+                if name in self.plant.added:
                     factors[name] = factors.get(name, 0.0) + factor
                 else:
                     factors[name] = factors.get(name, 1.0) * factor
@@ -529,12 +514,14 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     """Return the defaults of the fields that are None, and the law with what it takes from the
     plant.
     """
-    in_order = s.contact.kind == "bobs"  # pendulums in a row must not start beyond each other
+    x0 = s.plant.x0
+    if s.contact.kind == "bobs":  # pendulums in a row must not start beyond each other
+        x0 = tuple(sorted(x0))
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
         "physics_step": s.control_period / _default_steps(s),
         "u_max": _default_bound(s),
-        "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
+        "x0": x0,
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
@@ -568,19 +555,13 @@ def longest_step(s: Scenario) -> float:
         return min(PLAY_STEP, jitter)
     if not (s.plain_equation or s.exact_friction) or s.stepper is not None:
         return min(REALISTIC_STEP, jitter)
-    one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(
-        s.actuator[0], Lag
-    )
-    moving = []
+    longest = min(MAX_STEP, jitter)
+    if len([part for part in s.actuator if part.drives]) == 1 and isinstance(s.actuator[0], Lag):
+        return longest
     for part in s.actuator:
         if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited:
-            moving.append(part)
-    moving = [] if one_lag else moving
-    return min(
-        MAX_STEP,
-        jitter,
-        *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving),
-    )
+            longest = min(longest, max(0.5 * part.delay, s.control_period / DRIVE_STEPS))
+    return longest
 
 
 def stepped_by_mujoco(s: Scenario) -> Scenario:
@@ -596,16 +577,14 @@ def _default_steps(s: Scenario) -> int:
     Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the
     input delay is a whole number of steps.
     """
-    longest = max(
-        longest_step(s), s.control_period / MAX_DEFAULT_STEPS
-    )  # a scenario that needs less is refused later
+    # a scenario that needs less is refused later
+    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)
     minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
-    fitting = (
-        n for n in range(minimum, 4 * minimum + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6
-    )
     if s.actuator or s.exact_friction:
-        return next(fitting, minimum)
+        for steps in range(minimum, 4 * minimum + 1):
+            if abs(math.remainder(delay * steps, 1.0)) < 1e-6:
+                return steps
     return minimum
 
 
@@ -613,20 +592,15 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """Return what the plant's channels suggest, or the default bound; one number if all channels
     have the same.
     """
-    default = default_u_max(plant)
-    if (
-        plant.own and math.inf in plant.limits
-    ):  # the bound of one joint's motor is none of another's
+    given = plant.suggested.get("u_max", (None,))
+    limits = [default_u_max(plant)] * len(given)
+    if plant.own and math.inf in plant.limits:  # the bound of one joint's motor is no other's
         given = plant.suggested.get("u_max", (None,) * plant.driven)
-        each = [limit if limit < math.inf else U_MAX for limit in plant.limits]
-        bounds = tuple(
-            limit if bound is None else bound for limit, bound in zip(each, given, strict=True)
-        )
-        return bounds if len(set(bounds)) > 1 else bounds[0]
-    bounds = tuple(
-        default if bound is None else bound for bound in plant.suggested.get("u_max", (None,))
-    )
-    return bounds if len(set(bounds)) > 1 else bounds[0]
+        limits = [U_MAX if limit == math.inf else limit for limit in plant.limits]
+    bounds = []
+    for limit, bound in zip(limits, given, strict=True):
+        bounds.append(limit if bound is None else bound)
+    return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
 
 def default_u_max(plant: Plant) -> float:
@@ -652,8 +626,7 @@ def check_clock(s: Resolved) -> None:
     if abs(delay - round(delay)) > 1e-6:
         raise ScenarioError(
             f"input_delay {s.input_delay:g} s is not a whole number of physics steps of "
-            f"{s.physics_step:g} s: "
-            "give a physics_step that divides it"
+            f"{s.physics_step:g} s: give a physics_step that divides it"
         )
     if s.samples < 1:
         raise ScenarioError(
@@ -663,9 +636,8 @@ def check_clock(s: Resolved) -> None:
     if s.samples * s.steps > MAX_STEPS or (s.samples + 1) * s.plant.n > MAX_VALUES:
         raise ScenarioError(
             f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels "
-            "and "
-            f"{s.samples * s.steps:.3g} physics steps: give a shorter duration or longer periods "
-            f"(at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
+            f"and {s.samples * s.steps:.3g} physics steps: give a shorter duration or longer "
+            f"periods (at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
         )
     if s.jump is not None and s.jump.time >= s.duration:
         raise ScenarioError(
@@ -682,9 +654,7 @@ def check_signals(s: Resolved) -> None:
     step.
     """
     for d in s.disturbance:
-        shortest = (
-            s.plant.n * s.duration / max(MAX_STEPS, s.work)
-        )  # s between knots, of all channels
+        shortest = s.plant.n * s.duration / max(MAX_STEPS, s.work)  # between knots, s
         if isinstance(d, OrnsteinUhlenbeck | Dryden) and d.dt < shortest:
             raise ScenarioError(
                 f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s "
@@ -702,8 +672,7 @@ def check_signals(s: Resolved) -> None:
     if winds and not flies(s.plant):
         raise ScenarioError(
             f"disturbance {shown(winds[0])} is a wind, and {s.plant.name} has no drag: give a "
-            "force, or plant "
-            "'quadrotor'"
+            "force, or plant 'quadrotor'"
         )
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
@@ -711,24 +680,24 @@ def check_signals(s: Resolved) -> None:
     if forces and s.plant.direct and not s.plant.pose:
         raise ScenarioError(
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of "
-            f"{s.plant.name} act on its "
-            "joints: give another signal"
+            f"{s.plant.name} act on its joints: give another signal"
         )
-    functions_of_time = [
-        ("reference", signal, "a smooth signal") for signal in dict.fromkeys(s.references)
-    ]
+    for signal in dict.fromkeys(s.references):
+        check_function_of_time("reference", signal, "a smooth signal")
     if s.feedforward:
-        functions_of_time += [("feedforward", s.feedforward, "a known signal of u")]
-    else:
-        functions_of_time += []
-    for name, signal, cure in functions_of_time:
-        kinds = {
-            "a force": signal.cartesian,
-            "a wind": signal.air,
-            "noise": signal.random,
-            "one that sees the loop": signal.sees,
-        }
-        for kind in (kind for kind, applies in kinds.items() if applies):
+        check_function_of_time("feedforward", s.feedforward, "a known signal of u")
+
+
+def check_function_of_time(name: str, signal: Signal, cure: str) -> None:
+    """Check that a signal is a number that only time decides."""
+    kinds = {
+        "a force": signal.cartesian,
+        "a wind": signal.air,
+        "noise": signal.random,
+        "one that sees the loop": signal.sees,
+    }
+    for kind, applies in kinds.items():
+        if applies:
             raise ScenarioError(f"{name} is {type(signal).__name__}, which is {kind}: give {cure}")
 
 
@@ -746,17 +715,13 @@ def check_law(s: Resolved) -> None:
     if s.model == "true" and (s.law.joint or s.jump or s.stepper or s.clock.jitter):
         raise ScenarioError(
             "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave "
-            "that out, or give "
-            "model='nominal'"
+            "that out, or give model='nominal'"
         )
     for law in s.law.parts:
         if not suits(law, s.plant):
-            paired = dataclasses.replace(s.plant, underactuated=True)
-            listed = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
-            if s.plant.own and suits(law, paired):
+            cure = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
+            if s.plant.own and suits(law, dataclasses.replace(s.plant, underactuated=True)):
                 cure = "give each channel a partner"
-            else:
-                cure = listed
             raise ScenarioError(
                 f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: "
                 f"{cure}"
@@ -770,8 +735,8 @@ def check_law(s: Resolved) -> None:
         if period is not None and abs(s.control_period - period) > 1e-9 * period:
             raise ScenarioError(
                 f"law {law.name!r} is discretised for {period:g} s, and control_period is "
-                f"{s.control_period:g} s: give "
-                f"control_period={period:g}, or the controller of continuous time"
+                f"{s.control_period:g} s: give control_period={period:g}, or the controller of "
+                "continuous time"
             )
 
 
@@ -780,9 +745,8 @@ def check_surface(surface: Surface, law: Law) -> None:
     if not law.relative_degree == surface.relative_degree == 1:
         raise ScenarioError(
             f"surface {surface.name!r} has relative degree {surface.relative_degree}, and law "
-            f"{law.name!r} "
-            f"{law.relative_degree}: leave the surface out, or give a surface and a law of "
-            "relative degree 1"
+            f"{law.name!r} {law.relative_degree}: leave the surface out, or give a surface and a "
+            "law of relative degree 1"
         )
 
 
@@ -794,8 +758,8 @@ def check_channels(s: Resolved) -> None:
         if isinstance(value, tuple) and len(value) != s.plant.driven:
             raise ScenarioError(
                 f"gain {name} of {s.law.name} has {len(value)} values, {gain_text(value)}, and "
-                f"{s.plant.name} has "
-                f"{s.plant.driven} driven channels: give one number, or {s.plant.driven}"
+                f"{s.plant.name} has {s.plant.driven} driven channels: give one number, or "
+                f"{s.plant.driven}"
             )
     if not s.law.joint:
         return
@@ -827,21 +791,17 @@ def check_free_body(s: Resolved) -> None:
     """
     if not s.plant.pose:
         return
-    if (
-        not s.law.joint and s.law.name != "none" and s.law.function is not None
-    ):  # else of a trace, without code
+    # the law of a trace may have no code
+    if not s.law.joint and s.law.name != "none" and s.law.function is not None:
         raise ScenarioError(
             f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose "
-            "channels turn together: "
-            "give a law of many joints, such as 'geometric'"
+            "channels turn together: give a law of many joints, such as 'geometric'"
         )
     given = {name: (words, getattr(s, name)) for name, words in NOT_OF_FREE_BODIES.items()}
     taken = {"clock": not s.clock.regular, "velocity": s.velocity.name != "measured"}
     refused = [words for name, (words, value) in given.items() if taken.get(name, bool(value))]
     if any(d.sees for d in s.disturbance):
-        refused += ["disturbance that sees the loop"]
-    else:
-        refused += []
+        refused.append("disturbance that sees the loop")
     if refused:
         raise ScenarioError(
             f"{s.plant.name} is a free body, which takes no {refused[0]}: leave that out"
@@ -855,8 +815,8 @@ def check_inertia(s: Resolved) -> None:
         if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(
                 f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two "
-                "joints move the same "
-                "bodies in the same way: drive one of them, or give another x0"
+                "joints move the same bodies in the same way: drive one of them, or give another "
+                "x0"
             )
 
 
@@ -880,12 +840,11 @@ def check_mechanism(s: Resolved) -> None:
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the "
             "integrator out"
         )
-    if len(s.actuator) > 1 and any(
-        isinstance(part, DCMotor) and part.ripple for part in s.actuator
-    ):
-        raise ScenarioError(
-            "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
-        )
+    for part in s.actuator:
+        if isinstance(part, DCMotor) and part.ripple and len(s.actuator) > 1:
+            raise ScenarioError(
+                "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
+            )
     if s.stepper is not None:
         check_stepper(s)
     for part in s.friction:
@@ -893,17 +852,13 @@ def check_mechanism(s: Resolved) -> None:
     for step in (0, s.samples * s.steps):
         values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
         if s.mechanism != "equation":
-            list(
-                s.plant.mechanisms[s.mechanism].fields(
-                    mechanism_model(s.plant, s.mechanism), values
-                )
-            )  # raises, too
-        for name, value in s.plant.placed.items() if s.contact.kind != "none" else ():
-            if (present := getattr(values, name)) != value:
+            model = mechanism_model(s.plant, s.mechanism)
+            list(s.plant.mechanisms[s.mechanism].fields(model, values))  # raises, too
+        for name, value in s.plant.placed.items():
+            if s.contact.kind != "none" and (present := getattr(values, name)) != value:
                 raise ScenarioError(
                     f"the obstacles of contact {s.contact.kind!r} of {s.plant.name} are placed for "
-                    f"{name} = {value:g}, "
-                    f"and {name} is {present:g}: leave {name} as it is"
+                    f"{name} = {value:g}, and {name} is {present:g}: leave {name} as it is"
                 )
 
 
@@ -919,8 +874,8 @@ def check_stepper(s: Resolved) -> None:
     if s.law.joint and s.model != "none":
         raise ScenarioError(
             f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a "
-            "Stepper's u is an "
-            "acceleration: give model='none', a law of one channel, or another actuator"
+            "Stepper's u is an acceleration: give model='none', a law of one channel, or another "
+            "actuator"
         )
 
 
@@ -937,9 +892,7 @@ def _doubts(s: Resolved) -> Iterator[str]:
     weak.
     """
     # ramps may have many turns
-    amplitudes = []
-    for signal in s.references:
-        amplitudes.append(signal.parameters().get("amplitude", 0.0))
+    amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
@@ -951,12 +904,11 @@ def _doubts(s: Resolved) -> Iterator[str]:
                 f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
             need = abs(f) / abs(g) if g else 0.0
             if motor.stall < need and (need <= limit or not s.force_command):
-                fact = (
+                yield (
                     f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} "
-                    "at rest, and "
+                    f"at rest, and channel {i} of {s.plant.name} needs {need:.3g} to hold its "
+                    "start: give a stronger motor, or more gear"
                 )
-                fact += f"channel {i} of {s.plant.name} needs {need:.3g} to hold its start"
-                yield f"{fact}: give the motor more {'torque' if s.stepper else 'gear, voltage or current'}"
 
 
 def _made_up_bound(s: Scenario) -> str:
@@ -966,30 +918,21 @@ def _made_up_bound(s: Scenario) -> str:
     if s.u_max is not None or not s.plant.own or not s.force_command or s.law.name == "none":
         return ""
     driven = range(s.plant.driven)
-    u_max = s.resolved.u_max
-    if isinstance(u_max, tuple):
-        taken = u_max
-    else:
-        taken = [u_max for _ in driven]
-    limits = s.plant.limits or [math.inf for _ in driven]
-    suggested = s.plant.suggested.get("u_max", [None for _ in driven])
+    taken = s.resolved.u_max
+    if not isinstance(taken, tuple):
+        taken = (taken,) * len(driven)
+    limits = s.plant.limits or (math.inf,) * len(driven)
+    suggested = s.plant.suggested.get("u_max", (None,) * len(driven))
     free = [i for i in driven if limits[i] == math.inf and suggested[i] is None]
     if not free:
         return ""
-    *before, last = [repr(joint_names(s.plant)[i]) for i in free]
-    if before:
-        joints = f"joints {', '.join(before)} and {last}"
-    else:
-        joints = f"joint {last}"
-    bounds = list(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
-    verb = "are" if len(bounds) > 1 else "is"
-    number = f"{taken[free[0]]:g}"
-    fact = (
-        f"nothing bounds the force on {joints} of {s.plant.name}, so that |u| <= "
-        f"{' and '.join(bounds)} {verb} taken"
+    joints = joined(repr(joint_names(s.plant)[i]) for i in free)
+    bounds = joined(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
+    what = "joint" if len(free) == 1 else "joints"
+    example = f"u_max={taken[free[0]]:g}"
+    if len(driven) > 1:
+        example = f"smc.Channel({example}) for each"
+    return (
+        f"nothing bounds the force on {what} {joints} of {s.plant.name}, so that |u| <= {bounds} "
+        f"is taken: give u_max, what your motor gives, such as {example}"
     )
-    if len(driven) == 1:
-        example = f"u_max={number}"
-    else:
-        example = f"smc.Channel(u_max={number}) for each"
-    return f"{fact}: give u_max, what your motor gives, such as {example}"

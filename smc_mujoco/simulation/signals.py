@@ -4,7 +4,7 @@ clock.
 The float fields of a signal are its parameters p. Its function `value` is compiled, and has one of
 four forms:
 
-    value(t, p) -> (r, r', r'')                       deterministic; a disturbance uses only the first number
+    value(t, p) -> (r, r', r'')                       deterministic; of a disturbance only r counts
     value(t, p, memory, seed, channel, stream)        process noise
     value(t, p, data)                                 a series, which holds an array
     value(t, p, memory, e, de, s)                     a disturbance that sees the loop
@@ -713,8 +713,7 @@ class Clock:
                     "of "
                 )
             raise ScenarioError(
-                f"Clock's jitter is {self.jitter:g} s: {finer or 'give '}at least a physics step"
-                f"{f', {physics_step:g} s' * room}, and less than the control period, "
-                f"{control_period:g} s, and "
-                "missed=... for samples that do not run"
+                f"Clock's jitter is {self.jitter:g} s: {finer or 'give '}at least a physics "
+                f"step{f', {physics_step:g} s' * room}, and less than the control period, "
+                f"{control_period:g} s, and missed=... for samples that do not run"
             )

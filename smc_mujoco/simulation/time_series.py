@@ -146,8 +146,8 @@ class TimeSeries(Signal):
         for i in np.flatnonzero(steps > MAX_GAP_STEPS * median)[:1]:
             raise ScenarioError(
                 f"{path} has a gap after line {rows[i][0]}, from {times[i]:g} s to "
-                f"{times[i + 1]:g} s, where rows are "
-                f"{median:g} s apart: fill it in, or cut the file there"
+                f"{times[i + 1]:g} s, where rows are {median:g} s apart: fill it in, or cut the "
+                "file there"
             )
         return cls(times, values)
 

@@ -170,8 +170,7 @@ class Trace:
         if len(about) > MAX_TEXT:
             raise ScenarioError(
                 f"cannot save {path}: its scenario is a text of {len(about):,} characters and more "
-                f"than {MAX_TEXT:,} "
-                "are not read back: give it shorter time series"
+                f"than {MAX_TEXT:,} are not read back: give it shorter time series"
             )
         arrays: dict[str, Any] = {"about": np.array(about)} | self.arrays()
         with replacing(path) as file:
