@@ -48,12 +48,9 @@ from smc_mujoco.simulation.state import (
     state_at,
 )
 
-MAX_STATE = (
-    1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
-)
-LAST_STAGE = (
-    1.0 - 1e-8
-)  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
+MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
+# of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
+LAST_STAGE = 1.0 - 1e-8
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
@@ -61,13 +58,13 @@ MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 # the addresses of what rotors and drag have.
 Arrays = namedtuple(
     "Arrays",
-    """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis actuator_force qfrc_constraint qfrc_bias
-    qfrc_spring qfrc_passive qfrc_actuator qLDiagInv dof_frictionloss actuator_user body_user""",
+    """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis
+    actuator_force qfrc_constraint qfrc_bias qfrc_spring qfrc_passive qfrc_actuator qLDiagInv dof_frictionloss actuator_user body_user""",
 )
 
 
 @njit(error_model="numpy")
-def control(address, sim, data):
+def control(address, sim, data):  # noqa: PLR0912
     """Do one callback of one simulation."""
     calls = sim.calls
     sim.calls = calls + 1
@@ -294,7 +291,7 @@ def _evaluate_model(address, sim, i):
 
 
 @njit(error_model="numpy")
-def update_law(address, sim, k, t):
+def update_law(address, sim, k, t):  # noqa: PLR0912
     """Run the law at sample k, at time t, s: once for each driven channel, or once for all.
 
     Return a failure code.

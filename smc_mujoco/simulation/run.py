@@ -20,7 +20,7 @@ from typing import Annotated, overload
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import mjcb
+from smc_mujoco.common import guard, mjcb
 from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, users_stacklevel
 from smc_mujoco.common.progress import bar
@@ -69,6 +69,15 @@ def interrupted(name: str) -> str:
         f"mujoco.set_mjcb_{name} before or after the run, or restore what mujoco.get_mjcb_{name}() "
         "returned"
     )
+
+
+def check_arithmetic() -> None:
+    """Raise ScenarioError if other code has changed how this thread computes."""
+    if not guard.computes_as_usual():
+        raise ScenarioError(
+            "other code has changed the arithmetic of this thread (rounding, flush-to-zero): call "
+            "C's fesetround(FE_TONEAREST) before the run, and leave it so"
+        )
 
 
 Report = Callable[[int], None]  # called with the number of steps since its last call
@@ -130,22 +139,16 @@ def stream(
 ) -> Iterator[tuple[int, Trace]]:
     """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
-    groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
-    for index, prepared in enumerate(map(prepare, scenarios)):
-        if prepared.why_not:
-            warnings.warn(
-                f"{prepared.why_not}; it is called in Python", PlainLoopWarning, users_stacklevel()
-            )
-        alone = index if prepared.why_not else -1
-        groups.setdefault((prepared.key, alone), []).append((index, prepared))
-    for group in groups.values():
-        for batch in _batches(group, threads):
-            items = [prepared for _, prepared in batch]
-            with callback.installed(), memory_for(items):
-                traces = ScenarioBatch(items, threads).run(report)
-            if len(batch) >= MIN_TRIM_RUNS:
-                return_freed_memory()
-            yield from zip((index for index, _ in batch), traces, strict=True)
+    for batch in _batches(enumerate(map(prepare, scenarios)), threads):
+        indices, items = zip(*batch, strict=True)
+        if items[0].why_not:
+            words = f"{items[0].why_not}; it is called in Python"
+            warnings.warn(words, PlainLoopWarning, users_stacklevel())
+        with callback.installed(), memory_for(items):
+            traces = ScenarioBatch(items, threads).run(report)
+        if len(batch) >= MIN_TRIM_RUNS:
+            return_freed_memory()
+        yield from zip(indices, traces, strict=True)
 
 
 @contextlib.contextmanager
@@ -174,21 +177,29 @@ def return_freed_memory() -> None:
 
 
 def _batches(
-    group: Sequence[tuple[int, Prepared]], threads: int
+    scenarios: Iterable[tuple[int, Prepared]], threads: int
 ) -> Iterator[list[tuple[int, Prepared]]]:
-    """Yield a group in batches of at most BATCH_BYTES, but of at least one run for each thread."""
-    batch: list[tuple[int, Prepared]] = []
-    size = 0
-    for index, prepared in group:
-        needed = prepared.bytes
-        if len(batch) >= threads and size + needed > BATCH_BYTES:
+    """Yield runs in batches of one key, each as soon as it is full: at most BATCH_BYTES, but at
+    least one run for each thread.
+
+    What is called in Python has a batch of its own.
+    """
+    waiting: dict[Hashable, list[tuple[int, Prepared]]] = {}
+    sizes: dict[Hashable, int] = {}
+    for index, prepared in scenarios:
+        if prepared.why_not:
+            yield [(index, prepared)]
+            continue
+        key = prepared.key
+        batch = waiting.setdefault(key, [])
+        size = sizes.get(key, 0) + prepared.bytes
+        if len(batch) >= threads and size > BATCH_BYTES:
             yield batch
-            batch = []
-            size = 0
+            batch = waiting[key] = []
+            size = prepared.bytes
         batch.append((index, prepared))
-        size += needed
-    if batch:
-        yield batch
+        sizes[key] = size
+    yield from waiting.values()
 
 
 @constrained
@@ -407,7 +418,11 @@ class ScenarioBatch:
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
         before, self.calls = self.calls, self.calls + calls
-        called = [function for packed in self.packed for function in packed.python]
+        called = []
+        for packed in self.packed:
+            called += packed.python
+        other = mjcb.replaced()
+        check_arithmetic()
         try:
             with python_functions.hearing_ctrl_c(called):
                 action(alive)
@@ -420,13 +435,13 @@ class ScenarioBatch:
             if "allocate memory" in str(error):
                 raise
             # another Python callback replaced ours; the comparison shows it below
-        other = mjcb.replaced()
+        check_arithmetic()
+        other = other or mjcb.replaced()
         self.replaced = self.replaced or other
-        interrupted = [
-            i
-            for i in alive
-            if i not in self.errors and (other or records["calls"][i] != self.calls)
-        ]
+        interrupted = []
+        for i in alive:
+            if i not in self.errors and (other or records["calls"][i] != self.calls):
+                interrupted.append(i)
         records["failure"][interrupted] = state.INTERRUPTED
         records["failed_step"][interrupted] = before // self.scenarios[0].stages
 
@@ -451,12 +466,13 @@ class ScenarioBatch:
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""
-        if code == state.DIVERGED:
-            return self.errors.get(i, PLANT_DIVERGED)
-        if code == state.INTERRUPTED:
-            return interrupted(self.replaced)
-        if code == state.DISTURBANCE_NOT_FINITE:
-            return DISTURBANCE_NOT_FINITE
+        known = {
+            state.DIVERGED: self.errors.get(i, PLANT_DIVERGED),
+            state.INTERRUPTED: interrupted(self.replaced),
+            state.DISTURBANCE_NOT_FINITE: DISTURBANCE_NOT_FINITE,
+        }
+        if code in known:
+            return known[code]
         if why := self.python_failure(i):
             return why
         if code in (state.LAW_RAISED, state.NOT_FINITE) and (why := self.law_failure(i)):

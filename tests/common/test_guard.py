@@ -6,6 +6,8 @@ import ctypes
 import ctypes.util
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -37,6 +39,9 @@ def worker(job: Mapping[str, Any], report: Callable) -> Any:
         return children
     if kind == "exit":
         os._exit(1)
+    if kind == "waits":
+        Path(job["file"]).write_text(str(os.getpid()))
+        signal.pause()
     if kind == "deep":
         raise guard.Fault(f"is wrong:\n {job['kind']}")
     return job
@@ -82,12 +87,34 @@ def test_a_trial_without_room_for_its_report_blames_no_module():
 
 def test_what_a_trial_starts_ends_with_it():
     running = guard.run_isolated(__name__, {"kind": "forks"}, 60.0)
-    for _ in range(500):  # until the process that inherits orphans has noticed
-        running = [one for one in running if alive(one)]
-        if not running:
+    until(lambda: not any(map(alive, running)))  # the process that inherits orphans has noticed
+
+
+PARENT = """
+import sys
+from smc_mujoco.common import guard
+sys.path.insert(0, sys.argv[1])
+guard.run_isolated("test_guard", {"kind": "waits", "file": sys.argv[2]}, 60.0)
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+def test_it_ends_with_the_process_that_wanted_it_however_that_ends(how, tmp_path):
+    file = tmp_path / "process"
+    command = [sys.executable, "-c", PARENT, str(Path(__file__).parent), str(file)]
+    with subprocess.Popen(command) as parent:
+        until(lambda: file.exists() and file.read_text())
+        parent.send_signal(how)
+    until(lambda: not alive(int(file.read_text())))
+
+
+def until(true: Callable[[], object]) -> None:
+    """Wait for something, 30 s at most."""
+    for _ in range(3000):
+        if true():
             return
         time.sleep(0.01)
-    pytest.fail(f"{running} still run")
+    pytest.fail("it took too long")
 
 
 def alive(process: int) -> bool:
@@ -130,3 +157,18 @@ def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
         float.fromhex("0x1.999999999999ap-4"),
     )
     assert least / ten * 2.0**1000 > 0.0
+
+
+@pytest.mark.skipif(os.uname().machine != "x86_64", reason="the number of the mode is that of x86")
+def test_a_run_is_refused_where_other_code_has_set_the_rounding():
+    """It would change every run of the process in silence."""
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.01)
+    smc.run(scenario)
+    library = guard.Arithmetic().library
+    library.fesetround(0x800)
+    try:
+        with pytest.raises(smc.ScenarioError, match="arithmetic of this thread"):
+            smc.run(scenario)
+    finally:
+        library.fesetround(0)
+    assert smc.run(scenario).failure is None

@@ -340,6 +340,20 @@ def test_a_stream_holds_one_batch_and_diverging_runs_print_nothing_and_leave_no_
     assert not list(tmp_path.iterdir())
 
 
+def test_a_stream_prepares_no_more_than_a_batch_ahead(monkeypatch):
+    """A generator of a hundred thousand scenarios would be in memory as a whole."""
+    monkeypatch.setattr(runs, "BATCH_BYTES", 1)
+    asked = []
+
+    def many():
+        for seed in range(20):
+            asked.append(seed)
+            yield scenario(seed=seed)
+
+    next(iter(smc.stream(many(), threads=2)))
+    assert len(asked) == 3
+
+
 def test_a_callback_that_was_installed_is_put_back():
     calls = []
 
