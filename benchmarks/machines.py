@@ -21,12 +21,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import programs
 import stepper_figures as stepper
 
 import smc_mujoco as smc
 from smc_mujoco.common.version import versions
 from smc_mujoco.evidence.rigs import twin_figures
-from smc_mujoco.evidence.rigs.machines import emps, quanser
 from smc_mujoco.evidence.rigs.rig import Rig, percentages
 from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 from smc_mujoco.simulation.time_series import TimeSeries
@@ -123,7 +123,7 @@ def of_emps() -> Iterator[TwinFigure]:
     samples.
     """
     rig = smc.rig("emps")
-    program = emps.program()
+    program = programs.program()
     values = list(program.values)
     variants = {
         "": None,
@@ -131,7 +131,7 @@ def of_emps() -> Iterator[TwinFigure]:
         "with the reference a tick early": [*values[1:], values[-1]],
     }
     for variant, other in variants.items():
-        told = emps.tracking(rig, None if other is None else TimeSeries(program.times, other))
+        told = programs.tracking(rig, None if other is None else TimeSeries(program.times, other))
         for (figure, machine), twin in zip(EMPS_RECORD.items(), told, strict=True):
             yield TwinFigure(
                 rig="emps",
@@ -156,7 +156,7 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
     step = step[step["t"] <= 0.8]
 
     def arm(one: Rig) -> np.ndarray:
-        t, theta, _ = quanser.moved(one, -1.0, 0.0, 0.8)
+        t, theta, _ = programs.moved(one, -1.0, 0.0, 0.8)
         return np.interp(step["t"], t, theta)
 
     sets = list(rig.members().values())
@@ -176,8 +176,8 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
         published=size(arm(public)),
         **common,
     )
-    told = np.transpose([quanser.falls(one) for one in sets])
-    published = quanser.falls(public)
+    told = np.transpose([programs.falls(one) for one in sets])
+    published = programs.falls(public)
     for (figure, (unit, machine)), twins, of_public in zip(
         FALLS.items(), told.tolist(), published, strict=True
     ):

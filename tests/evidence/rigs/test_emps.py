@@ -4,33 +4,34 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs.machines import emps
+from benchmarks import programs
+from smc_mujoco.evidence.rigs.machines.emps import PERIOD
 from smc_mujoco.simulation.time_series import TimeSeries
 
 RECORDED = 0.5814e-3, 0.8522e-3  # m, rms and largest, of the public record
 RIG = smc.rig("emps")
-PROGRAM = emps.program()
+PROGRAM = programs.program()
 
 
 def test_the_program_is_periodic_and_as_fast_as_recorded():
     r = np.array(PROGRAM.values)
-    v = np.diff(r) / emps.PERIOD
-    assert len(r) == emps.SAMPLES
-    np.testing.assert_array_equal(r[: -emps.LAP], r[emps.LAP :])
+    v = np.diff(r) / PERIOD
+    assert len(r) == programs.SAMPLES
+    np.testing.assert_array_equal(r[: -programs.LAP], r[programs.LAP :])
     assert (v.max(), v.min()) == pytest.approx((0.1247, -0.1247), abs=5e-5)
-    assert (r[0], v[0]) == pytest.approx(emps.START, rel=0.04)
+    assert (r[0], v[0]) == pytest.approx(programs.START, rel=0.04)
 
 
 def test_the_tracking_error_is_the_recorded_one_to_a_hundredth():
-    assert emps.tracking(RIG) == pytest.approx(RECORDED, rel=0.01)
+    assert programs.tracking(RIG) == pytest.approx(RECORDED, rel=0.01)
 
 
 def test_a_reference_a_tick_late_or_early_errs_by_fifteen_hundredths():
     """So which instant a sample has decides more than any quantity of the machine."""
     r = list(PROGRAM.values)
-    rms, _ = emps.tracking(RIG)
-    late, _ = emps.tracking(RIG, TimeSeries(PROGRAM.times, [r[0], *r[:-1]]))
-    early, _ = emps.tracking(RIG, TimeSeries(PROGRAM.times, [*r[1:], r[-1]]))
+    rms, _ = programs.tracking(RIG)
+    late, _ = programs.tracking(RIG, TimeSeries(PROGRAM.times, [r[0], *r[:-1]]))
+    early, _ = programs.tracking(RIG, TimeSeries(PROGRAM.times, [*r[1:], r[-1]]))
     assert (late / rms, early / rms) == pytest.approx((1.15, 0.85), abs=0.01)
 
 
@@ -41,7 +42,7 @@ def test_the_error_at_constant_speed_is_that_of_the_formula():
     q = RIG.values
     gains = RIG.scenario().law.gains
     trace = smc.run(
-        RIG.scenario(reference=PROGRAM, duration=2.4, x0=emps.START[0], v0=emps.START[1])
+        RIG.scenario(reference=PROGRAM, duration=2.4, x0=programs.START[0], v0=programs.START[1])
     )
     k = 2000
     v = trace.v[k, 0]

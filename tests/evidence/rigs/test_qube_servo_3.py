@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs.machines.quanser import falls, moved
+from benchmarks.programs import falls, moved
 
 pytestmark = pytest.mark.quick
 

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from benchmarks import programs
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs import figure, rig, twin_figures
 from smc_mujoco.evidence.rigs.figure import twins_figure
-from smc_mujoco.evidence.rigs.machines import emps
 from smc_mujoco.evidence.rigs.twin_figures import TwinFigure
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
@@ -52,7 +52,7 @@ def test_every_record_that_a_rig_was_identified_from_has_rows():
 
 
 def test_the_rows_of_emps_are_those_of_its_program():
-    rms, largest = emps.tracking(smc.rig("emps"))
+    rms, largest = programs.tracking(smc.rig("emps"))
     assert row("emps", "program of 24.8 s", "rms error").twin == pytest.approx(1e3 * rms, rel=1e-3)
     assert row("emps", "program of 24.8 s", "largest error").twin == pytest.approx(
         1e3 * largest, rel=1e-3

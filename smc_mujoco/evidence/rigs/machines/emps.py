@@ -5,7 +5,6 @@ current, so there is no back-EMF; that of the motor here is too small to have an
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -16,63 +15,9 @@ from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
-from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.time_series import TimeSeries
 
-SAMPLES, LAP = 24_841, 6_240  # of the record, and of the program's period
-LENGTHS = (  # ms, of alternately constant and zero acceleration
-    35,
-    351,
-    50,
-    1,
-    98,
-    687,
-    98,
-    1,
-    148,
-    1035,
-    148,
-    1,
-    50,
-    351,
-    101,
-    351,
-    50,
-    1,
-    98,
-    687,
-    98,
-    1,
-    148,
-    1035,
-    148,
-    1,
-    50,
-    351,
-    66,
-)
-ACCELERATIONS = (  # m/s^2
-    0.819696,
-    -0.826876,
-    0.834499,
-    -0.834589,
-    0.837223,
-    -0.83719,
-    0.827038,
-    -0.834201,
-    0.827215,
-    -0.834609,
-    0.834591,
-    -0.837223,
-    0.837141,
-    -0.826781,
-    0.827378,
-)
-START = 1.078221e-4, 0.01343255  # m, m/s
-PERIOD, STEP = (
-    1e-3,
-    5e-4,
-)  # s, under RK4. With steps h of first order, positions lead by h/2 v, which biases friction.
+# s, under RK4. With steps h of first order, positions lead by h/2 v, which biases friction.
+PERIOD, STEP = 1e-3, 5e-4
 BACK_EMF = 1e-6  # V s/m: too small to have an effect
 PUBLISHED = (
     "A. Janot, M. Gautier and M. Brunot, Data set and reference models of EMPS, 2019 (no licence "
@@ -102,36 +47,6 @@ def machine(q):
         "integrator": "RK4",
         "x0": 0.0,
     }
-
-
-def program() -> TimeSeries:
-    """Return the reference of the public record: four laps, the last cut short.
-
-    Its samples are the controller's.
-    """
-    parts = []
-    for i, n in enumerate(LENGTHS):
-        parts.append(np.full(n, ACCELERATIONS[i // 2] if i % 2 == 0 else 0.0))
-    a = np.concatenate(parts)
-    v = START[1] + PERIOD * np.concatenate([[0.0], np.cumsum(a)])[:-1]
-    x = START[0] + np.concatenate([[0.0], np.cumsum(PERIOD * v + 0.5 * PERIOD**2 * a)])[:-1]
-    laps = math.ceil(SAMPLES / LAP)
-    return TimeSeries((PERIOD * np.arange(SAMPLES)).tolist(), np.tile(x, laps)[:SAMPLES].tolist())
-
-
-def tracking(rig: Rig, reference: TimeSeries | None = None, **changes: Any) -> tuple[float, float]:
-    """Return the rms and the largest tracking error of the program, m; `reference`: the
-    controller's instead.
-    """
-    wanted = program()
-    fields = {
-        "reference": reference or wanted,
-        "duration": wanted.times[-1],
-        "x0": START[0],
-        "v0": START[1],
-    }
-    error = np.array(wanted.values) - run(rig.scenario(**fields | changes)).x[:, 0]
-    return float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
 
 
 def commands(record: Record, first: int) -> np.ndarray:

@@ -6,10 +6,7 @@ The QUBE-Servo 3 is a twin: `python benchmarks/qube_servo_3.py` finds its number
 records of one machine. The dead bands of the amplifiers are left out.
 """
 
-import itertools
 import math
-
-import numpy as np
 
 from smc_mujoco.evidence.rigs import controllers
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
@@ -17,8 +14,6 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.plant import plant
-from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.signals import Constant
 
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"
@@ -231,44 +226,6 @@ QUBE_SERVO_3 = Rig(
         "the cable at rest, half of the friction and of the spring found here."
     ),
 )
-FALLS = 25.0, 19.0, 13.0  # degrees, of falls that cover the machine's swings of 8 to 25
-
-
-def moved(
-    twin: Rig, volts: float | None, angle: float, duration: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, the arm's angle and the pendulum's from hanging, of a QUBE-Servo that starts at
-    rest.
-
-    `volts`: None for an open circuit, in which only the rotor's inertia is left of the motor.
-    """
-    fields = {"x0": (0.0, math.pi + angle), "v0": 0.0, "duration": duration}
-    if volts is None:
-        inertia = twin.values["arm_inertia"] + twin.values["rotor_inertia"]
-        free = twin.with_values({"arm_inertia": inertia}).scenario("none", actuator=None, **fields)
-    else:
-        free = twin.scenario("none", feedforward=Constant(volts), **fields)
-    trace = run(free)
-    return trace.t, trace.x[:, 0], trace.x[:, 1] - math.pi
-
-
-def falls(twin: Rig) -> tuple[float, float]:
-    """Return frequency, Hz, and damping ratio of the pendulum, means of the first periods of FALLS,
-    circuit open.
-    """
-    found = []
-    for angle in map(math.radians, FALLS):
-        t, _, a = moved(twin, None, angle, 1.2)
-        i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-        crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
-        peaks = [np.abs(a[j:k]).max() for j, k in itertools.pairwise(i[:4])]
-        found.append(
-            (1.0 / (crossings[2] - crossings[0]), math.log(peaks[0] / peaks[2]) / math.tau)
-        )
-    frequency, damping = np.mean(found, axis=0)
-    return float(frequency), float(damping)
-
-
 SRV02_PENDULUM = Rig(
     name="srv02",
     label="SRV02 with rotary pendulum, by its published parameters",
