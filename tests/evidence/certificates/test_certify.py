@@ -2,7 +2,6 @@
 that hold.
 """
 
-import contextlib
 import copy
 import dataclasses
 import functools
@@ -11,7 +10,6 @@ import math
 import shutil
 import subprocess
 import sys
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -535,32 +533,6 @@ def test_the_checker_refuses_mutants_of_other_theorems(name):
     if "told as" in name:
         part(data, SATURATED)["holds"] = True
     assert refused(data)
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-def test_the_inner_set_lies_where_s_0_is_reached_on_both_sides(side, monkeypatch):
-    """The set |s| <= S; here the inner set reaches to s = -2 or 2."""
-    monkeypatch.setattr(checker, "falls", lambda *_: True)
-    W = [[1.0, 0.4, 0.1, 0.4, 1.0], [1.0, 0.2, 0.35, 0.9, 1.0][::-side], [1.0] * 5]
-    grid = {
-        "x": [0, 1, 2],
-        "s": [-2, -1, 0, 1, 2],
-        "W": W,
-        "inner": 0.3,
-        "outer": 0.36,
-        "start": [0, 0],
-        "bound": 2,
-    }
-    one = SimpleNamespace(n=1)
-    law = SimpleNamespace(room=(1, 1), kind="sgn", c=1)
-    for reach, within in ((2, True), (1, False)):
-        doc = {"disturbance": 1, "parts": [{"theorem": "reaching", "X": 2, "S": reach}]}
-        with (
-            contextlib.nullcontext()
-            if within
-            else pytest.raises(checker.Refused, match="an inner set")
-        ):
-            checker.levels(doc, grid, one, law)
 
 
 def test_the_checker_stands_alone(tmp_path):

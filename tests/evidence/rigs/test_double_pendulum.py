@@ -56,15 +56,6 @@ def test_torques_of_a_simulated_run_are_the_commands(swung):
     assert rms(rig.with_values({"I2": 0.06}), record) > 0.05
 
 
-@pytest.mark.slow
-def test_a_simulated_run_gives_its_moments_back(swung):
-    rig, record = swung
-    found = smc.identify(rig.with_values({"r2": 0.2, "I2": 0.06}), record, ("r2", "I2"), starts=1)
-    assert found.values["r2"] == pytest.approx(rig.values["r2"], rel=0.02)
-    assert found.values["I2"] == pytest.approx(rig.values["I2"], rel=0.02)
-    assert min(found.fits[0][name] for name in ("tau_meas2",)) > 90.0
-
-
 def test_noise_of_the_encoders_does_not_make_a_link_lighter(swung):
     """Noise of an acceleration must not count as motion that takes a torque: least squares would
     shrink the inertia.

@@ -11,13 +11,10 @@ import pytest
 from scipy.signal import butter, freqz
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import Measurement
 from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import inverse, records, replays, search, uncertainty
-from smc_mujoco.evidence.rigs.controllers import cascade, state_feedback
 from smc_mujoco.evidence.rigs.replays import Piece, Point, Replays, Slopes
 from smc_mujoco.evidence.rigs.rig import Fall, Quantity, fallen, percentages
-from smc_mujoco.mechanisms.plant import Values
 
 pytestmark = pytest.mark.quick
 
@@ -378,13 +375,3 @@ def test_a_twin_falls_beyond_two_ranges_from_when_it_was_one_range_off():
     fit = percentages({"x": measured["x"] + 0.25, "y": np.ones(5)}, measured)
     norm = np.linalg.norm(measured["x"] - 0.5)
     assert fit == {"x": pytest.approx(100.0 * (1.0 - 0.25 * math.sqrt(5.0) / norm)), "y": -1e3}
-
-
-def test_the_cascade_of_the_axis_is_its_formula():
-    y = Measurement(0.0, 1e-3, 0.3, 0.2, 0.1, 0.2, 0.2, 0.0, 0.0, 0.0, 0.0)
-    u, _ = cascade.function(y, Values(kp=3.0, kv=5.0), np.zeros(0))
-    assert u == pytest.approx(5.0 * (3.0 * (0.2 - 0.3) - 0.2))
-    assert {one.name: one.label for one in (state_feedback, cascade)} == {
-        "state_feedback": "Rig's state feedback",
-        "cascade": "Rig's cascade",
-    }

@@ -88,18 +88,6 @@ def test_the_numbers_of_a_machine_and_their_sources_are_as_recorded(name, snapsh
     assert "\n".join(lines(smc.rig(name))) == snapshot
 
 
-def test_a_pendubot_is_an_acrobot_that_is_driven_at_the_shoulder():
-    two, one = (list(lines(smc.rig(f"realaigym_{name}"))) for name in ("acrobot", "pendubot"))
-    swapped = []
-    for line in two:
-        swapped.append(
-            line.replace("acrobot", "pendubot").replace(
-                "driven at the elbow", "driven at the shoulder"
-            )
-        )
-    assert swapped == one
-
-
 @pytest.mark.parametrize("name", smc.rigs())
 def test_each_quantity_changes_the_machine(name):
     """From values where no term is 0."""

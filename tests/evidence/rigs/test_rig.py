@@ -179,19 +179,6 @@ def test_the_replay_is_the_controllers_own_command(record):
         assert command == pytest.approx(u[first + k], abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("part", "sentence"),
-    [
-        ({"start": -1.0}, "start is -1: give at least 0"),
-        ({"duration": 0.01}, "duration is 0.01: give at least 0.1"),
-        ({"start": 10.0}, "too short to repeat it: give at least 10.1 s"),
-    ],
-)
-def test_a_part_outside_of_the_record_gets_one_sentence(part, sentence, record):
-    with pytest.raises(smc.ScenarioError, match=sentence):
-        QUBE.replay(record, **part)
-
-
 def test_a_replay_is_an_ordinary_scenario(record, tmp_path):
     """The oracle runs it alike, and a file brings it back with its controller."""
     scenario = QUBE.replay(record, duration=0.2)

@@ -48,10 +48,8 @@ def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
         return firmware.acceleration(kind, moved["ALPHA"], memory(**moved), 1.0, 0.0)[0] / STEPS
 
     slopes = []
-    for name in at:
-        slopes.append(
-            (of(**at | {name: at[name] + h}) - of(**at | {name: at[name] - h})) / (2.0 * h)
-        )
+    for name, value in at.items():
+        slopes.append((of(**at | {name: value + h}) - of(**at | {name: value - h})) / (2.0 * h))
     assert slopes == pytest.approx(LAYER[kind], abs=0.1)
 
 
@@ -202,27 +200,19 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
     assert loop["alpha_rms"] < 2.0
 
 
-def test_a_recording_is_loaded_and_a_bad_one_refused(tmp_path):
+def test_a_recording_is_loaded_and_one_that_lacks_a_column_refused(tmp_path):
     rows = record(np.sin)
     path = tmp_path / "hold.csv"
-
-    def write(names):
+    for names in (told.COLUMNS, told.COLUMNS[:-1]):
         with path.open("w", newline="") as file:
             out = csv.writer(file)
             out.writerow(names)
             out.writerows(np.column_stack([rows[name] for name in names]).tolist())
-
-    write(told.COLUMNS)
-    loaded = told.load(path)
-    assert all(np.array_equal(loaded[name], rows[name]) for name in rows)
-    write(told.COLUMNS[:-1])
+        if names == told.COLUMNS:
+            loaded = told.load(path)
+            assert all(np.array_equal(loaded[name], rows[name]) for name in rows)
     with pytest.raises(smc.ScenarioError, match="lacks the column position_clamped"):
         told.load(path)
-    path.write_text(",".join(told.COLUMNS) + "\n" + ",".join("x" * 9) + "\n")
-    with pytest.raises(smc.ScenarioError, match="no number"):
-        told.load(path)
-    with pytest.raises(smc.ScenarioError, match="5 rows: give at least 1000"):
-        told.figures({name: values[:5] for name, values in rows.items()})
 
 
 @pytest.mark.parametrize("condition", told.RECORDED)

@@ -15,7 +15,6 @@ import smc_mujoco as smc
 from benchmarks import programs
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs import figure, rig, twin_figures
-from smc_mujoco.evidence.rigs.figure import twins_figure
 from smc_mujoco.evidence.rigs.twin_figures import TwinFigure
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
@@ -118,19 +117,6 @@ def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
     )
     assert whole.ordered >= 0.75 * whole.sets
     assert plain.ordered == 0
-
-
-def test_a_figure_has_one_row_for_all_its_records_and_is_read_on_a_phone(tmp_path):
-    """Its page is no wider than a phone, with letters of 8 points: a page as wide as its column
-    keeps their size.
-    """
-    rows = [one for one in twin_figures.rows("qube_servo") if not one.variant]
-    svg, _ = twins_figure(rows, tmp_path / "told.svg")
-    text = svg.read_text(encoding="utf-8")
-    assert float(re.findall(r'width="([\d.]+)pt"', text)[0]) <= 0.75 * 390
-    assert text.count("<!-- theta rms, 8 records -->") == 1
-    assert text.count("<!-- theta rms -->") == 1  # of the record that is held out
-    assert len(re.findall(r'<use [^>]*y="', text)) >= 2 * len(rows)  # a mark and a cross each
 
 
 @pytest.mark.parametrize(("twin", "mark"), [(math.inf, ">"), (0.1, "<"), (2.0, "D")])
