@@ -79,16 +79,6 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(tmp_path):
     assert low < min(gone.scenario.resolved.x0) <= max(gone.scenario.resolved.x0) < high
 
 
-def test_commands_in_volts_and_in_newton_metres_share_no_axes(tmp_path):
-    motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0)
-    torque = smc.Scenario(plant="furuta", law="none", duration=0.01, actuator=motor)
-    volts = dataclasses.replace(torque, actuator=dataclasses.replace(motor, command="voltage"))
-    with pytest.raises(
-        smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"
-    ):
-        figure(smc.run([volts, torque]), tmp_path / "c")
-
-
 def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told(pair):
     """Two of the first run, to both sides; the other run has none."""
     spikes = np.zeros_like(pair[0].u)

@@ -12,55 +12,25 @@ from smc_mujoco.draw import style
 
 pytestmark = pytest.mark.quick
 
-SEEN = {  # linear sRGB as it looks to whom: G. M. Machado et al., IEEE TVCG 15(6), 2009, severity 1
-    "all cones": np.eye(3),
-    "no red": [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ],
-    "no green": [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ],
-    "no blue": [
-        [1.255528, -0.076749, -0.178779],
-        [-0.078411, 0.930809, 0.147602],
-        [0.004733, 0.691367, 0.303900],
-    ],
-}
-XYZ = np.array(
-    [
-        [0.4124564, 0.3575761, 0.1804375],
-        [0.2126729, 0.7151522, 0.072175],
-        [0.0193339, 0.119192, 0.9503041],
-    ]
-)
-
-
-def lab(colour: str, eye: str) -> np.ndarray:
-    """CIELAB (D65) of a colour."""
-    c = np.array(style.rgb(colour)) / 255
-    linear = np.clip(
-        SEEN[eye] @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0.0, 1.0
-    )
-    t = XYZ @ linear / XYZ.sum(axis=1)
-    x, y, z = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
-    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
-
 
 def least(colours, others=()) -> float:
     """The least distance of two colours in four sights, or of one of them to one of `others`."""
-    if others:
-        pairs = itertools.product(colours, others)
-    else:
-        pairs = itertools.combinations(colours, 2)
-    return min(
-        float(np.linalg.norm(lab(one, eye) - lab(other, eye)))
-        for one, other in pairs
-        for eye in SEEN
-    )
+    pairs = itertools.product(colours, others) if others else itertools.combinations(colours, 2)
+    return min(style.distance(*pair) for pair in pairs)
+
+
+@pytest.mark.parametrize(
+    ("colour", "lab"),
+    [
+        ("#FFFFFF", (100.0, 0.0, 0.0)),
+        ("#FF0000", (53.24, 80.09, 67.20)),
+        ("#0000FF", (32.30, 79.20, -107.86)),
+    ],
+)
+def test_colours_are_measured_in_cielab_as_published(colour, lab):
+    """B. Lindbloom, for D65. Who sees no red takes red and dark yellow for each other."""
+    assert style._seen(colour)[0] == pytest.approx(lab, abs=0.05)
+    assert style.distance("#FF0000", "#6E5E00") < 20.0 < style.distance("#FF0000", "#0000FF")
 
 
 def test_laws_that_are_compared_by_default_are_apart_in_four_sights_and_apart_from_all_else_that_is_drawn():
@@ -116,12 +86,12 @@ def test_a_law_at_several_values_has_shades_of_its_colour_from_light_to_dark():
     for law in ("observer_free", "rotary_swing_up", "my_own"):
         shades = style.law_colours([law, law, "classical", law])
         assert shades.pop(2) == style.law_colour("classical")
-        lightness = [lab(shade, "all cones")[0] for shade in shades]
+        lightness = [style._seen(shade)[0, 0] for shade in shades]
         assert lightness == pytest.approx([61.0, 41.0, 21.0], abs=1.5)
         assert least(shades) > 15.0
         hues = []
         for shade in [style.law_colour(law), *shades]:
-            hues.append(np.arctan2(*lab(shade, "all cones")[:0:-1]))
+            hues.append(np.arctan2(*style._seen(shade)[0, :0:-1]))
         assert np.ptp(np.unwrap(hues)) < 0.6
 
 

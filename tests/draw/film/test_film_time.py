@@ -62,24 +62,3 @@ def test_a_mark_says_when_each_law_has_settled(charts):
         alike = np.abs(picture[:, middle - 6 : middle + 7] - colour).max(axis=2) < 12
         beside = np.abs(picture[:, middle + 20 : middle + 33] - colour).max(axis=2) < 12
         assert alike.sum() > beside.sum() + 20, trace.scenario.law.name
-
-
-def test_dots_in_one_place_are_one_in_ink(charts):
-    drawn, traces = charts
-    same = Charts(
-        [traces[0], dataclasses.replace(traces[1], x=traces[0].x)],
-        LAWS,
-        style_of(traces),
-        SIZE,
-        1.0,
-    )
-    for made_of, ink in ((drawn, False), (same, True)):
-        left, _, right, _ = made_of.frames[0]
-        now = round(left + (right - left) * float(made_of.share(0.1)))
-        t, y = made_of.paths[0][1 - ink]
-        dot = made_of.at(0.1)[round(np.interp(0.1, t, y)), now]
-        assert (np.abs(dot.astype(int) - style.rgb(style.INK)).max() < 3) == ink
-
-
-def style_of(traces):
-    return style.law_colours([trace.scenario.law for trace in traces])

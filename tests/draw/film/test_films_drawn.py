@@ -142,18 +142,6 @@ def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_a
     )
 
 
-def test_a_network_says_how_much_of_it_is_shown_and_a_long_label_is_cut_to_the_picture(pen):
-    many = machine(smc.plant("pendulum_network", n=8))
-    caption = Caption(
-        [many], ["a far too long label " * 5], COLOURS[:1], None, SIZE, 1.0, arrows.scales([many])
-    )
-    caption.place(np.array([[20.0, 60, 120, 220]]))
-    caption.over(paper(), 0.25, (False,))
-    assert any("the first 6 of 8" in note for note in pen)
-    assert any("…" in note for note in pen)
-    assert 0.0 <= caption.pills[0, 0] < caption.pills[0, 2] <= SIZE[0]
-
-
 @pytest.mark.parametrize("limits", [[0.4, 0.2, 0.9], math.inf])
 def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares_of_limits(
     limits, pen, monkeypatch
@@ -396,17 +384,3 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
         "b.webp",
         "first.mp4",
     }
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"span": (1.0,)},
-        {"span": (9.0, 9.5)},
-        {"span": (0.0, 4.0), "fps": 120.0, "speed": 0.5},
-    ],
-)
-def test_a_part_that_cannot_be_filmed_leaves_no_file(options, refused, tmp_path):
-    trace = machine("duffing", duration=5.0)
-    refused(lambda: film.film(trace, tmp_path / "c.webp", **options))
-    assert not list(tmp_path.iterdir())

@@ -111,19 +111,6 @@ def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
         assert abs(crates[1, 0] - crates[0, 0]) > 0.5
 
 
-def test_a_still_is_framed_by_all_of_the_way_of_a_free_body_as_the_film_is(monkeypatch):
-    """The crate starts far above the arm, and falls."""
-    plant = smc.plant_from(
-        CRATE.replace('pos=".5 0 .1"', 'pos=".5 0 1.5"'), {"arm": smc.Channel(x0=0.5)}
-    )
-    traces = [smc.run(smc.Scenario(plant=plant, law="pid", duration=0.5))]
-    boxes = []
-    for times in (np.array([0.5]), np.linspace(0.0, 0.5, 16)):
-        with filmed(traces, monkeypatch, times) as (shown, _):
-            boxes.append(shown.boxes)
-    np.testing.assert_allclose(boxes[0], boxes[1], atol=1.0)
-
-
 def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
     traces = []

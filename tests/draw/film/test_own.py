@@ -89,23 +89,6 @@ def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp
             )  # seen from the front, the near side goes right
 
 
-def test_an_arrow_that_points_at_the_camera_is_not_drawn():
-    plant = smc.plant_from(
-        """<mujoco><worldbody><body pos="0 0 .5"><joint name="j" type="slide" axis="0 1 0"/><geom size=".1"/></body>
-        </worldbody><actuator><motor joint="j"/></actuator></mujoco>""",
-        ["j"],
-    )
-    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
-    push = (0, 0, Arrow(0.0, 0.8, (1.0, 0.0, 0.0, 1.0)))
-    with staged(
-        [trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340), (0.0, 0.0)
-    ) as scene:
-        bare = scene.render()
-        assert (scene.render([push]) != bare).any()
-        scene.project = lambda points: np.full((len(points), 2), 100.0)  # exactly at it
-        assert (scene.render([push]) == bare).all()
-
-
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(
@@ -115,16 +98,3 @@ def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     words = [word for word in key([trace], scales([trace])) if "violet" in word]
     assert len(words) == 1
     assert words[0].startswith("violet arrow: friction, limits and contact, longest ")
-
-
-@pytest.mark.slow
-@without_charts
-def test_a_body_without_a_shape_has_no_arrow_and_no_error(tmp_path):
-    (tmp_path / "bare.xml").write_text("""
-      <mujoco><worldbody><geom size="1 1 .1" type="plane"/><body>
-        <inertial pos="0 0 .2" mass="1" diaginertia="1 1 1"/><joint name="j" axis="0 1 0"/></body>
-        <body pos="0 0 .5"><joint name="i" axis="0 1 0"/><geom size=".1"/></body></worldbody>
-      <actuator><motor joint="j"/><motor joint="i"/></actuator></mujoco>""")
-    plant = smc.plant_from(tmp_path / "bare.xml", ["j", "i"])
-    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.2, x0=0.3))
-    assert smc.film([trace], tmp_path / "a.png", at=0.1, size=(640, 360)).stat().st_size

@@ -64,14 +64,6 @@ def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, sp
     assert speed / (seconds * FPS) <= pace.MAX_TRAVEL < 2 * speed / (seconds * FPS) or speed == 1.0
 
 
-def test_the_fastest_machine_and_its_own_channel_s_range_count(base):
-    slow = moving(base, lambda t: 5.0 * t / 4.0)
-    quick = moving(base, lambda t: 1e-3 * np.clip(t / 0.1, 0.0, 1.0))
-    assert at([slow], (0.05,)) == [1.0]
-    assert at([slow, quick], (0.05,)) == [1.0]  # a thousandth of what is in view
-    assert at([quick], (0.05,)) == [0.125]
-
-
 def test_films_have_a_longest_duration(base, monkeypatch):
     trace = moving(
         base, lambda t: np.sin(20.0 * t)
