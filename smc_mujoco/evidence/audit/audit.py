@@ -1,8 +1,8 @@
 """The audit of a paper: its claims, each a function of runs, and the verdicts on them.
 
-    result = audit("gaber", only=["3"])            # one claim, under every set of gains of the paper
+    result = audit("gaber", only=["3"])            # one claim, under every set of gains
     result.claims[0].verdict
-    result.save("evidence.json")                   # claim -> runs -> numbers -> threshold -> verdict
+    result.save("evidence.json")                   # claim, runs, numbers, threshold, verdict
 
 Thresholds are written into the paper's file before its first run; the file says what was changed
 after it. `verdict` says how checks become verdicts.
@@ -11,7 +11,7 @@ after it. `verdict` says how checks become verdicts.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -124,15 +124,13 @@ def audit(
             evidence[entry.id][name] = measure(entry, its_runs)
             used[entry.id][name] = its_runs.used
             report(done, len(entries) * len(names))
-    if quick:
-        instead = {
-            entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries
-        }
-        entries = [
-            dataclasses.replace(entry, measured=entry.measured + instead[entry.id])
-            for entry in entries
-        ]
-    verdicts = Claims(judged(entry, evidence[entry.id]) for entry in entries)
+    verdicts = Claims()
+    for entry in entries:
+        claim = judged(entry, evidence[entry.id])
+        if quick and entry.quick:
+            said = f"{entry.measured}; here, quickly, {entry.quick}"
+            claim = dataclasses.replace(claim, measured=said)
+        verdicts.append(claim)
     return Audit(audited, verdicts, quick, used, table is None)
 
 
@@ -202,45 +200,36 @@ def measure(entry: Entry, runs: Runs) -> Evidence:
 
 
 def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
-    """Return what a claim's function measures with these runs, as checks and numbers beside them."""
+    """Return what a claim's function measures: checks, and numbers beside them."""
     try:
         returned = entry.evidence(runs)
     except (Exception, SystemExit) as error:  # whatever a user's function raises
         raise failed(runs.paper, entry, error) from error
     try:
-        return list(_evidence(entry, returned, runs.checked))
+        return list(_evidence(entry, returned))
     except ScenarioError as error:
         raise failed(runs.paper, entry, error) from None
 
 
-def _evidence(entry: Entry, returned: Any, checked: Collection[str]) -> Iterator[Check | Beside]:
-    """Yield checks and numbers from what a claim's function returned; `checked`: measures whose
-    thresholds it used.
-    """
+def _evidence(entry: Entry, returned: Any) -> Iterator[Check | Beside]:
+    """Yield checks and numbers from what a claim's function returned."""
     if not isinstance(returned, Mapping):
-        checks = isinstance(returned, Sequence) and all(
-            isinstance(one, Check | Beside) for one in returned
-        )
-        if not checks:
+        each = returned if isinstance(returned, Sequence) else [None]
+        if not all(isinstance(one, Check | Beside) for one in each):
             raise ScenarioError(f"it returns {shown(returned)}: {CURE}")
-        for threshold in entry.thresholds:
-            if threshold.measure not in checked:
-                cure = "return numbers, or checks from runs.check"
-                raise ScenarioError(
-                    f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}"
-                )
         yield from returned
         return
     if not entry.thresholds:
         raise ScenarioError(
-            'it returns numbers, and holds_if is a text: write a table, as { "exponent" = ">= 1.9" }'
+            "it returns numbers, and holds_if is a text: "
+            'write a table, as { "exponent" = ">= 1.9" }'
         )
     values = {measure: dict(_cases(measure, one)) for measure, one in returned.items()}
     for threshold in entry.thresholds:
         if not values.get(threshold.measure):
-            cure = f"its measures are {', '.join(str(one) for one, cases in values.items() if cases) or 'none'}"
             raise ScenarioError(
-                f"it returns no {threshold.measure!r}, of which holds_if is: {cure}"
+                f"it returns no {threshold.measure!r}, of which holds_if is: "
+                f"its measures are {', '.join(map(str, values))}"
             )
         yield from threshold.evidence(values.pop(threshold.measure))
     for measure, cases in values.items():
@@ -254,8 +243,5 @@ def _cases(measure: object, values: Any) -> Iterator[tuple[str, float]]:
         try:
             yield str(case), float(value)
         except (TypeError, ValueError):
-            if case:
-                where = f"{measure!r}, {case!r}"
-            else:
-                where = repr(measure)
+            where = f"{measure!r}, {case!r}" if case else repr(measure)
             raise ScenarioError(f"it returns {shown(value)} for {where}: {CURE}") from None

@@ -48,17 +48,15 @@ def document(audit: Any) -> dict[str, Any]:
         raise ScenarioError("evidence is of runs that the audit made itself: leave out the table")
     names: dict[str, str] = {}  # key of a run -> its name in the file
     runs: dict[str, Any] = {}
-    for key, run in (
-        item for sets in audit.used.values() for used in sets.values() for item in used.items()
-    ):
-        name = names[key] = names.get(key) or portable_key(run.scenario)
-        if name not in runs:
-            runs[name] = _run(run.scenario)
-        runs[name] |= {
-            what: hashed
-            for what, hashed in (("scores", run.scores), ("trace", run.trace))
-            if hashed
-        }
+    for by_set in audit.used.values():
+        for used in by_set.values():
+            for key, run in used.items():
+                name = names[key] = names.get(key) or portable_key(run.scenario)
+                about = runs.setdefault(name, _run(run.scenario))
+                if run.scores:
+                    about["scores"] = run.scores
+                if run.trace:
+                    about["trace"] = run.trace
     sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
     data = {
         "format": FORMAT,
@@ -107,15 +105,13 @@ def check(path: str | Path) -> dict[str, Any]:
 
 def files(paper: Paper) -> dict[str, str]:
     """Return file -> hash of a paper's files, the same for every kind of line ending."""
-    paths = sorted(
-        path
-        for path in paper.folder.rglob("*")
-        if path.suffix in HASHED_SUFFIXES and path.is_file()
-    )
-    texts = {}
-    for path in paths:
-        texts[path.relative_to(paper.folder).as_posix()] = path.read_bytes().replace(b"\r\n", b"\n")
-    return {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
+    hashes = {}
+    for path in sorted(paper.folder.rglob("*")):
+        if path.suffix in HASHED_SUFFIXES and path.is_file():
+            text = path.read_bytes().replace(b"\r\n", b"\n")
+            name = path.relative_to(paper.folder).as_posix()
+            hashes[name] = hashlib.sha256(text).hexdigest()
+    return hashes
 
 
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
@@ -139,14 +135,14 @@ def _run(scenario: Scenario) -> dict[str, Any]:
     """Return a short description of a run. Its name is a hash of the whole scenario."""
     plant = scenario.plant
     suite = plants().get(scenario.plant.name)
-    changed = {}
-    for name, value in plant.parameters.items():
-        if not suite or suite.parameters.get(name) != value:
+    known = suite.parameters | {"n": suite.n} if suite else {}
+    changed = {}  # other than the suite's
+    for name, value in (plant.parameters | {"n": plant.n}).items():
+        if name not in known or known[name] != value:
             changed[name] = value
     return {
         "plant": plant.name,
-        "parameters": changed
-        | ({"n": plant.n} if not suite or plant.n != suite.n else {}),  # other than the suite's
+        "parameters": changed,
         "law": scenario.law.name,
         "gains": dict(scenario.law.gains),
         "condition": condition(scenario),

@@ -25,6 +25,7 @@ COLOURS = dict(zip(VERDICTS, ("#2b7a3d", "#8a6100", "#b3322b", "#6a6a6a", "#6a6a
 COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # answers to questions
 ROW_HEIGHT = 26.0  # points on a full page, height of a claim's row
 MAX_DECADES = 3.0  # on each side of 1
+TICKS = (-MAX_DECADES, -1.0, 0.0, 1.0, MAX_DECADES)
 SETS_SHARE = 0.5  # share of a row's height over which its sets of gains are spread
 TEXT_SHARE = 0.36  # share of the page's width for the claims' texts
 
@@ -42,48 +43,31 @@ def figure(
         raise ScenarioError("no claims to draw: give at least one")
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    kinds = [kind for kind in COLOURS if any(claim.verdict == kind for claim in claims)]
     with style.page(width):
         handles = []
-        for kind in kinds:
-            handles.append(Line2D([], [], color=COLOURS[kind], marker="o", ls="", label=kind))
-        whole = (
-            pages.head_height(width, handles) + style.points(ROW_HEIGHT * (len(claims) + 2.5)) / 72
-        )
-        page = pages.blank(width, height or whole, fig)
+        for kind, colour in COLOURS.items():
+            if any(claim.verdict == kind for claim in claims):
+                handles.append(Line2D([], [], color=colour, marker="o", ls="", label=kind))
+        rows = style.points(ROW_HEIGHT * (len(claims) + 2.5)) / 72
+        page = pages.blank(width, height or pages.head_height(width, handles) + rows, fig)
         ax = page.subplots()
-        for row, claim in enumerate(claims):
-            if row % 2:
-                ax.axhspan(row - 0.5, row + 0.5, color=style.RULE, alpha=0.25, lw=0)
-            draw(ax, row, claim)
-        ax.axvline(0.0, color=style.INK, lw=style.points(1.2))
-        ax.set(xlim=(-1.08 * MAX_DECADES, 1.08 * MAX_DECADES), ylim=(len(claims) - 0.5, -0.5))
-        sets = list(claims[0].verdicts)
-        if len(sets) > 1:
-            order = f"; from above, gains {', '.join(sets)}"
-        else:
-            order = ""
-        words = f"measured / asked: left of 1 it holds, and is filled{order}"
         letters = style.points(9.5)
         room = TEXT_SHARE * 72 * width
+        names = []
+        for row, claim in enumerate(claims):
+            draw(ax, row, claim)
+            name = f"{MARKS[claim.verdict]} {claim.id}  {claim.text}"
+            names.append(style.cropped(name, room, letters))
+        ax.axvline(0.0, color=style.INK, lw=style.points(1.2))
+        ax.set(xlim=(-1.08 * MAX_DECADES, 1.08 * MAX_DECADES), ylim=(len(claims) - 0.5, -0.5))
+        words = f"measured / asked: left of 1 it holds; gains {', '.join(claims[0].verdicts)}"
         ax.set_xlabel(style.wrapped(words, 2 * room, letters, lines=2), fontsize=letters)
-        narrow = width < pages.NARROW
-        ends = {-MAX_DECADES: f"≤ {10**-MAX_DECADES:g}", MAX_DECADES: f"≥ {10**MAX_DECADES:g}"}
-        ticks = []
-        for k in range(-round(MAX_DECADES), round(MAX_DECADES) + 1):
-            if not narrow or k % 2 == 0:
-                ticks.append(float(k))
-        ax.set_xticks(ticks, [ends.get(k, f"{10.0**k:g}") for k in ticks])
-        names = [
-            style.cropped(f"{MARKS[claim.verdict]} {claim.id}  {claim.text}", room, letters)
-            for claim in claims
-        ]
+        ax.set_xticks(TICKS, ["≤ 0.001", "0.1", "1", "10", "≥ 1000"])
         ax.set_yticks(range(len(claims)), names, fontsize=letters)
         for label, claim in zip(ax.get_yticklabels(), claims, strict=True):
             label.set_color(COLOURS[claim.verdict])
             label.set_parse_math(False)
         ax.tick_params(axis="y", length=0)
-        ax.grid(axis="y", visible=False)
         pages.set_head(page, width, title, handles)
         pages.write(page, paths)
     return page

@@ -1,7 +1,7 @@
 """The runs that claims rest on. A claim's function is called with a `Runs`.
 
     def settles(runs):
-        scenarios = runs.grid()                        # (plant, law, condition) -> Scenario, of the claim's names
+        scenarios = runs.grid()                        # (plant, law, condition) -> Scenario
         scores = runs.scores(scenarios.values())       # every metric of each, in order
         return {"settling time, s": {plant: one["settling_time"] for (plant, *_), one in
         zip(scenarios, scores)}}
@@ -45,7 +45,7 @@ Substitute = Mapping[
 
 
 class Result(NamedTuple):
-    """What is kept of a run: its law's name and gains, and its scores, each inf if the run failed."""
+    """What is kept of a run: its law's name, gains and scores, which are inf if the run failed."""
 
     law: str
     gains: Mapping[str, float]
@@ -54,14 +54,13 @@ class Result(NamedTuple):
     @classmethod
     def of(cls, law: str, gains: Mapping[str, float], outcome: Mapping[str, Any]) -> "Result":
         """Return what is kept of an outcome, or of a row of a study's table."""
-        names = [m.name for m in metrics()]
-        if outcome["failure"] is not None:
-            return cls(law, gains, dict.fromkeys(names, math.inf))
-        return cls(
-            law,
-            gains,
-            {name: float(outcome[name]) for name in names if outcome.get(name) is not None},
-        )
+        scores = {}
+        for metric in metrics():
+            if outcome["failure"] is not None:
+                scores[metric.name] = math.inf
+            elif outcome.get(metric.name) is not None:
+                scores[metric.name] = float(outcome[metric.name])
+        return cls(law, gains, scores)
 
 
 class Used(NamedTuple):
@@ -94,9 +93,6 @@ class Runs:
     used: dict[str, Used] = dataclasses.field(
         default_factory=dict
     )  # key -> run that the claim has used
-    checked: set[str] = dataclasses.field(
-        default_factory=set
-    )  # measures whose thresholds the claim has asked for
     scored: dict[str, Result] = dataclasses.field(
         default_factory=dict
     )  # key -> run whose scores any claim has used
@@ -112,7 +108,6 @@ class Runs:
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
         runs.used = {}
-        runs.checked = set()
         runs.plants = entry.plants
         runs.laws = entry.laws
         runs.conditions = entry.conditions or ("nominal",)
@@ -152,7 +147,6 @@ class Runs:
         at most 1.1 times that time.
         """
         threshold = find("threshold", measure, self.thresholds)
-        self.checked.add(measure)
         return check(
             what, value, threshold.relation, threshold.limit * times, sentence or threshold.sentence
         )

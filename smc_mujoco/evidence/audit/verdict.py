@@ -20,6 +20,7 @@ import dataclasses
 import math
 import operator
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -324,11 +325,9 @@ def summary(claims: Sequence[Claim]) -> str:
         f"the paper's own sentences{f' ({read} read)' if read else ''}: {_marked(totals(claims))}"
     ]
     for whose, words in ((DERIVED, "derived from it"), (OURS, "questions beside it")):
-        rest = [claim.verdict for claim in claims if claim.whose == whose]
+        rest = Counter(claim.verdict for claim in claims if claim.whose == whose)
         if rest:
-            parts.append(
-                f"{words}: {_marked({kind: rest.count(kind) for kind in dict.fromkeys(rest)})}"
-            )
+            parts.append(f"{words}: {_marked(rest)}")
     return "; ".join(parts)
 
 
@@ -353,7 +352,7 @@ def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
 
 
 def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
-    """Return sentence -> whether it holds: all its checks do, or one if the claim is existential."""
+    """Return sentence -> whether it holds: all its checks do, or one of an existential claim."""
     checks: dict[str, list[bool]] = {}
     for one in evidence:
         if isinstance(one, Check):
@@ -363,35 +362,18 @@ def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
 
 
 def combined(
-    verdicts: Mapping[str, str],
-    quantifier: str = NAMED,
-    answers: Mapping[str, str] | None = None,
-    over: str = "",
-) -> tuple[str, bool, str]:
-    """Return the verdict over all sets of gains, whether it flips, and a sentence on that, in
-    `answers` if given.
-    """
+    verdicts: Mapping[str, str], quantifier: str = NAMED, over: str = ""
+) -> tuple[str, str]:
+    """Return the verdict over all sets of gains, and a sentence on that."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
-        return kinds.pop(), False, ""
-    by_set = ", ".join(
-        f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items()
-    )
-    some = quantifier == EXISTENTIAL or over == "some"
-    if some:
-        decisive = SUPPORTED
-    elif quantifier == UNIVERSAL or over == "all":
-        decisive = REFUTED
-    else:
-        decisive = None
-    if decisive in kinds:
-        about = f"of {over} gains" if over else quantifier
-        return (
-            str(decisive),
-            True,
-            f"The claim is {about}, so that one set of gains decides: {by_set}.",
-        )
-    return PARTLY, True, f"The verdict depends on the gains: {by_set}."
+        return kinds.pop(), ""
+    if quantifier == EXISTENTIAL or over == "some":
+        if SUPPORTED in kinds:
+            return SUPPORTED, "One example, under one set of gains, supports it."
+    elif REFUTED in kinds and (quantifier == UNIVERSAL or over == "all"):
+        return REFUTED, "One counter-example, under one set of gains, refutes it."
+    return PARTLY, "The verdict depends on the gains."
 
 
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
@@ -400,42 +382,29 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     verdicts = {
         name: verdict(some, statement.quantifier, searched[name]) for name, some in evidence.items()
     }
-    answers = ANSWERS if statement.whose == OURS else None
     if statement.rivals in verdicts:
-        rest = [
-            f"{(answers or {}).get(kind, kind)} with {name} gains"
-            for name, kind in verdicts.items()
-        ]
-        others = ", ".join(
-            words for words in rest if not words.endswith(f"with {statement.rivals} gains")
-        )
         overall = verdicts[statement.rivals]
+        rivals = f"{statement.rivals} gains of the other laws"
+        sentence = f"Decided by a search over the law's gains, with {rivals}."
         flips = False
-        sentence = f"Decided by a search over the law's gains, with {statement.rivals} gains of the other laws"
-        if others:
-            sentence += f"; for one set of gains each: {others}."
-        else:
-            sentence += "."
     else:
-        overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
-    if answers:
-        overall, verdicts = (
-            answers[overall],
-            {name: answers[kind] for name, kind in verdicts.items()},
-        )
+        overall, sentence = combined(verdicts, statement.quantifier, statement.over)
+        flips = len(set(verdicts.values())) > 1
+    if statement.whose == OURS:
+        overall = ANSWERS[overall]
+        verdicts = {name: ANSWERS[kind] for name, kind in verdicts.items()}
     numbers: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in evidence}
     beside: dict[str, dict[str, float]] = {name: {} for name in evidence}
-    for name, what, one in (
-        (name, one.what, one) for name, some in evidence.items() for one in some
-    ):
-        if what in numbers[name] or what in beside[name]:
-            raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
-        if isinstance(one, Beside):
-            beside[name][what] = float(one.value)
-        else:
-            numbers[name][what] = {
-                field: value for field, value in one._asdict().items() if field != "what"
-            }
+    for name, some in evidence.items():
+        for one in some:
+            fields = one._asdict()
+            what = fields.pop("what")
+            if what in numbers[name] or what in beside[name]:
+                raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
+            if isinstance(one, Beside):
+                beside[name][what] = float(one.value)
+            else:
+                numbers[name][what] = fields
     shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
     shared["note"] = " ".join(filter(None, (statement.note, sentence)))
     return Claim(

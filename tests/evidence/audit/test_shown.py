@@ -136,7 +136,6 @@ def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_lim
             for each in one.checks(gains):
                 found.append(each.slack)
         assert found == pytest.approx(slack, abs=1e-9)
-        assert not one.flips or {"slow", "tuned"} <= {*re.findall(r"\w+", one.note)}
     assert re.findall("(.) ([0-9])", summary(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
     assert re.findall("(.) ([0-9])", summary([])) == []
 
@@ -195,4 +194,3 @@ def test_the_figure_has_a_row_for_each_claim_and_a_dot_for_each_check(claims):
         size=(4.0, 5.0),
     )
     assert narrow.axes[0].get_yticklabels()[0].get_text().endswith("…")
-    assert "gains" not in narrow.axes[0].get_xlabel()
