@@ -1,1 +1,1 @@
-"""The audit of papers: claims as data, a function that measures each, and the verdicts that follow."""
+"""The audit of papers: claims as data, a function that measures each, and their verdicts."""

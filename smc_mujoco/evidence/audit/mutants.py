@@ -1,6 +1,6 @@
 """Whether an audit can fail: the claims of a paper, measured on broken laws, the mutants.
 
-    assert survivors("./my_paper") == {}      # in a test: each claim that holds is lost by some mutant of its first law
+    assert survivors("./my_paper") == {}      # in a test: some mutant loses each claim that holds
 
 A mutant is the law that a claim is about with the wrong sign, without gain, without memory, or as a
 relay. A paper does not write about such a law, so a claim that holds under every mutant measures

@@ -58,53 +58,32 @@ READ_PARTS: dict[str, None] = dict.fromkeys(
     ("full text", "abstract", "textbook", "second hand", "nothing")
 )
 TEXT_FIELDS = ("title", "authors", "source", "read", "access", "note")  # of a paper
-SPREAD_SETS, NEAR_SETS = (
-    6,
-    3,
-)  # sets of gains that a search tries over the bounds, and around the best of them
-A_TEXT = (str, "a text")
-A_LIST = (list, "a list of names")
+# sets of gains that a search tries over the bounds, and around the best of them
+SPREAD_SETS, NEAR_SETS = 6, 3
+CURES: dict[Any, str] = {
+    str: "a text",
+    list: "a list of names",
+    dict: "a table",
+    bool: "true or false",
+    dict | str: 'a table, as { "settling time, s" = "< 2" }',
+}
 FIELDS_CURE = 'fields of a scenario, as "duration=5.0"'
-PAPER_FIELDS = {  # field of a paper -> its type and what to write
-    **dict.fromkeys(TEXT_FIELDS, A_TEXT),
-    "claim": (list, "tables, each under a line [[claim]]"),
-    "runs": (str, FIELDS_CURE),
-    **dict.fromkeys(("sets", "quick_sets"), A_LIST),
-    **{
-        name: (dict, f"a table, under a line [{name}]")
-        for name in ("plants", "conditions", "gains", "allowed")
-    },
+PAPER_FIELDS: dict[str, Any] = {  # field of a paper -> its type
+    **dict.fromkeys((*TEXT_FIELDS, "runs"), str),
+    **dict.fromkeys(("claim", "sets", "quick_sets"), list),
+    **dict.fromkeys(("plants", "conditions", "gains", "allowed"), dict),
 }
-CLAIM_FIELDS = {  # the same of a claim
-    "id": A_TEXT,
-    "text": A_TEXT,
-    "whose": (
-        str,
-        '"paper" for a sentence of the paper, "derived" for what follows from one, "ours" for a question',
-    ),
-    "where": A_TEXT,
-    "function": (str, "the name of a function"),
-    "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
-    "how": (str, "a text: how it is derived, or why it is asked"),
-    "over": (str, '"all" or "some" of the gains in [allowed.LAW]'),
-    "searched": (str, "the law of these gains; without it the claim's first"),
-    "rivals": (
-        str,
-        "a set of gains: that of the other laws in the search; what other sets give is told beside it",
-    ),
-    "late": (bool, "true or false"),
-    **dict.fromkeys(
-        ("read", "words", "measured", "note", "instead", "shown_by", "quantifier"), A_TEXT
-    ),
-    **dict.fromkeys(("quick", "varies", "immune"), A_TEXT),
-    **dict.fromkeys(("plants", "laws", "conditions"), A_LIST),
-    "runs": (str, FIELDS_CURE),
-    "values": (dict, "a table of numbers"),
+REQUIRED_OF_CLAIM = ("id", "text", "whose", "where", "function", "holds_if")
+CLAIM_FIELDS: dict[str, Any] = {  # the same of a claim
+    **dict.fromkeys((*REQUIRED_OF_CLAIM, "how", "over", "searched", "rivals", "runs"), str),
+    **dict.fromkeys(("read", "words", "measured", "note", "instead", "shown_by"), str),
+    **dict.fromkeys(("quantifier", "quick", "varies", "immune"), str),
+    **dict.fromkeys(("plants", "laws", "conditions"), list),
+    "holds_if": dict | str,
+    "late": bool,
+    "values": dict,
 }
-REQUIRED_FIELDS = (
-    ("title", "authors", "source", "read", "claim"),
-    tuple(CLAIM_FIELDS)[:6],
-)  # of a paper, of a claim
+REQUIRED_OF_PAPER = ("title", "authors", "source", "read", "claim")
 
 
 class Allowed(NamedTuple):
@@ -209,8 +188,8 @@ class Paper:
                 lacking.append(f"{gain} = {one.default:g}")
         if lacking:
             raise ScenarioError(
-                f"the gains {gains!r} of {law} lack some, whose defaults are not the paper's: write in [gains.{gains}] "
-                f"what the paper has for {', '.join(lacking)}"
+                f"the gains {gains!r} of {law} lack some, whose defaults are not the paper's: "
+                f"write in [gains.{gains}] what the paper has for {', '.join(lacking)}"
             )
         return made
 
@@ -262,7 +241,8 @@ def paper(which: str | Path) -> Paper:
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)
         raise ScenarioError(
-            f"no folder {str(which)!r} with a {PAPER_FILE}: give one, or a name of {', '.join(known)}"
+            f"no folder {str(which)!r} with a {PAPER_FILE}: "
+            f"give one, or a name of {', '.join(known)}"
         )
     return _read(folder, _package(folder))
 
@@ -297,7 +277,7 @@ def new(folder: Path) -> list[Path]:
 
 
 def _package(folder: Path) -> str:
-    """Make a package of a user's folder, so that its modules can be imported, and return its name."""
+    """Make a package of a user's folder, so that its modules are imported, and return its name."""
     package = ModuleType("paper_" + re.sub(r"\W", "_", folder.resolve().name))
     package.__path__ = [str(folder.resolve())]
     for known in [module for module in sys.modules if module.partition(".")[0] == package.__name__]:
@@ -376,27 +356,25 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
     return ScenarioError(f"{_place(error, paper.folder)}: {called} raised {words(error)}")
 
 
-def _values(
-    data: Mapping[str, Any], fields: Mapping[str, tuple[Any, str]], required: tuple[str, ...]
-) -> dict:
+def _values(data: Mapping[str, Any], fields: Mapping[str, Any], required: tuple[str, ...]) -> dict:
     """Return the values of a table, texts with single spaces; refuse unknown fields, wrong types
     and missing fields.
     """
     for field in data:
         find("field", field, fields)
-    values = {field: _typed(field, value, *fields[field]) for field, value in data.items()}
+    values = {field: _typed(field, value, fields[field]) for field, value in data.items()}
     for field in required:
         if not values.get(field):
-            raise ScenarioError(f"it has no {field}: write {field}, {fields[field][1]}")
+            raise ScenarioError(f"it has no {field}: write {field}, {CURES[fields[field]]}")
     return values
 
 
-def _typed(field: str, value: Any, kind: Any, cure: str) -> Any:
+def _typed(field: str, value: Any, kind: Any, cure: str = "") -> Any:
     """Return a value of this type, a text with single spaces, or raise ScenarioError naming the
     field.
     """
     if not isinstance(value, kind):
-        raise ScenarioError(f"{field} is {shown(value)}: write {cure}")
+        raise ScenarioError(f"{field} is {shown(value)}: write {cure or CURES[kind]}")
     if isinstance(value, str):
         return " ".join(value.split())
     return value
@@ -404,7 +382,7 @@ def _typed(field: str, value: Any, kind: Any, cure: str) -> Any:
 
 def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     """Return the paper in a file's data."""
-    values = _values(data, PAPER_FIELDS, REQUIRED_FIELDS[0])
+    values = _values(data, PAPER_FIELDS, REQUIRED_OF_PAPER)
     find("part in read", values["read"], READ_PARTS)
     sets = _sets(values.get("gains", {}), values.get("sets", []))
     quick_sets = tuple(values.get("quick_sets", list(sets)[:1]))
@@ -438,7 +416,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
         with _about(
             f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"
         ):
-            entry = _entry(_typed("it", one, dict, "a table"), functions, paper)
+            entry = _entry(_typed("it", one, dict), functions, paper)
             if entry.id in entries:
                 raise ScenarioError("it is there twice: give one another id")
         entries[entry.id] = entry
@@ -447,7 +425,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
 
 def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Paper) -> Entry:
     """Return a claim from its table."""
-    values: dict[str, Any] = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_FIELDS[1])
+    values: dict[str, Any] = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_OF_CLAIM)
     function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
     asked = values.pop("holds_if")
     if isinstance(asked, str):
@@ -502,7 +480,7 @@ def _check(entry: Entry, paper: Paper) -> None:
 
 def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: Paper) -> Allowed:
     """Return the gains that a paper allows for a law, from the table [allowed.LAW]."""
-    table = dict(_typed(f"allowed.{law}", data, dict, "a table, as { k1 = [1.0, 9.0] }"))
+    table = dict(_typed(f"allowed.{law}", data, dict))
     find("law in allowed", law, laws_known() | paper.laws)
     margins = table.pop("margins", None)
     if margins is not None:
@@ -513,13 +491,12 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
     bounds = {}
     for gain, ends in table.items():
         find(f"gain of {law} in allowed", gain, paper.bound(law, {}).gains)
-        if isinstance(ends, list):
-            pair = [end for end in ends if isinstance(end, int | float)]
-        else:
-            pair = []
+        pair = ends if isinstance(ends, list) else []
+        pair = [end for end in pair if isinstance(end, int | float)]
         if len(pair) != 2 or not 0.0 < pair[0] < pair[1]:
             raise ScenarioError(
-                f"allowed.{law}.{gain} is {shown(ends)}: write two positive numbers, the lower first"
+                f"allowed.{law}.{gain} is {shown(ends)}: "
+                "write two positive numbers, the lower first"
             )
         bounds[gain] = (float(pair[0]), float(pair[1]))
     return Allowed(
@@ -556,8 +533,8 @@ def _sets(tables: Mapping[str, Any], listed: list[str]) -> dict[str, Any]:
         if sets[key] is None:
             continue
         of_set: dict[str, dict[str, Any]] = {}
-        for law_or_plant, values in _typed(f"gains.{key}", sets[key], dict, "a table").items():
-            table = _typed(f"gains.{key}.{law_or_plant}", values, dict, "a table of gains")
+        for law_or_plant, values in _typed(f"gains.{key}", sets[key], dict).items():
+            table = _typed(f"gains.{key}.{law_or_plant}", values, dict)
             if table and all(isinstance(value, dict) for value in table.values()):
                 of_set[law_or_plant] = table
             else:
@@ -567,7 +544,7 @@ def _sets(tables: Mapping[str, Any], listed: list[str]) -> dict[str, Any]:
 
 
 def _plant(what: str, data: object, folder: Path) -> Plant:
-    """Return a plant from its table: {plant, parameters...}, or {plant = "FILE.xml:joint+joint"}."""
+    """Return a plant from its table: {plant, parameters...}; plant may be FILE.xml:joint+joint."""
     example = 'a table, as { plant = "duffing", delta = 0.0 }'
     values = dict(_typed(what, data, dict, example))
     base = _typed(f"{what}.plant", values.pop("plant", None), str, example)

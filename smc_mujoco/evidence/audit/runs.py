@@ -229,6 +229,16 @@ class Runs:
         """Return every metric of one run."""
         return self.scores([self.scenario(plant, law_name, condition)])[0]
 
+    def by_plant(self, measure: Callable[[str], Value]) -> dict[str, Value]:
+        """Return plant -> what is measured on it, for the claim's plants."""
+        return dict(zip(self.plants, map(measure, self.plants), strict=True))
+
+    def metric(
+        self, name: str, plant: str, laws: Iterable[str], condition: str = "nominal"
+    ) -> dict[str, float]:
+        """Return law -> a metric of its run on a plant."""
+        return {law: self.score(plant, law, condition)[name] for law in laws}
+
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
         wanted = self._keyed(scenarios)

@@ -1,1 +1,1 @@
-"""The folder that `smc-mujoco claims --new` copies: a paper with two claims, which runs as it is."""
+"""The folder that `smc-mujoco claims --new` copies: a paper with two claims, which runs."""

@@ -9,7 +9,9 @@ way up the network's pendulums are nor how strongly they are coupled: a claim on
 it holds on both networks of the study.
 """
 
+import itertools
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
@@ -79,18 +81,16 @@ def long_run(runs, plant, lam, position, rate=0.0):
 
 
 def command_bound(runs, plant):
-    """Return min(|lambda|, u_max), the bound on the u of the paper's law or its mutant, N or N m."""
+    """Return min(|lambda|, u_max), the bound on the u of the paper's law or its mutant."""
     return min(abs(runs.law(plant, OURS).gains["lam"]), runs.scenario(plant, OURS).resolved.u_max)
 
 
 def comes_to_rest(runs, grid):
     """Return the ultimate bound of every named scenario, over |x0|."""
-    scores = zip(grid.items(), runs.scores(grid.values()), strict=True)
-    return {
-        "ultimate bound / |x0|": {
-            name: score["ultimate_bound"] / scale(run) for (name, run), score in scores
-        }
-    }
+    bounds = {}
+    for (name, run), score in zip(grid.items(), runs.scores(grid.values()), strict=True):
+        bounds[name] = score["ultimate_bound"] / scale(run)
+    return {"ultimate bound / |x0|": bounds}
 
 
 def larger_than(value, scale=0.0):
@@ -102,7 +102,7 @@ def larger_than(value, scale=0.0):
 
 def times(runs, plant, *laws):
     """Return the settling times of laws on a plant, nominal, s."""
-    return [runs.score(plant, law)["settling_time"] for law in laws]
+    return list(runs.metric("settling_time", plant, laws).values())
 
 
 def overshoot(runs, plant, law):
@@ -149,16 +149,12 @@ def largest_delays(runs, plants, laws, within=TOLERATED_ERROR):
     `margins`, down to one control period. Its runs are the audit's own, so that mutants of laws are
     searched as well.
     """
-    if runs.quick:
-        apart = QUICK_RESOLUTION
-        integrator = "implicitfast"
-    else:
-        apart = 1
-        integrator = "RK4"
-    levels = [
-        0,
-        *(periods for delay in DELAYS if (periods := round(delay / CONTROL_PERIOD)) >= apart),
-    ]
+    apart, integrator = (QUICK_RESOLUTION, "implicitfast") if runs.quick else (1, "RK4")
+    levels = [0]
+    for delay in DELAYS:
+        periods = round(delay / CONTROL_PERIOD)
+        if periods >= apart:
+            levels.append(periods)
 
     def tolerated(tried):
         scenarios = []
@@ -171,14 +167,9 @@ def largest_delays(runs, plants, laws, within=TOLERATED_ERROR):
             s["ultimate_bound"] <= within * scale(c) for s, c in zip(scores, scenarios, strict=True)
         ]
 
-    pairs = []
-    for plant in plants:
-        for law in laws:
-            pairs.append((plant, law))
-    searches = {
-        pair: Search(levels=levels, resolution=lambda low: apart, rounded=round, low=-1)
-        for pair in pairs
-    }
+    searches = {}
+    for pair in itertools.product(plants, laws):
+        searches[pair] = Search(levels=levels, resolution=lambda low: apart, rounded=round, low=-1)
     find_boundaries(searches, tolerated)
     return {pair: max(search.low, 0) * CONTROL_PERIOD for pair, search in searches.items()}
 
@@ -284,27 +275,26 @@ def observer_free(runs):
 
 def reduces_chattering(runs):
     """Claim 3: reduces chattering."""
-    rates = {}
-    for plant in runs.plants:
-        rates[plant] = [runs.score(plant, law)["tv_rate"] for law in (OURS, CLASSICAL)]
-    return {"TV rate / classical's": {plant: ratio(*pair) for plant, pair in rates.items()}}
+
+    def share(plant):
+        return ratio(*runs.metric("tv_rate", plant, (OURS, CLASSICAL)).values())
+
+    return {"TV rate / classical's": runs.by_plant(share)}
 
 
 def bounded(runs):
     """Claim 4: bounded control."""
-    if runs.quick:
-        names = runs.conditions[:QUICK_IDEAL_COUNT]
-    else:
-        names = runs.conditions
+    names = runs.conditions[: QUICK_IDEAL_COUNT if runs.quick else None]
     grid = []
     for plant in runs.plants:
         for name in names:
             grid.append(runs.scenario(plant, OURS, name))
-    grid += [runs.scenario(plant, OURS, u_max=math.inf) for plant in runs.plants]
-    scores = runs.scores(grid)
-    largest = max(
-        ratio(score["max_u"], run.law.gains["lam"]) for run, score in zip(grid, scores, strict=True)
-    )
+    for plant in runs.plants:
+        grid.append(runs.scenario(plant, OURS, u_max=math.inf))
+    shares = []
+    for run, score in zip(grid, runs.scores(grid), strict=True):
+        shares.append(ratio(score["max_u"], run.law.gains["lam"]))
+    largest = max(shares)
     every = []
     for run in runs.results():
         if run.law == OURS:
@@ -316,17 +306,11 @@ def bounded(runs):
 
 def robust(runs):
     """Claim 5: robust to noise, disturbance, parameter variation."""
-    if runs.quick:
-        names = QUICK_CONDITIONS
-    else:
-        names = runs.conditions
-    pairs = []
+    grid = {}
     for plant in runs.plants:
-        for name in names:
-            pairs.append((plant, name))
-    return comes_to_rest(
-        runs, {f"{plant}, {name}": runs.scenario(plant, OURS, name) for plant, name in pairs}
-    )
+        for name in QUICK_CONDITIONS if runs.quick else runs.conditions:
+            grid[f"{plant}, {name}"] = runs.scenario(plant, OURS, name)
+    return comes_to_rest(runs, grid)
 
 
 def scalable(runs):
@@ -334,17 +318,14 @@ def scalable(runs):
     sizes = [n for n in runs.values["sizes"] if n <= QUICK_MAX_SIZE or not runs.quick]
     ratios = {}
     for plant in runs.plants:
-        networks = [find_plant(plant, n=n) for n in sizes]
         grid = []
-        for p in networks:
-            grid.append(
-                runs.scenario(plant, OURS, plant=p, duration=SHORT_RUN, integrator="implicitfast")
-            )
-        time_of_two, *times = (scores["settling_time"] for scores in runs.scores(grid))
-        ratios |= {
-            f"{plant}, N = {n}": ratio(time, time_of_two)
-            for n, time in zip(sizes[1:], times, strict=True)
-        }
+        fields = {"duration": SHORT_RUN, "integrator": "implicitfast"}
+        for n in sizes:
+            grid.append(runs.scenario(plant, OURS, plant=find_plant(plant, n=n), **fields))
+        of_two, *others = runs.scores(grid)
+        for n, scores in zip(sizes[1:], others, strict=True):
+            time = ratio(scores["settling_time"], of_two["settling_time"])
+            ratios[f"{plant}, N = {n}"] = time
     return {"settling time / that of N = 2": ratios}
 
 
@@ -359,27 +340,24 @@ GENERAL_LAWS = (CLASSICAL, ADAPTIVE, HOSMC, CONDITIONED, "boundary_layer")
 
 def compensates(runs):
     """Claim 10: compensates input nonlinearity implicitly."""
-    apart = {}
-    for plant in runs.plants:
-        law = runs.law(plant, OURS)
-        both = [runs.scenario(plant, OURS, law=one) for one in (law, variant(law, "squeezed"))]
-        apart[plant] = deviation(*runs.traces(both))
-    return {"max |x - x'| / |x0|": apart}
+
+    def apart(plant):
+        squeezed = variant(runs.law(plant, OURS), "squeezed")
+        both = runs.scenario(plant, OURS), runs.scenario(plant, OURS, law=squeezed)
+        return deviation(*runs.traces(both))
+
+    return {"max |x - x'| / |x0|": runs.by_plant(apart)}
 
 
 def never_chatters(runs):
     """Claim 11: no chattering by construction."""
     periods, delays, shortest = (runs.values[name] for name in ("periods", "delays", "shortest"))
     ends = delays[0], delays[-1]
-    cells = [(period, delay) for period in periods for delay in delays]
-    cells += [
-        (shortest, delay) for delay in ends
-    ]  # ten times the steps, so with the ends of the delays alone
     if runs.quick:
-        cells = []
-        for period in (periods[0], periods[-1]):
-            for delay in ends:
-                cells.append((period, delay))
+        cells = list(itertools.product((periods[0], periods[-1]), ends))
+    else:
+        # the shortest takes ten times the steps, so it has the ends of the delays alone
+        cells = [*itertools.product(periods, delays), *itertools.product((shortest,), ends)]
     rate = {}
     at = {}
     limit = {}
@@ -408,16 +386,13 @@ def better(runs):
     beside = []
     for plant in runs.plants:
         for sentence, name, metric, condition in MEASURES:
-            values = {
-                law: runs.score(plant, law, condition)[metric]
-                for law in (OURS, *RIVALS, CONDITIONED, UNCLAMPED)
-            }
+            laws = (OURS, *RIVALS, CONDITIONED, UNCLAMPED)
+            values = runs.metric(metric, plant, laws, condition)
             for law in RIVALS:
                 what = f"{plant}: {name} against 1.1 times that of {law}"
                 checks.append(runs.check(sentence, what, values[OURS], values[law], sentence))
-            beside += [
-                Beside(f"{plant}: {name} of {law}", values[law]) for law in (CONDITIONED, UNCLAMPED)
-            ]
+            for law in (CONDITIONED, UNCLAMPED):
+                beside.append(Beside(f"{plant}: {name} of {law}", values[law]))
     return checks + beside
 
 
@@ -426,10 +401,9 @@ def synchronises(runs):
     checks = []
     for plant in runs.plants:
         scores = runs.scores(runs.scenario(plant, OURS, condition) for condition in runs.conditions)
-        joined, alone = (score["spread_settling_time"] for score in scores)
-        checks.append(
-            runs.check("settling time, s", f"{plant}: settling time of the spread, s", joined)
-        )
+        joined, alone = map(operator.itemgetter("spread_settling_time"), scores)
+        what = f"{plant}: settling time of the spread, s"
+        checks.append(runs.check("settling time, s", what, joined))
         what = f"{plant}: the same without coupling, s, against that with it"
         checks.append(runs.check("without coupling", what, alone, joined))
     return checks
@@ -477,19 +451,17 @@ def higher_degree(runs):
             tried.append(runs.scenario(name, OURS, law=third, actuator=Lag(LAG), velocity=one))
         bounds = [scores["ultimate_bound"] for scores in runs.scores(tried)]
         grid[name] = tried[bounds.index(min(bounds))]
-    scores = zip(grid.items(), runs.scores(grid.values()), strict=True)
-    settled = {
-        name: score["settling_time"] / scenario.duration for (name, scenario), score in scores
-    }
+    settled = {}
+    for (name, run), score in zip(grid.items(), runs.scores(grid.values()), strict=True):
+        settled[name] = score["settling_time"] / run.duration
     return {"settling time / duration of the run": settled} | comes_to_rest(runs, grid)
 
 
 def no_tuning(runs):
     """Claim 24: damping arises from alpha, no tuning."""
-    theory = {name: smallest_lam(runs, name) for name in runs.plants}
     return {
         "smallest lambda that stabilises it": smallest_stable(runs),
-        "the same by linear theory": theory,
+        "the same by linear theory": runs.by_plant(lambda plant: smallest_lam(runs, plant)),
     }
 
 
@@ -497,10 +469,7 @@ def with_estimators(runs):
     """Claim 25: works with low-pass filtered differentiation, Savitzky-Golay, sliding
     differentiators.
     """
-    if runs.quick:
-        sigmas = runs.values["sigmas"][-1:]
-    else:
-        sigmas = runs.values["sigmas"]
+    sigmas = runs.values["sigmas"][-1 if runs.quick else 0 :]
     grid = {}
     for plant in runs.plants:
         for name in runs.values["estimators"]:
@@ -555,15 +524,17 @@ def never_rises(runs):
 
 def globally_stable(runs):
     """Claim 20: globally asymptotically stable, any lambda > 0."""
-    positions, rates, ratios = (runs.values[name] for name in ("positions", "rates", "ratios"))
-    starts = [
-        (position, rate) for position in positions for rate in ((0.0,) if runs.quick else rates)
-    ]
-    smallest = {name: smallest_lam(runs, name) for name in runs.plants}
-    cells = [(name, share) for name in runs.plants if smallest[name] > 0.0 for share in ratios]
-    lams = [(name, share * smallest[name]) for name, share in cells]
-    unscaled = [(name, runs.law(name, OURS).gains["lam"]) for name in runs.plants]
-    tried = [*lams, *unscaled]
+    rates = (0.0,) if runs.quick else runs.values["rates"]
+    starts = list(itertools.product(runs.values["positions"], rates))
+    smallest = runs.by_plant(lambda name: smallest_lam(runs, name))
+    cells = []
+    tried = []
+    for name in runs.plants:
+        for share in runs.values["ratios"] if smallest[name] > 0.0 else ():
+            cells.append(f"{name}, {share:g} of the smallest lambda")
+            tried.append((name, share * smallest[name]))
+    for name in runs.plants:
+        tried.append((name, runs.law(name, OURS).gains["lam"]))
     grid = []
     for name, lam in tried:
         for position, rate in starts:
@@ -573,22 +544,21 @@ def globally_stable(runs):
         near.append(
             scores["ultimate_bound"] <= runs.values["within"] * max(map(abs, scenario.plant.x0))
         )
-    shares = iter(np.reshape(near, (len(tried), len(starts))).mean(axis=1).tolist())
+    shares = np.reshape(near, (len(tried), len(starts))).mean(axis=1).tolist()
     return {
-        "share that converges": {
-            f"{name}, {share:g} of the smallest lambda": next(shares) for name, share in cells
-        },
+        "share that converges": dict(zip(cells, shares, strict=False)),
         "smallest lambda": smallest,
-        "share at the set's lambda": {name: next(shares) for name in runs.plants},
+        "share at the set's lambda": dict(zip(runs.plants, shares[len(cells) :], strict=True)),
     }
 
 
 def any_gain(runs):
     """Claim 21: g smooth and non-zero suffices."""
-    law_on = {plant: variant(runs.law(plant, OURS), "reversed") for plant in runs.plants}
-    return comes_to_rest(
-        runs, {plant: runs.scenario(plant, OURS, law=law) for plant, law in law_on.items()}
-    )
+
+    def reversed_run(plant):
+        return runs.scenario(plant, OURS, law=variant(runs.law(plant, OURS), "reversed"))
+
+    return comes_to_rest(runs, runs.by_plant(reversed_run))
 
 
 # the simulations: four laws side by side on single plants and on the network
@@ -638,14 +608,12 @@ def largest_oscillation(runs):
     others = larger_than(
         max(overshoot(runs, runs.plant, law) for law in LAWS if law != HOSMC), scale=100.0
     )
-    over = {
-        law: runs.score(runs.plant, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)
-    }
-    names = {law: f"{runs.plant}: overshoot of {law}, %" for law in over}
+    over = runs.metric("overshoot", runs.plant, (HOSMC, CONDITIONED, UNCLAMPED))
+    name = f"{runs.plant}: overshoot of {{}}, %"
     checks = []
     for law in (HOSMC, CONDITIONED):
-        checks.append(runs.check("overshoot", names[law], over[law], others))
-    return [*checks, Beside(names[UNCLAMPED], over[UNCLAMPED])]
+        checks.append(runs.check("overshoot", name.format(law), over[law], others))
+    return [*checks, Beside(name.format(UNCLAMPED), over[UNCLAMPED])]
 
 
 def fast_and_minimal(runs):
@@ -670,13 +638,13 @@ def similar(runs):
 
 def rapid(runs):
     """Claim 38: network: rapid synchronisation and damping."""
-    scores = {plant: runs.score(plant, OURS) for plant in runs.plants}
-    return {
-        f"settling time of the {of}, s": {
-            plant: one[f"{of}_settling_time"] for plant, one in scores.items()
-        }
-        for of in ("mean", "spread")
-    }
+    times = {}
+    for part in ("mean", "spread"):
+        metric = f"{part}_settling_time"
+        times[f"settling time of the {part}, s"] = runs.by_plant(
+            lambda plant, metric=metric: runs.score(plant, OURS)[metric]
+        )
+    return times
 
 
 def distortion(runs):
@@ -719,28 +687,28 @@ def hosmc_like_adaptive(runs):
 
 def monotonic(runs):
     """Claim 50: fast and monotonic on every system."""
-    return {"overshoot, %": {plant: overshoot(runs, plant, OURS) for plant in runs.plants}}
+    return {"overshoot, %": runs.by_plant(lambda plant: overshoot(runs, plant, OURS))}
 
 
 def settles_as_well(runs):
     """Claim 51: settles like or better than classical and HOSMC."""
-    pairs = {plant: times(runs, plant, OURS, CLASSICAL, HOSMC) for plant in runs.plants}
+
+    def share(plant):
+        ours, *rivals = times(runs, plant, OURS, CLASSICAL, HOSMC)
+        return ratio(ours, min(rivals))
+
     what = f"settling time, over the better of classical and {HOSMC}"
-    return {what: {plant: ratio(ours, min(rivals)) for plant, (ours, *rivals) in pairs.items()}}
+    return {what: runs.by_plant(share)}
 
 
 def removes_chattering(runs):
     """Claim 52: removes the chattering of classical and adaptive."""
-    rivals = (CLASSICAL, ADAPTIVE)
-    laws = (OURS, CLASSICAL, ADAPTIVE)
-    rates = {
-        (plant, law): runs.score(plant, law)["tv_rate"] for plant in runs.plants for law in laws
-    }
-    pairs = {}
+    shares = {}
     for plant in runs.plants:
-        for law in rivals:
-            pairs[f"{plant}, {law}"] = (rates[plant, OURS], rates[plant, law])
-    return {"TV rate, over that of the law": {name: ratio(*pair) for name, pair in pairs.items()}}
+        rates = runs.metric("tv_rate", plant, (OURS, CLASSICAL, ADAPTIVE))
+        for law in (CLASSICAL, ADAPTIVE):
+            shares[f"{plant}, {law}"] = ratio(rates[OURS], rates[law])
+    return {"TV rate, over that of the law": shares}
 
 
 # Van der Pol under noise and disturbance: noise is the study's, 0.01 m on x and 0.05 m/s on v, d =
@@ -760,23 +728,13 @@ def nearly_identical(runs):
     disturbed, nominal = runs.traces(
         [runs.scenario(runs.plant, OURS, condition) for condition in ("sine", "nominal")]
     )
-    residual = {
-        law: runs.score(runs.plant, law, "sine")["ultimate_bound"]
-        for law in (OURS, *RIVALS, UNCLAMPED)
-    }
+    residual = runs.metric("ultimate_bound", runs.plant, (OURS, *RIVALS, UNCLAMPED), "sine")
     what = f"{runs.plant}: residual under d of"
     apart = f"{runs.plant}: deviation from nominal under d, over |x0|"
-    checks = []
+    checks = [runs.check("deviation", apart, deviation(disturbed, nominal))]
     for law in RIVALS:
-        checks.append(
-            runs.check(
-                "residual",
-                f"{what} {OURS} against that of {law}, m",
-                residual[OURS],
-                residual[law],
-            )
-        )
-    checks.insert(0, runs.check("deviation", apart, deviation(disturbed, nominal)))
+        against = f"{what} {OURS} against that of {law}, m"
+        checks.append(runs.check("residual", against, residual[OURS], residual[law]))
     return [*checks, Beside(f"{what} {UNCLAMPED}, m", residual[UNCLAMPED])]
 
 
@@ -903,13 +861,13 @@ def cheap(runs, exact):
 
 def saturation_avoided(runs):
     """Claim 56: actuator saturation inherently avoided."""
-    apart = {}
-    for plant in runs.plants:
+
+    def apart(plant):
         half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, MIN_BOUND)
-        apart[plant] = deviation(
-            *runs.traces([runs.scenario(plant, OURS, u_max=limit) for limit in (half, math.inf)])
-        )
-    return {"deviation at u_max = lambda / 2, over |x0|": apart}
+        bounded = runs.scenario(plant, OURS, u_max=half)
+        return deviation(*runs.traces([bounded, runs.scenario(plant, OURS, u_max=math.inf)]))
+
+    return {"deviation at u_max = lambda / 2, over |x0|": runs.by_plant(apart)}
 
 
 def exponential(runs):
@@ -918,8 +876,9 @@ def exponential(runs):
     for plant in runs.plants:
         start = runs.scenario(plant, OURS).resolved.x0
         away = []
-        for k in (NEAR_FACTOR, *FAR_FACTORS):
-            away.append(runs.scenario(plant, OURS, x0=tuple(k * x for x in start)))
+        for factor in (NEAR_FACTOR, *FAR_FACTORS):
+            x0 = tuple((factor * np.array(start)).tolist())
+            away.append(runs.scenario(plant, OURS, x0=x0))
         near, *rates = map(decay_rate, runs.traces(away))
         for factor, rate in zip(FAR_FACTORS, rates, strict=True):
             apart[f"{plant}, from {factor:g} x0"] = abs(ratio(rate, near) - 1.0)
@@ -965,9 +924,8 @@ def jumps(runs):
 def delay_tolerant(runs):
     """Claim 61: classical SMC is delay-sensitive, the paper's is not."""
     tried = (*LAWS, UNCLAMPED)
-    longest, below = (
-        largest_delays(runs, runs.plants, tried, within) for within in (TOLERATED_ERROR, 1.0)
-    )
+    longest = largest_delays(runs, runs.plants, tried)
+    below = largest_delays(runs, runs.plants, tried, within=1.0)
     checks = []
     beside = []
     for plant in runs.plants:
@@ -976,17 +934,12 @@ def delay_tolerant(runs):
             what = f"{plant}: largest delay against that of {law}, s"
             checks.append(runs.check("largest delay", what, ours, longest[plant, law]))
         words = f"{plant}: largest delay"
-        beside += [
-            Beside(f"{words} with which {law} ends below its start, s", below[plant, law])
-            for law in LAWS
-        ]
+        for law in LAWS:
+            what = f"{words} with which {law} ends below its start, s"
+            beside.append(Beside(what, below[plant, law]))
         beside.append(Beside(f"{words} of {UNCLAMPED}, s", longest[plant, UNCLAMPED]))
-        beside.append(
-            Beside(
-                f"{plant}: critical delay of the paper's law by linear theory, s",
-                critical_delay(runs, plant),
-            )
-        )
+        what = f"{plant}: critical delay of the paper's law by linear theory, s"
+        beside.append(Beside(what, critical_delay(runs, plant)))
     return checks + beside
 
 
@@ -1046,7 +999,8 @@ def table_one(runs):
             evidence.append(plus if mark == "+" else minus)
     for column, law in TABLE_COLUMNS.items():
         if runs.values["strict"] <= steps[law] < runs.thresholds["smoothness"].limit:
-            what = f"smoothness: {column}, at a limit of {runs.values['strict']:g} the mark would be --"
+            limit = f"at a limit of {runs.values['strict']:g} the mark would be --"
+            what = f"smoothness: {column}, {limit}"
             evidence.append(Beside(what, steps[law]))
     return [
         *evidence,
