@@ -29,7 +29,7 @@ quick: ## the first case of each test that takes little: a minute, for every cha
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest --quick
 
-attack: ## random scenarios, calls and files by the thousand, for releases (10 minutes)
+attack: ## random scenarios and files by the thousand, for releases (7 minutes)
 	@./setup.sh requirements-test.lock
 	$(BIN)/python tests/attack.py
 

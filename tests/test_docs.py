@@ -16,9 +16,6 @@ from helpers.pages import ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
 from smc_mujoco.cli import law_pages
-from smc_mujoco.evidence.audit.paper import paper, shipped
-from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.studies import scene
 
 TEMPLATES = [template for known in law_pages.CATALOGUES.values() for template in known().values()]
 DOCS = ROOT / "docs"
@@ -70,30 +67,6 @@ def test_the_reference_has_every_public_name_and_each_entry_once(known):
         assert hasattr(importlib.import_module(module), name) or importlib.import_module(
             f"{module}.{name}"
         )
-
-
-def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
-    pages = "".join(path.read_text() for path in DOCS.glob("*.md"))
-    assert [marker for marker in known.SHOWN if pages.count(marker) != 1] == []
-    claims = [claim.id for claim in paper("gaber").claims.values() if claim.instead]
-    quoted = [
-        [f"`{name}`" for name in names]
-        for names in (smc.plants(), [m.name for m in metrics()], scene.scenes())
-    ]
-    tables = known.machines(), known.definitions(), known.questions(), known.instead()
-    for lines, names in zip(tables, [*quoted, [f"{i}:" for i in claims]], strict=True):
-        head, *rows = list(lines)
-        assert [row.split()[1] for row in rows] == names
-        assert {row.count("|") for row in rows} == {head.partition("\n")[0].count("|")}
-        assert min(map(len, rows)) > 40
-    papers = [*shipped()]
-    assert re.findall(r"^\| `(\w+)`", "\n".join(known.audits()), re.MULTILINE) == papers
-    shown = "\n".join(known.decisions()).split("???")[1:]
-    assert [text.count("\n    | ") - 1 for text in shown] == [
-        len(paper(name).claims) for name in papers
-    ]
-    laws = [*smc.laws(), *smc.laws(kind="joint")]
-    assert sorted(re.findall(r"`(\w+)`", "".join(known.kinds()))) == sorted(laws)
 
 
 @pytest.mark.slow
@@ -162,14 +135,6 @@ def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
 )
 def test_the_plain_notation_becomes_latex(generator, plain, latex):
     assert generator.notation.formula(plain).split() == latex.split()
-
-
-def test_formulas_in_sentences_are_found_and_words_are_not(generator):
-    text = (
-        "With a gain k > 0, s = 0 lasts for |d| <= D; the author's law of 1993 needs 2 m, and dt^2."
-    )
-    expected = r"With a gain $k \gt  0$, $s = 0$ lasts for $\left| d \right| \le  D$; the author's law of 1993 needs 2 m, and "
-    assert generator.notation.sentence(text) == expected + r"${\Delta t}^{2}$."
 
 
 @pytest.mark.parametrize("kind", sorted({template.kind for template in TEMPLATES}))

@@ -4,12 +4,10 @@ without outputs.
 
 import ast
 import json
-import re
 from pathlib import Path
 
 import pytest
 from helpers.commands import python
-from helpers.public import public_names, there
 
 from smc_mujoco.common import gl
 
@@ -60,10 +58,6 @@ def code(path: Path) -> list[str]:
     return [text for kind, text in cells(path) if kind == "code"]
 
 
-def test_there_are_three():
-    assert [path.stem for path in NOTEBOOKS] == sorted(SAID)
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
     text = path.read_text("utf-8")
@@ -78,23 +72,6 @@ def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
     for cell in data["cells"]:
         if cell["cell_type"] == "code":
             assert (cell["outputs"], cell["execution_count"]) == ([], None)
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_text_stands_before_each_cell_and_links_lead_somewhere(path):
-    found = cells(path)
-    assert found[0][1].startswith("# ")
-    assert [
-        i for i, (kind, _) in enumerate(found) if kind == "code" and found[i - 1][0] != "markdown"
-    ] == []
-    texts = "\n".join(text for kind, text in found if kind == "markdown")
-    assert [
-        link for link in re.findall(r"\]\(([^)]+)\)", texts) if not (path.parent / link).is_file()
-    ] == []
-    assert [
-        page for page in re.findall(r"`(docs/\S+\.md)`", texts) if not (ROOT / page).is_file()
-    ] == []
-    assert [name for name in public_names(texts) if not there(name)] == []
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

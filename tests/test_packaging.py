@@ -2,8 +2,6 @@
 when they are missing, and a set-up that installs what the locks pin or fails in one sentence.
 """
 
-import email
-import importlib.util
 import os
 import re
 import shutil
@@ -126,48 +124,6 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     assert done.returncode == 0, done.stdout
 
 
-def test_the_wheel_says_what_it_is_and_needs(wheel):
-    with zipfile.ZipFile(wheel) as archive:
-        (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
-        about = email.message_from_bytes(archive.read(name))
-        assert {Path(name).name for name in archive.namelist() if "/licenses/" in name} == {
-            "LICENSE",
-            "NOTICE",
-        }
-    needs = [need for need in about.get_all("Requires-Dist", []) if "extra ==" not in need]
-    assert {named(need) for need in needs} & {
-        "dm-control",
-        "mediapy",
-        "imageio-ffmpeg",
-        "distributed",
-    } == set()
-    assert "mujoco<5,>=3.17" in needs
-    assert {*about.get_all("Provides-Extra", [])} == {*EXTRAS}
-    assert {*EXTRAS} == {
-        "dm",
-        "film",
-        "report",
-        "cluster",
-        "rl",
-        "fmu",
-        "proof",
-        "all",
-    }
-    assert about["Author"] == "The smc_mujoco developers"
-    assert "Typing :: Typed" in about.get_all("Classifier", [])
-
-
-def test_the_wheel_s_metadata_and_the_citation_name_one_version_and_one_holder():
-    import smc_mujoco
-
-    citation = (ROOT / "CITATION.cff").read_text()
-    (author,) = (author["name"] for author in PROJECT["project"]["authors"])
-    assert f"\nversion: {smc_mujoco.__version__}\n" in citation
-    assert all(
-        author in (ROOT / name).read_text() for name in ("CITATION.cff", "NOTICE", "README.md")
-    )
-
-
 def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binaries, tmp_path):
     done = run(binaries / "python", "-m", "smc_mujoco", "--version", cwd=tmp_path)
     assert (done.returncode, done.stdout.split()[0]) == (0, "smc-mujoco")
@@ -202,16 +158,6 @@ def test_a_shell_completes_commands_and_names(binaries, tmp_path, shell, typed, 
     done = run(binaries / "smc-mujoco", cwd=tmp_path, **asked)
     assert meant in done.stdout
     assert "basin" not in done.stdout
-
-
-def test_models_are_found_from_the_wheel(binaries, tmp_path):
-    names = sorted(name.removeprefix("models/") for name in shipped("models"))
-    code = "import sys; from smc_mujoco.mechanisms.plant import model_path as f; print(*map(f, sys.argv[1:]), sep='\\n')"
-    done = run(binaries / "python", "-c", code, *names, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    for name, path in zip(names, map(Path, done.stdout.splitlines()), strict=True):
-        assert path.is_relative_to(binaries.parent)
-        assert path.as_posix().endswith(f"smc_mujoco/models/{name}")
 
 
 @pytest.mark.slow
@@ -328,25 +274,6 @@ def test_an_extra_that_is_missing_is_one_sentence_where_it_is_needed(refused, co
     assert all(word in line for word in words)
 
 
-def test_links_of_the_package_index_s_page_lead_to_the_repository():
-    spec = importlib.util.spec_from_file_location("metadata_hook", ROOT / ".github" / "metadata.py")
-    assert spec
-    assert spec.loader
-    hook = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(hook)
-    text = "[a](docs/a.md#b) ![c](docs/c.png) [d](../../actions/d) [e](https://e.org) [f](#f)"
-    assert hook.absolute(text, "https://h/r") == (
-        "[a](https://h/r/blob/main/docs/a.md#b) ![c](https://h/r/raw/main/docs/c.png) [d](https://h/r/actions/d) "
-        "[e](https://e.org) [f](#f)"
-    )
-    told = {}
-    for repository in ("", "https://h/r/"):
-        hook.Metadata(str(ROOT), {"repository": repository}).update(told.setdefault(repository, {}))
-    assert told[""] == {"urls": {}, "readme": {"content-type": "text/markdown", "text": README}}
-    assert told["https://h/r/"]["urls"]["Issues"] == "https://h/r/issues"
-    assert told["https://h/r/"]["readme"]["text"] == hook.absolute(README, "https://h/r")
-
-
 def named(requirement: str) -> str:
     """The package that a requirement is of."""
     return re.split(r"[^A-Za-z0-9.-]", requirement)[0].lower()
@@ -393,18 +320,6 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     assert {named(need) for need in tested} <= locked("requirements.lock", "requirements-test.lock")
 
 
-def test_every_extra_is_named_where_it_is_missing_and_no_other():
-    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "smc_mujoco").rglob("*.py"))
-    assert set(re.findall(r"""\b(?:extra|missing|cure)\(["'](\w+)""", code)) == set(EXTRAS) - {
-        "all"
-    }
-
-
-def test_every_extra_is_in_all():
-    (every,) = EXTRAS["all"]
-    assert every == f"smc-mujoco[{','.join(name for name in EXTRAS if name != 'all')}]"
-
-
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     for name in ("setup.sh", "pyproject.toml", "requirements.lock"):
@@ -435,27 +350,6 @@ def test_set_up_without_a_fit_python_is_one_sentence(checkout, script, sentence)
     assert sentence in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not (checkout / ".venv").exists()
-
-
-def test_packages_of_a_set_up_that_was_stopped_are_installed_again(checkout):
-    base = checkout / ".venv" / "bin"
-    uv = checkout / "uv"
-    base.mkdir(parents=True)
-    (base / "python").symlink_to(sys.executable)
-    files = [(checkout / name).read_text() for name in ("pyproject.toml", "requirements.lock")]
-    (base.parent / "installed").write_text(f"{checkout}\n{''.join(files)}")
-    (checkout / "more.lock").touch()
-    uv.write_text('#!/bin/sh\necho "$*" >>asked\n[ -e go ] || kill -9 $PPID\n')
-    uv.chmod(0o755)
-    for k in range(3):
-        done = run("./setup.sh", "more.lock", cwd=checkout, PATH=f"{checkout}:{os.environ['PATH']}")
-        assert (done.returncode == 0) == (k > 0), done.stderr
-        (checkout / "go").touch()
-    first, second = (
-        (checkout / "asked").read_text().splitlines()
-    )  # the third time nothing is missing
-    assert ["--reinstall" in words for words in (first, second)] == [False, True]
-    assert not (base.parent / "adding").exists()
 
 
 @pytest.mark.slow

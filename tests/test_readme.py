@@ -21,7 +21,6 @@ from helpers.public import public_names, there
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
-from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.common.files import slug
 from smc_mujoco.evidence.rigs import ensemble
@@ -84,21 +83,6 @@ def named(value: object) -> str:
     return str(value)[:40]
 
 
-def rows(page: str, heading: str) -> set[str]:
-    """What stands in backquotes in the first column of a page's table under a heading."""
-    text = (ROOT / "docs" / page).read_text()
-    table = re.search(rf"^\| {heading} \|.*?\n\n", text, re.MULTILINE | re.DOTALL)
-    assert table is not None
-    cells = [line.split("|")[1] for line in table[0].splitlines()[2:] if line]
-    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
-
-
-def test_there_is_something_to_test():
-    assert len(CODE) >= 3
-    assert sum("smc-mujoco" in line for _, line in LINES) >= 3
-    assert len(LINKS) >= 2
-
-
 @pytest.mark.parametrize(("page", "i", "block"), CODE, ids=named)
 def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
     page, i, block, tmp_path, monkeypatch
@@ -150,20 +134,6 @@ def test_command_lines_name_commands_options_and_files_that_exist(page):
         check_command(line, known)
 
 
-def test_a_flag_of_a_command_is_off_unless_it_is_given():
-    commands = typer.main.get_command(main.app).commands  # pyright: ignore[reportAttributeAccessIssue]
-    on = set()
-    for name, command in commands.items():
-        for parameter in command.params:
-            if (
-                getattr(parameter, "is_flag", False)
-                and parameter.default
-                and not parameter.secondary_opts
-            ):
-                on.add((name, *parameter.opts))
-    assert on == set()
-
-
 def check_command(line: str, known: dict) -> None:
     word, *rest = shlex.split(line)[1:]
     assert word in known, line
@@ -195,19 +165,6 @@ def results(folder: Path) -> set[str]:
     }
 
 
-def test_labels_of_one_file_name_are_refused():
-    run = smc.Scenario(plant="duffing", law="none")
-    with pytest.raises(smc.ScenarioError, match="same file name: k = 2, k=2"):
-        smc.Scene(title="Twins", conditions={"nominal": {"k = 2": run, "k=2": run}})
-
-
-def test_traces_are_named_as_these_tests_say(tmp_path):
-    trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
-    assert show.save({"A b": {"c": trace}}, tmp_path) == [
-        tmp_path / f"{slug('A b')}-{slug('c')}.npz"
-    ]
-
-
 def test_make_targets_exist():
     wanted = {re.match(r"make (\w+)", line) for _, line in LINES if line.startswith("make ")}
     assert {"demo", "test"} <= {found[1] for found in wanted if found} <= TARGETS
@@ -236,12 +193,6 @@ def test_relative_links_and_pictures_lead_somewhere(page):
         assert path.stat().st_size > 0, path
 
 
-def test_the_pages_list_what_a_law_measures():
-    from smc_mujoco.control.law import Measurement
-
-    assert rows("add_law.md", "field of `y`") == set(Measurement._fields)
-
-
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_names_that_a_page_takes_from_the_package_are_there(page):
     assert [name for name in public_names(page.read_text()) if not there(name)] == []
@@ -260,9 +211,3 @@ def test_folders_and_modules_that_contributing_lists_are_there():
         for name, paths in zip(names, places, strict=True)
         if not any(path.exists() for path in paths)
     ] == []
-
-
-def test_the_python_that_readme_asks_for_is_the_one_that_the_package_asks_for():
-    (said,) = set(re.findall(r"Python (3\.\d+) or newer", README))
-    assert f'requires-python = ">={said}"' in (ROOT / "pyproject.toml").read_text()
-    assert sys.version_info >= tuple(map(int, said.split(".")))

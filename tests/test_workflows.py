@@ -91,15 +91,6 @@ def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_sha
     assert targets == {*promised.split(), "slow"}  # the slow tests have a job of their own
 
 
-def test_workflows_have_the_pythons_of_the_package():
-    about = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    classified = re.findall(r"Python :: (3\.\d+)", about)
-    assert (
-        jobs(ROOT / ".github/workflows/tests.yml")["linux"]["strategy"]["matrix"]["python"]
-        == classified
-    )
-
-
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
 def test_a_workflow_may_read_and_no_more(workflow):
     data = yaml.safe_load(workflow.read_text(encoding="utf-8"))

@@ -146,28 +146,6 @@ def test_dry_friction_is_the_published_arctangent():
     np.testing.assert_allclose(simulator._slope(state, 0.0, 0.0, known), without, rtol=1e-12)
 
 
-def test_the_grid_has_the_published_levels():
-    """722 machines, and the pulses of each apart and of the published sizes."""
-    grid = simulator.cases()
-    levels = {}
-    for case in grid:
-        levels.setdefault((case.test, case.name), []).append(case.value)
-    assert {name for test, name in levels if test == "model"} == set(simulator.MODEL_LEVELS)
-    assert levels["model", "cf2"] == pytest.approx(np.linspace(-0.2, 0.2, 21))
-    assert levels["velocity_noise", "velocity_noise"][::10] == pytest.approx(
-        np.linspace(0.0, 0.5, 21)
-    )
-    assert levels["torque_response", "torque_response"] == pytest.approx(np.linspace(0.1, 2.0, 21))
-    assert [case.delay for case in grid if case.test == "delay"] == [*range(21)]
-    assert len(grid) == 722
-    pulses = np.array([case.pulses for case in grid[-50:]])
-    assert np.diff(np.sort(pulses[..., 0], axis=1)).min() >= 1.0
-    for k, (low, high) in enumerate([(1.0, 9.0), (0.05, 0.1), (0.5, 5.0)]):
-        size = np.abs(pulses[..., k])
-        assert low <= size.min() < low + 0.1 * (high - low)
-        assert high - 0.1 * (high - low) < size.max() <= high
-
-
 @smc.law_function(plants=boards.ROBOTS)
 def mine(y, gains, memory):
     u = 0.4 * y.x - 0.25 * y.v + 0.07 * y.q - 0.03 * y.dq + 0.5 * y.t + 10.0 * y.dt
@@ -296,20 +274,6 @@ def test_uptime_and_swing_ups_of_a_motion_by_hand():
     run = global_policy.Run(states, np.zeros((30_000, 2)))
     assert run.swing_ups == 2
     assert run.uptime == pytest.approx(0.2 + 0.1 + 57.002, abs=1e-9)
-
-
-def test_a_law_is_not_asked_during_a_reset_and_its_limit_holds():
-    @smc.law_function(plants=("pendubot",), memory=1)
-    def counting(y, gains, memory):
-        memory[0] += 1.0
-        return 1e-6 * memory[0] if y.t < 59.99 else 99.0, y.q
-
-    run = global_policy.minute(boards.on_board("pendubot", counting()), 333)
-    pushed = np.abs(run.torques[:-10, 1]) > 0.0
-    asked = 1e-6 * np.cumsum(~pushed)
-    assert 15 * 100 <= pushed.sum() <= 15 * 101
-    np.testing.assert_allclose(run.torques[:-10, 0][~pushed], asked[~pushed], rtol=0, atol=1e-9)
-    assert run.torques[-1].tolist() == [6.0, 0.0]
 
 
 # this package's rows

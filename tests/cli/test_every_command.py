@@ -18,7 +18,6 @@ from typer.models import OptionInfo
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
-from smc_mujoco.cli.commands.options import actuator
 from smc_mujoco.common.constraints import of_parameters
 
 # command line -> the functions that it calls, of which the last does the work; not for audits
@@ -261,10 +260,6 @@ def test_a_file_of_another_kind_is_refused_before_the_work(line, option, capsys)
     assert "'a.gif': end the name in" in capsys.readouterr().err
 
 
-def test_drives_on_the_command_line_are_those_of_python():
-    assert actuator("lag:0.01+Backlash:0.2") == (smc.Lag(0.01), smc.Backlash(0.2))
-
-
 def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
     """Return how each option and argument is written -> its parameter, and what typer is told of
     it.
@@ -332,33 +327,6 @@ def test_the_examples_of_a_command_have_options_that_it_takes(name):
     assert {
         word for _, words in examples for word in words.split() if word.startswith("--")
     } <= taken
-
-
-NAMING = {
-    "law": "observer_free",
-    "plant": "duffing",
-    "plants": "duffing",
-    "what": "pid",
-}  # what completes to what
-
-
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_option_says_what_it_is_in_which_unit_within_which_bounds_and_completes_names(name):
-    group, command = COMMANDS[name]
-    assert group in main.GROUPS
-    for written, (parameter, info) in parameters(command).items():
-        words = info.help or ""
-        kind = str(parameter.annotation)
-        assert words.endswith("."), written
-        assert len(words) < 450, written
-        if "float" in kind:
-            unit = r"(, s\b|\bper s\b|\brad\b|\bN\b|, s,|share|a,b|s that|unit)"
-            assert re.search(unit, words) or info.metavar, (written, words)
-        if "int" in kind.replace("print", "") and written != "--joints":
-            assert info.min in (0, 1, 2, 8), written
-        if written.strip("-") in NAMING:
-            whole = NAMING[written.strip("-")]
-            assert whole in " ".join(info.autocompletion(whole[:-1])), written
 
 
 # what is printed and written

@@ -105,15 +105,6 @@ def trace(folder) -> Path:
     )
 
 
-def environment(**variables: str) -> dict[str, str]:
-    root = Path(smc.__file__).parents[1]
-    return (
-        os.environ
-        | {"PYTHONPATH": str(root), "COLUMNS": "80", "PYTHONIOENCODING": "utf-8"}
-        | variables
-    )
-
-
 def refused(answer: tuple[int, str, str], *words: object) -> None:
     """Exit code 2, one sentence on stderr with these words in it, no traceback."""
     code, out, err = answer
@@ -317,39 +308,6 @@ def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):
         assert "spread_bound" not in rows
 
 
-ANSWERS = """
-import smc_mujoco as smc
-from smc_mujoco.mechanisms.hardware.friction import Coulomb
-
-def block(level):
-    return smc.Scenario(plant="duffing", law="none", x0=0.1, duration=0.3, friction=Coulomb(level))
-
-scene = smc.Scene(
-    title="Blocks",
-    conditions={"dry": {"light": block(0.05), "heavy": block(5.0)}, "wet": {"light": block(0.0)}},
-    answers=("stick_time", "peak_reaction"),
-)
-"""
-
-
-def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn, folder):
-    (folder / "blocks.py").write_text(ANSWERS)
-    code, out, err = call("run", "blocks.py", "--no-film", "--out", "out")
-    assert (code, err) == (0, "")
-    after = out[out.index("stick_time (s)") :]
-    assert re.search(r"run +dry +wet *\n", after)
-    stick, reaction = (
-        re.findall(r"^(light|heavy) +(.*?) *$", part, re.M)
-        for part in after.split("peak_reaction (N)")
-    )
-    assert [label for label, _ in stick] == ["light", "heavy"]
-    assert stick[0][1].split()[1] == "0"  # nothing holds it in the wet
-    assert stick[1][1] == "0.300"
-    assert reaction[0][1].split() == ["0.0500", "0"]
-    assert len(reaction[1][1].split()) == 1  # no heavy one in the wet
-    assert max(map(len, after.partition("wrote")[0].splitlines())) <= 80
-
-
 def test_a_run_that_failed_has_no_answer():
     wild = smc.plant("duffing", alpha=-1e6, beta=0.0)
     runs = {"wild": smc.run(smc.Scenario(plant=wild, law="none", duration=0.1))}
@@ -468,17 +426,6 @@ def test_what_a_user_s_file_raises_is_shown_from_that_file_on(line, said, call, 
     with pytest.raises((ImportError, OSError, ValueError)) as raised:
         smc.grid(["duffing"], ["mine.py"])
     assert type(raised.value).__name__ == said.partition(":")[0]
-
-
-def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(
-    call, scene, folder, monkeypatch
-):
-    monkeypatch.setattr(show, "run", lambda *_, **__: pytest.fail("it ran"))
-    (folder / "taken").write_text("")
-    refused(call("run", scene, "--no-film", "--out", "taken"), "taken", "choose another folder")
-    refused(
-        call("run", scene, "--no-film", "--out", "taken/below"), "taken", "choose another folder"
-    )
 
 
 @pytest.mark.parametrize(

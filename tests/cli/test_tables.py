@@ -2,12 +2,10 @@
 
 import io
 import math
-import re
 from types import SimpleNamespace
 from typing import Any
 
 import arms
-import pytest
 from rich.console import Console
 
 import smc_mujoco as smc
@@ -121,26 +119,3 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
     ]  # what a mark means
     assert "pid 0.100 0.125 5.00 4.50 100 % 25 %" in cells[2]
     assert ["s (m/s)" in tables_of[1], "s (rad/s)" in tables_of[2]] == [True, True]
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: tables.trace_summary(VOLTS),
-        lambda: tables.scores("runs", {"none": VOLTS, "a law": VOLTS}),
-        lambda: tables.answers(["tv_rate", "peak"], {"nominal": {"none": VOLTS}}),
-        lambda: [tables.catalogue("names", [("n" * k, "what it is") for k in (1, 9)])],
-    ],
-)
-def test_no_two_cells_of_a_row_touch(make):
-    for table in make():
-        cells = [
-            [str(cell).split("\n")[0] for cell in row]
-            for row in zip(*(c.cells for c in table.columns), strict=True)
-        ]
-        lines = printed([table]).splitlines()
-        for row in cells:
-            words = [cell for cell in row if cell]
-            assert any(
-                re.search(r"\s+".join(re.escape(word) for word in words), line) for line in lines
-            ), row
