@@ -60,7 +60,8 @@ def law_from(
     if units is not None:
         if reader is not policy:
             raise ScenarioError(
-                "units are of a policy's action: a law in C, an FMU, K or compute gives N or N m, leave units out"
+                "units are of a policy's action: leave them out, as a law in C, an FMU, K or "
+                "compute gives N or N m"
             )
         options["units"] = units
     return reader(source, **options)

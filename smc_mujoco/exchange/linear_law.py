@@ -32,7 +32,7 @@ INPUTS = {  # what a controller may read -> expression of the law's measurement
 }
 DEFAULT_INPUTS = ("error", "error_rate")
 MAX_STATES = 50
-CURE = "give a TransferFunction or StateSpace of python-control, (A, B, C, D, dt), or an array of gains"
+CURE = "give a TransferFunction or StateSpace, (A, B, C, D, dt), or an array of gains"
 Matrix = tuple[tuple[float, ...], ...]
 
 
@@ -117,15 +117,13 @@ class LinearLaw:
         last = len(self.a) - 1
         lines = ["h = 0.5 * y.dt"] if self.a else []
         while last >= 0:  # blocks, from below
+            first = last
             if last > 0 and self.a[last][last - 1]:
-                first = last - 1
-            else:
-                first = last
+                first -= 1
             for k in range(first, last + 1):
                 solved = [0.0] * (last + 1) + list(self.a[k][last + 1 :])
-                lines.append(
-                    f"f{k} = memory[{k}] + h * ({_sum_of_products([(solved, 'x'), (self.b[k], 'w')])})"
-                )
+                read = _sum_of_products([(solved, "x"), (self.b[k], "w")])
+                lines.append(f"f{k} = memory[{k}] + h * ({read})")
             lines += _block_lines(self.a, first, last)
             last = first - 1
         return [
@@ -237,7 +235,7 @@ def _rows(matrix: np.ndarray) -> Matrix:
 def _system(K: Any) -> System:
     """Return what the user gave as matrices."""
     if isinstance(K, tuple | list) and len(K) in (4, 5):
-        return _matrices(K[0], K[1], K[2], K[3], K[4] if len(K) == 5 else None)
+        return _matrices(*K[:4], K[4] if len(K) == 5 else None)
     if all(hasattr(K, name) for name in "ABCD"):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     if isinstance(K, np.ndarray) and K.ndim in (1, 2):
@@ -256,7 +254,8 @@ def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
         if any(np.iscomplexobj(array) for array in arrays):
             raise ValueError
         a, b, c, d = (array.astype(float) for array in arrays)
-        b = b[:, None] if b.ndim == 1 else b
+        if b.ndim == 1:
+            b = b[:, None]
         a, b, c, d = (np.atleast_2d(array) for array in (a, b, c, d))
         if not a.size:
             a = np.zeros((0, 0))

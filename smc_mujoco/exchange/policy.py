@@ -87,9 +87,9 @@ class Policy(Uncompiled):
             return dataclasses.replace(self, act=copy.deepcopy(self.act))
         except Exception as error:
             warnings.warn(
-                f"policy {self.name!r} cannot be copied ({one_line(str(error))}), so that channels "
-                "and runs share it: give an object that copy.deepcopy copies, or a function only of "
-                "the observation",
+                f"policy {self.name!r} cannot be copied ({one_line(str(error))}), so that "
+                "channels and runs share it: give an object that copy.deepcopy copies, or a "
+                "function only of the observation",
                 stacklevel=2,
             )
             return self
@@ -306,7 +306,7 @@ def _forward(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndar
         action = module(torch.as_tensor(observation[None], dtype=dtype))
     if isinstance(action, tuple | list | dict):
         raise TypeError(
-            f"it gave a {type(action).__name__}, not an action: wrap it in one that gives only the action"
+            f"it gave a {type(action).__name__}, not an action: wrap it in one that gives only that"
         )
     return action.double().numpy()
 

@@ -33,10 +33,7 @@ PROTOTYPE = (
 LIBRARY_FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 # A library uses its own functions and data even if the C library has the same names, such as
 # remove, y0, timezone.
-if sys.platform not in ("darwin", "win32"):
-    SYMBOLIC_FLAGS = ("-Wl,-Bsymbolic",)
-else:
-    SYMBOLIC_FLAGS = ()
+SYMBOLIC_FLAGS = () if sys.platform in ("darwin", "win32") else ("-Wl,-Bsymbolic",)
 WARNING_FLAGS = ("-Wall", "-Wextra")
 # Compiler warnings that are errors here.
 STRICT_FLAGS = tuple(
@@ -47,7 +44,8 @@ ERROR = re.compile(
     r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE
 )
 NO_ROOM_WORDS = re.compile(  # what compilers and linkers say
-    "No space left on device|Disk quota exceeded|File too large|File size limit exceeded|Cannot create temporary file"
+    "No space left on device|Disk quota exceeded|File too large|File size limit exceeded|"
+    "Cannot create temporary file"
 )
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
 _count = itertools.count()
@@ -109,31 +107,23 @@ def library(
     command = compiler()
     if set('"\\\n') & set(path):
         raise ScenarioError(
-            f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
+            f"cannot include {shown(str(source))} in C: give a path without quotation marks and "
+            "backslashes"
         )
     macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT_FLAGS, "-I", str(FOLDER)]
-    files = [str(FOLDER / "glue.c"), "-o", str(target)]
+    files = [str(FOLDER / "glue.c"), "-o", str(target), *flags, "-lm"]
     try:
-        done = run_compiler(
-            [
-                *command,
-                *LIBRARY_FLAGS,
-                *SYMBOLIC_FLAGS,
-                *STRICT_FLAGS,
-                *macros,
-                *files,
-                *flags,
-                "-lm",
-            ],
-            timeout,
-        )
+        line = [*command, *LIBRARY_FLAGS, *SYMBOLIC_FLAGS, *STRICT_FLAGS, *macros, *files]
+        done = run_compiler(line, timeout)
     except TimedOut:
         raise ScenarioError(
-            f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or give timeout="
+            f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it "
+            "shorter, or give timeout="
         ) from None
     except OSError:
         raise ScenarioError(
-            f"{source.name} cannot be compiled, as there is no C compiler {command[0]!r}: install one, or set CC"
+            f"{source.name} cannot be compiled, as there is no C compiler {command[0]!r}: install "
+            "one, or set CC"
         ) from None
     if done.returncode or not target.exists():
         raise ScenarioError(_sentence(source, symbol, " ".join(command), done.stderr))
@@ -161,12 +151,12 @@ def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
         return undefined(source, symbol)
     if error is None or error["line"] is None:  # from the linker or the command itself
         lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
-        telling = [
-            line for line in lines if re.search(r"ndefined|cannot find|error:", line)
-        ] or lines
-        return f"{name} does not compile, {command} says: {telling[0].strip()}; fix it, or give other flags="
+        telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)]
+        said = (telling or lines)[0].strip()
+        return f"{name} does not compile, {command} says: {said}; fix it, or give other flags="
+    must = f"it must be {PROTOTYPE.format(symbol)}"
     if f"'{symbol}'" in what or file == "glue.c":
-        return f"{name} has another {symbol} than smc_mujoco calls: it must be {PROTOTYPE.format(symbol)}"
+        return f"{name} has another {symbol} than smc_mujoco calls: {must}"
     if what.startswith("#error"):
         wanted = what.removeprefix("#error").strip(' "')
         return f"{name} does not compile: {wanted}"

@@ -183,8 +183,8 @@ def _in_q15(law: Component) -> Component:
         law = catalogue()[Q15_LAW].bind(law.gains, warn=True)
     if law.function is not catalogue()[Q15_LAW].function:
         raise ScenarioError(
-            f"law {law.name!r} has no Q15 form: give observer_free or {Q15_LAW}, or write double or "
-            "float numbers"
+            f"law {law.name!r} has no Q15 form: give observer_free or {Q15_LAW}, or write "
+            "double or float numbers"
         )
     return law
 

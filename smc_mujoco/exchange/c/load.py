@@ -251,7 +251,7 @@ def _library(
     """
     if sys.platform == "win32":
         raise ScenarioError(
-            f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
+            f"cannot take a law from {shown(str(source))} on Windows: run it on Linux, or in WSL"
         )
     path = Path(source)
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):

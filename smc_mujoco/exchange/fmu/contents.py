@@ -15,7 +15,6 @@ the array of variables, so C reads them as an array.
 
 import dataclasses
 import functools
-import itertools
 import math
 import re
 import sys
@@ -60,15 +59,8 @@ JOINT_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "C": (units.FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
     "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
 }
-MODEL_INPUTS = {
-    "f",
-    "g",
-    "fq",
-    "gq",
-    "M",
-    "h",
-}  # of the nominal model; C and J are what coriolis and jacobian need
-REQUIRED_INPUTS = ("x", "r", "dr")  # inputs of every FMU
+# of the nominal model; C and J are what coriolis and jacobian need
+MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
     "smc_law",
@@ -149,9 +141,9 @@ class ExportedLaw:
 def variables(exported: ExportedLaw) -> list[Variable]:
     """Return the variables in the order of their value references."""
     places = exported.places
-    of_model = JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
     wanted = inputs(exported)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
+    of_model = JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
     for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
         if name in wanted:
             for index, start in _starts(name, exported).items():
@@ -162,33 +154,44 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     if exported.estimator:
         computed.append(("v_estimated", "estimated velocity", SPEED))
     for name, words, unit in computed:
-        listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
+        for place in places:
+            listed.append(Variable(name + place, "SMC_COMPUTED", words, unit))
     for i in range(exported.actuators):
         words = "command of an actuator, for u"
         listed.append(Variable(f"control[{i + 1}]", "SMC_COMPUTED", words))
     words = "bound on the magnitude of u"
     for place, bound in zip(places, exported.u_max, strict=True):
-        start = bound if math.isfinite(bound) else MAX_DOUBLE
+        start = min(bound, MAX_DOUBLE)
         listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
     for kind, part in exported.parts.items():
-        for name, value in part.gains.items():
-            indices = ("",)
-            if kind == "law" and name not in part.shared:
-                indices = places
-            for i, index in enumerate(indices):
-                listed.append(parameter(kind, part, name, gain_at(value, i), index))
+        listed += _gains(kind, part, places if kind == "law" else ("",))
     words = "control period: the law runs this often"
     listed.append(Variable("dt", "SMC_CONSTANT", words, TIME, exported.period))
     for kind, (slots, _) in exported.code.items():
-        for i in range(max(1, exported.joints)):
-            for k in range(1, slots + 1):
-                words = f"number {k} of the memory of the {kind}"
-                index = str(k)
-                if exported.joints:
-                    words += f", joint {i + 1}"
-                    index = f"{i + 1},{k}"
-                listed.append(Variable(f"{kind}.memory[{index}]", "SMC_STATE", words))
+        listed += _memory(kind, slots, exported.joints)
     return listed
+
+
+def _gains(kind: str, part: Component, places: Sequence[str]) -> Iterator[Variable]:
+    """Yield the gains of a component, each for all places unless they share it."""
+    for name, value in part.gains.items():
+        indices = places
+        if kind == "law" and name in part.shared:
+            indices = ("",)
+        for i, index in enumerate(indices):
+            yield parameter(kind, part, name, gain_at(value, i), index)
+
+
+def _memory(kind: str, slots: int, joints: int) -> Iterator[Variable]:
+    """Yield the numbers of a component's memory, for each joint."""
+    for i in range(max(1, joints)):
+        for k in range(1, slots + 1):
+            words = f"number {k} of the memory of the {kind}"
+            index = str(k)
+            if joints:
+                words += f", joint {i + 1}"
+                index = f"{i + 1},{k}"
+            yield Variable(f"{kind}.memory[{index}]", "SMC_STATE", words)
 
 
 def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
@@ -198,8 +201,8 @@ def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
     """
     if name not in ("M", "C", "J"):
         return dict.fromkeys(exported.places, float(name in ("g", "gq") and not exported.joints))
-    rows = range(1, 4 if name == "J" else exported.joints + 1)
     columns = range(1, exported.joints + 1)
+    rows = {"J": range(1, 4)}.get(name, columns)
     return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
 
 
@@ -209,14 +212,17 @@ def inputs(exported: ExportedLaw) -> set[str]:
     for _, text in exported.code.values():
         texts.append(text if exported.modelled else UNREACHED.sub(r"\1", text))
     read = reads("".join(texts))
-    wanted = {*REQUIRED_INPUTS}
+    wanted = {"x", "r", "dr"}
     if exported.estimator is None or "v" in reads(exported.code["estimator"][1]):
         wanted.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
         wanted.add("ddr")
     if exported.modelled:
         wanted |= read & MODEL_INPUTS
-        wanted |= {name for name, needs in (("C", "coriolis"), ("J", "jacobian")) if needs in read}
+        if "coriolis" in read:
+            wanted.add("C")
+        if "jacobian" in read:
+            wanted.add("J")
     return wanted | (read & {"q", "dq"})
 
 
@@ -260,7 +266,9 @@ def header(listed: Sequence[Variable], exported: ExportedLaw, identifier: str, t
     kinds = [variable.kind for variable in listed]
     memory = len(kinds) - kinds.count("SMC_STATE")
     own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
-    joints = f"\n#define {JOINTS} {exported.joints}" if exported.joints else ""
+    joints = ""
+    if exported.joints:
+        joints = f"\n#define {JOINTS} {exported.joints}"
     indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
     return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
 #ifndef SMC_CONTROLLER_H
@@ -289,12 +297,12 @@ def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str
     statements `body`.
     """
     limits = {0.0: "0.0", -math.inf: "-INFINITY"}
-    lines = (
-        f'"{v.name}", {v.kind}, {v.start!r}, {limits[v.minimum]}, {int(v.positive)}' for v in listed
-    )
-    table = "\n".join(f"    {{{line}}}," for line in lines)
-    statements = "\n".join(f"    {line}" for line in body)
-    return f"""/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */
+    table = ""
+    for v in listed:
+        numbers = f"{v.start!r}, {limits[v.minimum]}, {int(v.positive)}"
+        table += f'    {{"{v.name}", {v.kind}, {numbers}}},\n'
+    statements = "".join(f"    {line}\n" for line in body)
+    return f"""/* controller.c: estimator, surface, law and saturation, in the order of a run. */
 #include "controller.h"
 
 #include <float.h>
@@ -302,8 +310,7 @@ def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str
 #include <stddef.h>
 
 const smc_variable smc_variables[] = {{
-{table}
-}};
+{table}}};
 
 /* Returns a gain or a bound. The largest double means that there is none. */
 static double number(double x)
@@ -313,8 +320,7 @@ static double number(double x)
 
 {helpers}int smc_controller(double *value, double t)
 {{
-{statements}
-}}
+{statements}}}
 """
 
 
@@ -326,15 +332,12 @@ def helpers(exported: ExportedLaw) -> str:
     needs = reads(exported.code["law"][1])
     functions = ""
     if "coriolis" in needs:
-        given = "C" in wanted
-        if given:
+        matrix = "(void)plant, (void)w"
+        add = ""
+        if "C" in wanted:
             matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}"
-        else:
-            matrix = "(void)plant, (void)w"
-        add = (
-            "\n        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];"
-            * given
-        )
+            term = "out[i] += C[i * SMC_JOINTS + j] * w[j];"
+            add = f"\n        for (int j = 0; j < SMC_JOINTS; j++) {term}"
         functions += f"""/* out = C w */
 static void coriolis(void *plant, const double *w, double *out)
 {{
@@ -367,41 +370,42 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     """
     wanted = inputs(exported)
     many = exported.joints
+    j = ""
+    u = "[0]"
+    s = "[1]"
+    size = "2"
+    moved = ""
     if many:
-        j = "[j]"
-        u = "[j]"
+        j = u = "[j]"
         s = "[SMC_JOINTS + j]"
-    else:
-        j = ""
-        u = "[0]"
-        s = "[1]"
+        size = "2 * SMC_JOINTS"
+        moved = " + j"
 
     def value(name: str, absent: str = "0.0") -> str:
         if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
             return absent
-        return f"value[{place(name + exported.places[0])}{' + j' * bool(many)}]"
+        return f"value[{place(name + exported.places[0])}{moved}]"
 
     def for_each(lines: Iterable[str]) -> Iterable[str]:
         if not many:
             return lines
-        return itertools.chain(
-            ["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"]
-        )
+        inner = [f"    {line}" for line in lines]
+        return ["for (int j = 0; j < SMC_JOINTS; j++) {", *inner, "}"]
 
     yield from _tables(listed, exported)
     yield "smc_measurement y = {0};"
-    yield f"double out[{'2 * SMC_JOINTS' if many else 2}];"
+    yield f"double out[{size}];"
     yield "int failure;"
     yield f"y.t = t, y.dt = SMC_DT, y.model = {float(exported.modelled)!r};"
-    if needs := [
-        name for name in ("coriolis", "jacobian") if name in reads(exported.code["law"][1])
-    ]:
-        yield f"y.plant = value, {', '.join(f'y.{name} = {name}' for name in needs)};"
+    for name in ("coriolis", "jacobian"):
+        if name in reads(exported.code["law"][1]):
+            yield f"y.plant = value, y.{name} = {name};"
     yield from for_each(_measured(exported, value, j))
     if exported.of_body:
         yield "smc_errors(y.x, y.v, y.r, y.dr, y.e, y.de);"
     if many and exported.modelled and "M" in wanted:
-        yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{place('M[1,1]')} + j];"
+        first = place("M[1,1]")
+        yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{first} + j];"
     if exported.surface:
         yield from _call("surface", "&y", "surface_memory")
         yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {value('v_eq')} = out[1];"
@@ -410,7 +414,8 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
         [
             f"const double u = fmin(fmax(out{u}, -y.limit{j}), y.limit{j}), s = out{s};",
             f"{value('u')} = u, {value('s')} = s;",
-            f"if (!(isfinite(out{u}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
+            f"if (!(isfinite(out{u}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r}))",
+            "    return SMC_NOT_FINITE;",
         ]
     )
     if exported.plant:
@@ -424,15 +429,23 @@ def _tables(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     for kind, part in exported.parts.items():
         yield f"const double {kind}_gains[] = {{"
         for name in part.gains:
-            shared = f"{kind}.{plain(name)}"
-            elements = [shared] * max(1, exported.joints * (kind == "law"))
-            if shared not in names:
-                elements = [shared + place for place in exported.places]
-            yield from (f"    number(value[{place(element)}])," for element in elements)
-        yield from ("    0.0,",) if not part.gains else ()
+            element = f"{kind}.{plain(name)}"
+            elements = [element]
+            if kind == "law" and exported.joints:
+                elements *= exported.joints
+            if element not in names:
+                elements = [element + place for place in exported.places]
+            for one in elements:
+                yield f"    number(value[{place(one)}]),"
+        if not part.gains:
+            yield "    0.0,"
         yield "};"
-        first = place(f"{kind}.memory[1{',1' * bool(exported.joints)}]")
-        yield f"double *{kind}_memory = {f'&value[{first}]' if exported.code[kind][0] else 'NULL'};"
+        memory = "NULL"
+        if exported.code[kind][0]:
+            memory = f"&value[{place(f'{kind}.memory[1]')}]"
+            if exported.joints:
+                memory = f"&value[{place(f'{kind}.memory[1,1]')}]"
+        yield f"double *{kind}_memory = {memory};"
 
 
 def _measured(exported: ExportedLaw, value: Callable[..., str], j: str) -> Iterator[str]:
@@ -446,9 +459,10 @@ def _measured(exported: ExportedLaw, value: Callable[..., str], j: str) -> Itera
     if exported.estimator:
         slots = exported.code["estimator"][0]
         yield f"const smc_reading reading = {{SMC_DT, y.x{j}, {value('v')}}};"
-        yield from _call(
-            "estimator", "&reading", "estimator_memory" + f" + {slots} * j" * bool(j and slots)
-        )
+        memory = "estimator_memory"
+        if j and slots:
+            memory += f" + {slots} * j"
+        yield from _call("estimator", "&reading", memory)
         yield f"y.v{j} = {value('v_estimated')} = out[0];"
         yield f"if (!isnan(out[1])) y.a{j} = out[1];"
     else:
@@ -456,7 +470,8 @@ def _measured(exported: ExportedLaw, value: Callable[..., str], j: str) -> Itera
     yield f"y.e{j} = y.x{j} - y.r{j}, y.de{j} = y.v{j} - y.dr{j};"
     if not j:
         yield f"y.f = {value('f', 'NAN')}, y.g = {value('g', 'NAN')};"
-        yield f"y.q = {value('q')}, y.dq = {value('dq')}, y.fq = {value('fq')}, y.gq = {value('gq')};"
+        yield f"y.q = {value('q')}, y.dq = {value('dq')};"
+        yield f"y.fq = {value('fq')}, y.gq = {value('gq')};"
     elif exported.modelled:
         yield f"y.h{j} = {value('h')}, y.g{j} = {value('g')};"
     else:

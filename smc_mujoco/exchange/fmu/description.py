@@ -70,7 +70,8 @@ def model_description(
         instantiationToken=token,
         description=summary(exported),
         generationTool=f"smc_mujoco {__version__}",
-        license="use without restriction, without warranty; the headers of FMI under the 2-clause BSD licence",
+        license="use without restriction, without warranty; the headers of FMI under the 2-clause "
+        "BSD licence",
         variableNamingConvention="structured",
     )
     xml.SubElement(
@@ -165,11 +166,7 @@ def summary(exported: ExportedLaw) -> str:
     """Return the controller in one line."""
     parts = [f"law {exported.law}"]
     if exported.surface:
-        parts += [f"surface {exported.surface}"]
-    else:
-        parts += []
+        parts.append(f"surface {exported.surface}")
     if exported.estimator:
-        parts += [f"velocity estimator {exported.estimator}"]
-    else:
-        parts += []
+        parts.append(f"velocity estimator {exported.estimator}")
     return f"Sliding-mode controller: {', '.join(parts)}; every {exported.period:g} s"

@@ -37,10 +37,8 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
-FOLDER, MIXED_JOINTS = (
-    Path(__file__).parent,
-    "mixed",
-)  # kind of joints of which some turn and some slide: without units
+FOLDER = Path(__file__).parent
+MIXED_JOINTS = "mixed"  # kind of joints of which some turn and some slide: without units
 FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 COMPILE_TIMEOUT = 120.0  # s
 BOUND = Number(above=0.0, infinite=True)  # on |u| of a joint
@@ -109,16 +107,16 @@ def law_to_fmu(
     if isinstance(law, Scenario):
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:
-        joint = "hinge" if joint is None else joint
+        joint = joint or "hinge"
     exported = _exported(law, **chosen)
-    joint = MIXED_JOINTS if exported.of_body else joint
-    plain = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
-    # of C
-    if plain[:1].isalpha():
-        identifier = plain
-    else:
-        identifier = f"law_{plain}".rstrip("_")
-    target = with_ending(path if path is not None else f"{identifier}.fmu", ".fmu")
+    if exported.of_body:
+        joint = MIXED_JOINTS
+    identifier = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
+    if not identifier[:1].isalpha():
+        identifier = f"law_{identifier}".rstrip("_")  # of C
+    if path is None:
+        path = f"{identifier}.fmu"
+    target = with_ending(path, ".fmu")
     files = _files(exported, identifier, joint)
     if binary:
         files |= _binary(files, identifier)
@@ -127,9 +125,8 @@ def law_to_fmu(
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
     ):
         for name, content in files.items():
-            archive.writestr(
-                zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED
-            )  # without the time
+            about = zipfile.ZipInfo(name)  # without the time
+            archive.writestr(about, content, zipfile.ZIP_DEFLATED)
     return target
 
 
@@ -144,22 +141,21 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
         )
     s = scenario.resolved
     limits = set(scenario.limits)
-    several = len(limits) > 1 and not s.law.joint
-    if several or s.feedforward is not None or s.stepper is not None:
-        if several:
-            what = "a bound for each channel"
-        elif s.feedforward:
-            what = "a feedforward"
-        else:
-            what = "a Stepper"
+    what = ""
+    if len(limits) > 1 and not s.law.joint:
+        what = "a bound for each channel"
+    elif s.feedforward is not None:
+        what = "a feedforward"
+    elif s.stepper is not None:
+        what = "a Stepper"
+    if what:
         raise ScenarioError(
             f"the scenario has {what}, which an FMU cannot have: give its law, with u_max="
         )
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
+    joint = "slide" if s.plant.unit == "m" else "hinge"
     if s.law.joint and s.plant.mixed:
         joint = MIXED_JOINTS
-    else:
-        joint = "slide" if s.plant.unit == "m" else "hinge"
     if s.law.joint:
         plant = s.plant if s.plant.pose else None
         return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": plant}, joint
@@ -179,6 +175,8 @@ def _exported(
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
     sliding = coerce.surface("surface", surface, None)
     estimator = coerce.velocity("velocity", velocity, None)
+    if estimator is not None and estimator.name == "measured":
+        estimator = None
     chosen = writable(law)
     count = number_of_joints(chosen, joints)
     if sliding is not None and count:
@@ -194,8 +192,8 @@ def _exported(
     return ExportedLaw(
         law=chosen,
         surface=sliding,
-        estimator=None if estimator is None or estimator.name == "measured" else estimator,
-        period=1e-3 if control_period is None else control_period,
+        estimator=estimator,
+        period=control_period or 1e-3,
         u_max=_bounds(math.inf if u_max is None else u_max, count),
         modelled=chosen.requires_model or model == "nominal",
         joints=count,
@@ -219,10 +217,10 @@ def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]
     listed = contents.variables(exported)
     if joint == MIXED_JOINTS:
         joint = "hinge"  # of which no unit is left but powers of the second
-        listed = [
-            v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None)
-            for v in listed
-        ]
+        for i, variable in enumerate(listed):
+            unit = variable.unit
+            if unit and (unit.force or unit.position):
+                listed[i] = variable._replace(unit=None)
     law = with_head(exported.law, "double", *exported.code["law"], exported.joints)
     files = {
         "controller.c": contents.source(
@@ -270,31 +268,23 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
                 (folder / name).write_text(text, encoding="utf-8")
         compiled = [str(folder / name) for name in sources if name.endswith(".c")]
         try:
-            line = [
-                *command,
-                *build.LIBRARY_FLAGS,
-                *BINARY_FLAGS,
-                *compiled,
-                "-o",
-                str(target),
-                "-lm",
-            ]
+            flags = [*build.LIBRARY_FLAGS, *BINARY_FLAGS]
+            line = [*command, *flags, *compiled, "-o", str(target), "-lm"]
             done = build.run_compiler(line, COMPILE_TIMEOUT)
         except TimedOut:
             raise ScenarioError(
-                f"{command[0]} takes more than {COMPILE_TIMEOUT:g} s to compile the FMU: set another compiler in CC, "
-                "or leave the binary out (binary=False, --no-binary)"
+                f"{command[0]} takes more than {COMPILE_TIMEOUT:g} s to compile the FMU: set "
+                "another compiler in CC, or leave the binary out (binary=False, --no-binary)"
             ) from None
         except OSError:
             raise ScenarioError(
-                f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install one, set CC, or leave "
-                "the binary out (binary=False, --no-binary)"
+                f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install "
+                "one, set CC, or leave the binary out (binary=False, --no-binary)"
             ) from None
         if done.returncode or not target.exists():
-            lines = [line for line in done.stderr.splitlines() if "error" in line] or [
-                "it says nothing"
-            ]
+            lines = [line for line in done.stderr.splitlines() if "error" in line]
+            said = lines[0] if lines else "nothing"
             raise ScenarioError(
-                f"the FMU does not compile, {command[0]} says: {lines[0]}; set another compiler in CC"
+                f"the FMU does not compile, {command[0]} says: {said}; set another compiler in CC"
             )
         return {f"binaries/{machine}/{identifier}{suffix}": target.read_bytes()}

@@ -137,9 +137,7 @@ class FmuLaw(Uncompiled):
 
 
 def steps(period: float | None, dt: float) -> tuple[int, float]:
-    """Return after how many control periods of dt the FMU with a period steps, and how long each of
-    its steps is, s.
-    """
+    """Return after how many control periods of dt, s, the FMU steps, and how long a step is, s."""
     if period is None:
         return 1, dt
     slower = period / dt
@@ -149,7 +147,8 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
     if abs(faster - round(faster)) < PERIOD_TOLERANCE * faster:
         return 1, dt / round(faster)
     raise ScenarioError(
-        f"the FMU steps every {period:g} s and the law runs every {dt:g} s: give control_period={period:g}"
+        f"the FMU steps every {period:g} s and the law runs every {dt:g} s: give "
+        f"control_period={period:g}"
     )
 
 
@@ -229,7 +228,7 @@ def law_from_fmu(
     law = FmuLaw(
         path=str(file.resolve()),
         digest=digest,
-        name=errors.name("name", name if name is not None else re.sub(r"\W", "_", file.stem)),
+        name=errors.name("name", name or re.sub(r"\W", "_", file.stem)),
         inputs=tuple(inputs.items()),
         outputs=tuple(outputs.values()),
         constants=tuple(

@@ -134,7 +134,9 @@ class Slave:
     def _log(self, *words: Any) -> None:
         """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""
         text = words[-1]
-        self.said.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+        if isinstance(text, bytes):
+            text = text.decode(errors="replace")
+        self.said.append(str(text))
 
 
 def worker(job: Mapping[str, Any], report: Callable) -> None:

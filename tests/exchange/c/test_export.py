@@ -1,4 +1,4 @@
-"""The library's laws written out as C: clean, small, and to the last bit what they are in Python."""
+"""The library's laws written out as C: clean, small, and bit for bit what they are in Python."""
 
 import contextlib
 import ctypes
@@ -451,7 +451,8 @@ def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
 
 
 def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
-    one = "@smc.law_function(gains={'k': 2.0})\ndef mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
+    one = "@smc.law_function(gains={'k': 2.0})\n"
+    one += "def mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
     (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{one}")
     with pytest.raises(SystemExit) as end:
         cli.main(["export", str(file), str(tmp_path / "a.c"), "--gains", "k=4"])
