@@ -41,9 +41,9 @@ from smc_mujoco.common import lazy
 from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
 
-_SHELF = lazy.shelf(__name__)
-__getattr__ = _SHELF.getattr
-__dir__ = _SHELF.dir
-__all__ = list(_SHELF.origins)
+_LAZY = lazy.lazy_module(__name__)
+__getattr__ = _LAZY.getattr
+__dir__ = _LAZY.dir
+__all__ = list(_LAZY.origins)
 
 registration.register_when_imported()

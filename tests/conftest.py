@@ -1,8 +1,9 @@
 """What the tests share: this package's plugin, also where it is not installed, and pytest's for
 testing plugins.
 
-    pytest --quick            # the first case of each test, in files that are marked quick; without the slow ones
-    pytest -m "not slow"      # all but the tests of over 0.3 s that run no line which faster ones do not
+    pytest --quick            # the first case of each test, in files that are marked quick
+    pytest -m "not slow"      # without tests of over 0.3 s whose lines faster ones run, too
+    pytest -k NAME            # only files that may hold the name are imported
 
 Compiled code is kept in one folder, so that all workers, all child processes, and copies of the
 package that tests install elsewhere compile a function once. Bytecode is kept too: otherwise each

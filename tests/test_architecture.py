@@ -64,7 +64,7 @@ SHELVES = {
     "design",
     "fidelity",
 }  # modules of public names, which anything may import
-PUBLIC = {*smc._SHELF.origins, *smc._SHELF.modules}
+PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 TEXTS = [

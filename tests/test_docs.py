@@ -53,12 +53,12 @@ def test_help_lists_every_public_name_once_and_those_of_a_first_script_first(kno
             listed.append(name)
     assert sorted(listed) == sorted(smc.__all__)
     assert sum(len(names) for names in list(tasks.values())[:5]) in range(35, 45)
-    assert set(re.findall(r"`smc\.(\w+)`", smc.__doc__ or "")) == set(smc._SHELF.modules)
+    assert set(re.findall(r"`smc\.(\w+)`", smc.__doc__ or "")) == set(smc._LAZY.modules)
 
 
 def test_the_reference_has_every_public_name_and_each_entry_once(known):
     named = re.findall(r"^::: (\S+)$", "".join(known.reference().values()), re.MULTILINE)
-    assert {f"{module}.{name}" for name, module in smc._SHELF.origins.items()} <= set(named)
+    assert {f"{module}.{name}" for name, module in smc._LAZY.origins.items()} <= set(named)
     for shelf in known.SHELVES:
         module = getattr(smc, shelf)
         assert {getattr(module, name) for name in module.__all__} <= {*map(pydoc.locate, named)}

@@ -15,7 +15,7 @@ NAMES = re.compile(r"^from (\S+) import (\w+) as \2$", re.MULTILINE)
 ALIASES = re.compile(r"^(\w+) = (smc_mujoco\.\S+)$", re.MULTILINE)
 
 
-class Shelf(NamedTuple):
+class LazyModule(NamedTuple):
     """What a package's `__init__.py` defines; `modules` are public modules, by the names that they
     have here.
     """
@@ -26,7 +26,7 @@ class Shelf(NamedTuple):
     modules: dict[str, str]  # public module -> its full name
 
 
-def shelf(package: str) -> Shelf:
+def lazy_module(package: str) -> LazyModule:
     """Return the public names of a package, which `__init__.pyi` beside its `__init__.py` lists for
     type checkers, too.
 
@@ -53,4 +53,4 @@ def shelf(package: str) -> Shelf:
     def names() -> list[str]:
         return sorted({*origins, *modules, "__doc__"})
 
-    return Shelf(imported, names, origins, modules)
+    return LazyModule(imported, names, origins, modules)

@@ -2,7 +2,7 @@
 
 from smc_mujoco.common import lazy
 
-_SHELF = lazy.shelf(__name__)
-__getattr__ = _SHELF.getattr
-__dir__ = _SHELF.dir
-__all__ = list(_SHELF.origins | _SHELF.modules)
+_LAZY = lazy.lazy_module(__name__)
+__getattr__ = _LAZY.getattr
+__dir__ = _LAZY.dir
+__all__ = list(_LAZY.origins | _LAZY.modules)

@@ -59,7 +59,8 @@ MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis
-    actuator_force qfrc_constraint qfrc_bias qfrc_spring qfrc_passive qfrc_actuator qLDiagInv dof_frictionloss actuator_user body_user""",
+    actuator_force qfrc_constraint qfrc_bias qfrc_spring qfrc_passive qfrc_actuator qLDiagInv
+    dof_frictionloss actuator_user body_user""",
 )
 
 

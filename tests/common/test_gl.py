@@ -218,11 +218,12 @@ PICTURE = """
 import sys, threading, mujoco
 held = dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context))
 from smc_mujoco.common import gl
-model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
+text = "<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>"
+model = mujoco.MjModel.from_xml_string(text)
 renderer = gl.renderer(model, 48, 64)
 renderer.update_scene(mujoco.MjData(model))
 assert renderer.render().shape == (48, 64, 3)
-assert dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context)) == held, "something is left in MuJoCo"
+assert dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context)) == held
 threading.keep = gl.renderer(model)  # closed by nobody, and freed after MuJoCo's modules
 """
 

@@ -50,7 +50,7 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
     assert laws[0] is not laws[1]
 
 
-def test_code_is_kept_if_no_other_process_can_number_a_function_of_it_alike_and_the_linker_adds_no_address():
+def test_code_is_kept_if_no_other_process_numbers_a_function_alike_and_no_address_is_added():
     own = f"f_B1v{Numbers.FIRST}"
     numbas = "f_B1v7"
     for names_of, declared, filled, kept in (
@@ -86,10 +86,8 @@ def test_a_private_name_of_numba_exists(thing, attributes):
 
 
 def test_what_is_written_for_numba_s_private_names_are_its_own():
-    assert (internals.UNRESOLVED, internals.DYNAMIC_MODULE) == (
-        RuntimeLinker.PREFIX,
-        utils._dynamic_modname,
-    )
+    assert RuntimeLinker.PREFIX == internals.UNRESOLVED
+    assert internals.DYNAMIC_MODULE == utils._dynamic_modname
 
 
 def test_private_names_of_numba_stand_in_one_module():

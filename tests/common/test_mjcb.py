@@ -31,7 +31,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.Plain
 MODEL = """
 <mujoco>
   <worldbody>
-    <body><joint name="j" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03"/></body>
+    <body><joint name="j" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03"/></body>
   </worldbody>
   <actuator><motor joint="j"/></actuator>
 </mujoco>

@@ -386,7 +386,8 @@ import concurrent.futures, multiprocessing, pickle, sys
 import smc_mujoco as smc
 assert "my_smc_package" not in sys.modules
 if __name__ == "__main__":
-    runs = smc.grid(["sprung_cart"], ["arctan_switching", "classical"], ["nominal"], 2, "default", 0.1)
+    laws = ["arctan_switching", "classical"]
+    runs = smc.grid(["sprung_cart"], laws, ["nominal"], 2, "default", 0.1)
     assert pickle.loads(pickle.dumps(runs)) == runs
     spawn = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=spawn) as pool:

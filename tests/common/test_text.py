@@ -96,6 +96,7 @@ def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
 
 def test_every_character_that_latex_reads_is_written_out():
     assert tabular.tex("a^-12 ⁰₉ \\~^&%$#_{}<|>Ωε–·×±−′″") == (
-        r"a$^{-12}$ $^0$$_9$ \textbackslash{}\textasciitilde{}\textasciicircum{}\&\%\$\#\_\{\}$<$$|$$>$$\Omega$"
+        r"a$^{-12}$ $^0$$_9$ \textbackslash{}\textasciitilde{}\textasciicircum{}"
+        r"\&\%\$\#\_\{\}$<$$|$$>$$\Omega$"
         r"$\varepsilon$--$\cdot$$\times$$\pm$$-$$'$$''$"
     )

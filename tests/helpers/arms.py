@@ -27,7 +27,10 @@ ARM = """
         </body>
       </body>
     </body>
-    <body pos="3 0 0"><joint name="apart" axis="0 1 0"/><geom fromto="0 0 0 0 0 -1" mass="1"/></body>
+    <body pos="3 0 0">
+      <joint name="apart" axis="0 1 0"/>
+      <geom fromto="0 0 0 0 0 -1" mass="1"/>
+    </body>
   </worldbody>
   <actuator>
     <motor joint="turn"/><motor joint="lift" gear="5"/><motor joint="reach"/><motor joint="apart"/>

@@ -4,9 +4,14 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.certificates.certificate import Certificate
 
 LEVELS = {
-    "x": [0.0, 1.0, 2.0], "s": [-2.0, 0.0, 2.0], "W": [[0.5, 0.0, 0.5], [0.75, 0.25, 0.5], [1.0, 1.0, 1.0]],
-    "start": [0.5, 0.0], "inner": 0.1, "outer": 0.6, "bound": 0.3,
-}  # fmt: skip
+    "x": [0.0, 1.0, 2.0],
+    "s": [-2.0, 0.0, 2.0],
+    "W": [[0.5, 0.0, 0.5], [0.75, 0.25, 0.5], [1.0, 1.0, 1.0]],
+    "start": [0.5, 0.0],
+    "inner": 0.1,
+    "outer": 0.6,
+    "bound": 0.3,
+}
 
 
 def part(theorem, margins, **data):

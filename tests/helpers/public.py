@@ -7,7 +7,7 @@ import smc_mujoco as smc
 
 def public_names(text: str) -> list[str]:
     """Return what stands after each "smc." in a text: a name, or a name of one of its modules."""
-    modules = "|".join(smc._SHELF.modules)
+    modules = "|".join(smc._LAZY.modules)
     return re.findall(rf"\bsmc\.((?:(?:{modules})\.)?\w+)", text)
 
 

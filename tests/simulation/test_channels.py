@@ -17,8 +17,10 @@ SINE = smc.Sine(0.3, 4.0)
 MOVE = smc.signals.MinimumJerk(0.4, 0.01, 0.03)
 REST = smc.Constant(0.0)
 PENDULUM = """
-<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/>
-  <body pos="0 0 -1"><joint name="elbow" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/></body>
+<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0"/>
+  <geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/>
+  <body pos="0 0 -1"><joint name="elbow" axis="0 1 0"/>
+    <geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/></body>
 </body></worldbody></mujoco>
 """
 COMMON = {"duration": 0.05, "noise": smc.Noise(1e-3, 1e-2)}

@@ -25,10 +25,13 @@ ARM = """<mujoco model="arm">
   <worldbody>
     <body name="upper">
       <joint name="shoulder" type="hinge" axis="0 1 0" damping="0.1"/>
-      <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="1.0" contype="0" conaffinity="0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="1.0"
+        contype="0" conaffinity="0"/>
     </body>
   </worldbody>
-  <actuator><motor name="shoulder" joint="shoulder" ctrllimited="true" ctrlrange="-20 20"/></actuator>
+  <actuator>
+    <motor name="shoulder" joint="shoulder" ctrllimited="true" ctrlrange="-20 20"/>
+  </actuator>
 </mujoco>"""
 WORN = smc.condition(
     "worn gear",

@@ -1,7 +1,7 @@
 """The physics step of realistic runs is fine enough: halving it changes no score of a smooth law by
 3 %.
 
-    python tests/simulation/test_convergence.py    # the study as a table: every plant and part, 10 s
+    python tests/simulation/test_convergence.py    # the study as a table: every plant and part
 
 Scores are settling_time, ultimate_bound and tv_rate. A score that is nothing but rounding or creep
 is compared as if it were at its floor: 1e-4 of the run's scale for the bound, 1e-4 of u_max per

@@ -140,7 +140,9 @@ TENDON = """
     <geom type="capsule" size="0.1" fromto="0 0 0 0.4 0 0" mass="1"/>
     <body pos="0.4 0 0" gravcomp="0.5"><joint name="b" axis="0 1 0" actuatorgravcomp="{own}"/>
       <geom type="capsule" size="0.1" fromto="0 0 0 0.4 0 0" mass="1"/></body></body>
-</worldbody>{tendon}<actuator><motor name="a" joint="a"/><motor name="b" joint="b"/>{actuator}</actuator></mujoco>
+</worldbody>{tendon}<actuator>
+  <motor name="a" joint="a"/><motor name="b" joint="b"/>{actuator}
+</actuator></mujoco>
 """
 PULL = """<tendon><fixed name="t" stiffness="3" damping="1">
   <joint joint="a" coef="1"/><joint joint="b" coef="-2"/></fixed></tendon>"""
@@ -273,7 +275,8 @@ def test_a_push_gives_its_impulse_to_its_body(refused):
     """A sphere that swings freely, without gravity: l F dt of angular momentum, F dt = 2 width peak
     / pi.
     """
-    text = """<mujoco><option gravity="0 0 0"/><worldbody><body name="bob"><joint name="a" axis="0 1 0"/>
+    text = """<mujoco><option gravity="0 0 0"/><worldbody>
+      <body name="bob"><joint name="a" axis="0 1 0"/>
       <geom type="sphere" size="0.01" pos="0 0 -1" mass="2"/></body></worldbody></mujoco>"""
     plant = smc.plant_from(text, channels={"a": {"motor": True}}, name="bob")
     push = smc.signals.Push(
@@ -326,13 +329,16 @@ def test_a_joint_law_pickles_and_survives_a_file(tmp_path, arm):
 
 TWICE = """
 <mujoco><worldbody><body>
-  <joint name="a" axis="0 1 0"/><joint name="b" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1"/>
+  <joint name="a" axis="0 1 0"/><joint name="b" axis="0 1 0"/>
+  <geom type="sphere" size="0.1" pos="0 0 -1"/>
 </body></worldbody></mujoco>
 """
 WELDED = """
 <mujoco><worldbody>
-  <body name="one"><joint name="a" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1"/></body>
-  <body name="two" pos="1 0 0"><joint name="b" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1"/></body>
+  <body name="one"><joint name="a" axis="0 1 0"/>
+    <geom type="sphere" size="0.1" pos="0 0 -1"/></body>
+  <body name="two" pos="1 0 0"><joint name="b" axis="0 1 0"/>
+    <geom type="sphere" size="0.1" pos="0 0 -1"/></body>
 </worldbody><equality><weld body1="one" body2="two"/></equality></mujoco>
 """
 TORQUE = "computed_torque_sliding"

@@ -305,8 +305,10 @@ for factor in (1e-300, 1e-30, 1e-16, 1e15):  # beyond 1e15 a parameter is refuse
 for name in ("alpha", "beta", "delta"):
     for value in (-1e9, 1e9):
         assert run("none", plant=smc.plant("duffing", **{name: value})).diverged_at is not None
-        run(law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0)), plant=smc.plant("duffing", **{name: value}))
-assert run(law(lambda y, gains, memory: (math.nan, 0.0)), noise=smc.Noise(1e90, 1e90)).diverged_at == 0.0
+        in_python = law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0))
+        run(in_python, plant=smc.plant("duffing", **{name: value}))
+lost = law(lambda y, gains, memory: (math.nan, 0.0))
+assert run(lost, noise=smc.Noise(1e90, 1e90)).diverged_at == 0.0
 assert run(law(lambda y, gains, memory: memory)).diverged_at == 0.0
 print("done")
 """
@@ -317,7 +319,8 @@ import resource, smc_mujoco as smc, smc_mujoco.simulation.run
 import sys
 sys.modules["smc_mujoco.simulation.run"].BATCH_BYTES = 2**20
 def peak():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 def play(count):
     one = dict(plant="duffing", law="none", duration=0.5, integrator="Euler")
     for _ in smc.stream([smc.Scenario(**one, seed=i) for i in range(count)]):
