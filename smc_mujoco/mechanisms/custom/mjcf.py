@@ -1,9 +1,9 @@
 """Users' models: read from a file, text, MjSpec or PyMJCF, tried in a child process, checked,
 identified by a hash.
 
-A model may crash the process that compiles it, or fill its memory. So `tried` first compiles each
-model once in a child process, with bounds on time and memory. That takes some hundredths of a
-second.
+A model may crash the process that compiles it, or fill its memory. So `compile_isolated` first
+compiles each model once in a child process, with bounds on time and memory. That takes some
+hundredths of a second.
 """
 
 import dataclasses
@@ -40,7 +40,7 @@ RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 
-_tried: set[str] = set()  # hashes of models that passed
+_passed: set[str] = set()  # hashes of models that passed
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
 process.free_after_fork(_lock)
 
@@ -259,11 +259,11 @@ def fields(model: mujoco.MjModel) -> list[str]:
     return [name for name in names if isinstance(getattr(model, name), np.ndarray)]
 
 
-def tried(source: Source, timeout: float) -> None:
+def compile_isolated(source: Source, timeout: float) -> None:
     """Compile a model in a child process within a timeout, s, unless this process has done so
     before.
     """
-    if source.sha256 in _tried:
+    if source.sha256 in _passed:
         return
     with scratch() as folder, no_room():
         copies = {name: str(folder / str(i)) for i, (name, _) in enumerate(source.assets)}
@@ -284,7 +284,7 @@ def tried(source: Source, timeout: float) -> None:
                 # plugin here
                 return
             raise _complaint(source, failed, timeout) from None
-    _tried.add(source.sha256)
+    _passed.add(source.sha256)
 
 
 def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:

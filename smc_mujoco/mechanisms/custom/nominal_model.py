@@ -63,7 +63,7 @@ _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.
 # addresses of model and data, of their arrays, and of arrays of this simulation's own: the
 # channels' places, the state that was evaluated, a unit force and its acceleration.
 NOMINAL = floats(
-    (
+    [
         "n",
         "driven",
         "nv",
@@ -78,12 +78,12 @@ NOMINAL = floats(
         "v",
         "unit",
         "moved",
-    )
+    ]
 )
 # The same for M, h and g; then the tip's site or -1, whether h is of passive forces alone, and
 # whether to compute g.
 DYNAMICS = floats(
-    (
+    [
         "n",
         "nv",
         "model",
@@ -101,7 +101,7 @@ DYNAMICS = floats(
         "alone",
         "at_rest",
         "quaternion",
-    )
+    ]
 )
 # Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels
 # come first.
@@ -321,9 +321,9 @@ def native_dynamics() -> Function:
     positions, velocities, actuation = map(
         _mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation")
     )
-    kinematics, centres, inertia = map(_mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM"))
-    rates = _mujoco("mj_comVel")
-    passives = _mujoco("mj_passive")
+    kinematics, centres, inertia, rates, passives = map(
+        _mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_passive")
+    )
     newton_euler = _mujoco("mj_rne", 2)
     full = _mujoco("mj_fullM", 1)
 
@@ -349,6 +349,7 @@ def native_dynamics() -> Function:
         g = pointer(out + 8 * (n * n + n))
         for j in range(n):
             kept[j] = v[j]
+            g[j] = math.nan
             qpos[place_at(places, j).qpos] = x[j]
         if at.quaternion >= 0.0:
             first = int(at.quaternion)
@@ -365,11 +366,8 @@ def native_dynamics() -> Function:
         for i in range(n):
             for j in range(n):
                 M[i, j] = dense[place_at(places, i).qvel, place_at(places, j).qvel]
-        for j in range(n):
-            g[j] = math.nan
-        for part in range(
-            0 if at.at_rest else 1, 2
-        ):  # g, then h, so that the last velocities are those of the sample
+        # g, then h, so that the last velocities are those of the sample
+        for part in range(0 if at.at_rest else 1, 2):
             for j in range(n):
                 qvel[place_at(places, j).qvel] = part * v[j]
             if at.alone != 0.0:

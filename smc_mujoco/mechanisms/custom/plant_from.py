@@ -175,7 +175,7 @@ def plant_from(
     model in its own colours; those of several laws are mixed with the laws' colours.
     """
     source = mjcf.source(path, assets)
-    mjcf.tried(source, timeout)
+    mjcf.compile_isolated(source, timeout)
     # laws and gains refer to plants by name
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
