@@ -75,57 +75,62 @@ def scenario(motor, push, plant=PLANT, **fields):
     )
 
 
+class Generator:
+    """The pulse generator: the period of each step, for a wanted direction and rate."""
+
+    def __init__(self, ramp):
+        self.ramp = ramp
+        self.wish = (0, 0)  # direction and rate
+        self.way = 0
+        self.n = 0
+        self.period = math.inf
+
+    def next_step(self):
+        """Return the period of a step that is added, 0 for none."""
+        wanted, rate = self.wish
+        if self.way and wanted != self.way and self.n > 0:
+            self.n -= 1
+            return self.period
+        if wanted != self.way:
+            self.way = wanted
+            self.n = 0
+            self.period = math.inf
+        if not self.way:
+            return 0.0
+        if 1.0 / rate < self.period:
+            fastest = 1.0 / math.sqrt(2.0 * self.ramp * (self.n + 1))
+            self.period = min(self.period, max(1.0 / rate, fastest))
+            self.n += 1
+        elif 1.0 / rate > self.period:
+            slowest = self.period**-2 - 2.0 * self.ramp
+            self.period = 1.0 / max(rate, math.sqrt(max(slowest, 0.0)))
+            self.n -= 1
+        self.n = max(self.n, 1)
+        return self.period
+
+
 def steps_by_events(motor, commands, phase, duration):
     """Times and directions of all steps, from events in the order of time.
 
     `commands`: (time, u) of the samples.
     """
     per = motor.steps * motor.gear / math.tau
-    ramp = motor.ramp * per
+    generator = Generator(motor.ramp * per)
     speed = 0.0
-    wish = (0, 0)
     last = 0.0
     events = [(t, 0, u) for t, u in commands]
     if motor.refill:
         looks = [(k + phase) * motor.refill for k in range(math.ceil(duration / motor.refill))]
         events += [(t, 1, 0.0) for t in looks if t < duration]
     steps = []
-    way = 0
-    n = 0
-    period = math.inf
     free = 0.0
-
-    def next_step():
-        """Return the period of a step that is added, 0 for none."""
-        nonlocal way, n, period
-        wanted, rate = wish
-        if way and wanted != way and n > 0:
-            n -= 1
-            return period
-        if way and wanted != way:
-            way = 0
-        if not way:
-            way = wanted
-            n = 0
-            period = math.inf
-        if not way:
-            return 0.0
-        if 1.0 / rate < period:
-            period = min(period, max(1.0 / rate, 1.0 / math.sqrt(2.0 * ramp * (n + 1))))
-            n = n + 1
-        elif 1.0 / rate > period:
-            slowest = period**-2 - 2.0 * ramp
-            period = 1.0 / max(rate, math.sqrt(slowest) if slowest > 0.0 else 0.0)
-            n = n - 1
-        n = max(n, 1)
-        return period
 
     def add(now):
         nonlocal free
         at = max(now, free)
-        before = way
-        if length := next_step():
-            steps.append((at, way or before))
+        before = generator.way
+        if length := generator.next_step():
+            steps.append((at, generator.way or before))
             free = at + length
         return length
 
@@ -139,12 +144,9 @@ def steps_by_events(motor, commands, phase, duration):
         last = t
         rate = math.floor(abs(speed) + 1e-9)
         sign = 1 if speed >= 0.0 else -1
-        stops = abs(speed) < motor.stop_band * per or rate < 1 or wish[0] == -sign
-        wish = (0, 0) if stops else (sign, rate)
-        if i + 1 < len(events):
-            until = events[i + 1][0]
-        else:
-            until = duration
+        stops = abs(speed) < motor.stop_band * per or rate < 1 or generator.wish[0] == -sign
+        generator.wish = (0, 0) if stops else (sign, rate)
+        until = events[i + 1][0] if i + 1 < len(events) else duration
         while not motor.refill and max(free, t) < until and add(t):
             pass
     return [(t, way) for t, way in steps if t < duration]
