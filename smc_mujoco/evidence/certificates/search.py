@@ -27,14 +27,12 @@ from smc_mujoco.simulation.cfunctions import cached
 # Says of a cell (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls
 # there.
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
-Attracts = Callable[
-    [np.ndarray], bool
-]  # says of P whether z' P z surely falls where it is at most 1
-CELLS, TARGET_CELLS = (
-    110,
-    8.0,
-)  # cells on each side of 0, in x and in s; cells in half a target: chosen
-SWEEPS, SWEEP_TOLERANCE = 500, 1e-9  # of a solution
+# Says of P whether z' P z surely falls where it is at most 1.
+Attracts = Callable[[np.ndarray], bool]
+CELLS = 110  # on each side of 0, in x and in s: chosen
+TARGET_CELLS = 8.0  # in half a target: chosen
+SWEEPS = 500  # of a solution, at most
+SWEEP_TOLERANCE = 1e-9
 SMOOTHING_COUNTS = (2, 8, 24)  # how often W is smoothed, which blunts its edges: chosen
 # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
 SPEED_RATIO = 3.0
@@ -43,13 +41,7 @@ MIN_FALL_SHARE = 0.01  # least fall in a cell, as a share of the range of W' in 
 MIN_RANGE = 0.02  # range of levels that is worth a certificate: chosen
 RAMP_SHARE = 0.5  # of the target's size, over which the cost of time rises from 0 to 1: chosen
 CELL_SAMPLES = 5  # of a cell, in both directions
-TARGET_SCALES = (
-    1.0,
-    1.05,
-    1.1,
-    1.2,
-    1.35,
-)  # of the target around the linear loop's worst case: chosen
+TARGET_SCALES = 1.0, 1.05, 1.1, 1.2, 1.35  # of the linear loop's worst case: chosen
 
 
 def rest(loop: Loop, reach: float) -> float:
@@ -57,17 +49,18 @@ def rest(loop: Loop, reach: float) -> float:
     `reach`.
     """
     x = np.linspace(0.0, reach, 4001)[1:]
-    left = loop.sigma(loop.c * x) - loop.phi(x) - loop.d0
-    if not (left > 0.0).any():
+
+    def left(z: Any) -> Any:
+        return loop.sigma(loop.c * np.asarray(z)) - loop.phi(np.asarray(z)) - loop.d0
+
+    holds = left(x) > 0.0
+    if not holds.any():
         return float("nan")
-    i = int(np.argmax(left > 0.0))
+    i = int(np.argmax(holds))
     low = 0.0 if i == 0 else x[i - 1]
-    at = lambda z: float(loop.sigma(np.array(loop.c * z)) - loop.phi(np.array(z)) - loop.d0)  # noqa: E731
-    root: Any
-    if at(low) >= 0.0:
-        root = low
-    else:
-        root = brentq(at, low, x[i])
+    if left(low) >= 0.0:
+        return float(low)
+    root: Any = brentq(left, low, x[i])
     return float(root)
 
 
@@ -146,9 +139,8 @@ class Levels:
     inner: float  # level
     outer: float  # level
     bound: float  # the largest |x| in cells that the inner level reaches
-    P: (
-        tuple[float, float, float] | None
-    )  # of z' P z = P0 x^2 + 2 P1 x s + P2 s^2 on the inner set without disturbance
+    # of z' P z = P0 x^2 + 2 P1 x s + P2 s^2 on the inner set without disturbance
+    P: tuple[float, float, float] | None
 
 
 def levels(
@@ -185,15 +177,17 @@ def levels(
             smooth = np.round(_smooth(W, count, loop.switches), 7)
             grid = _Grid(loop, x, s, smooth, size if P is None or not loop.d0 else None)
             tried.append((grid, grid.window()))
-    for grid, window in sorted(tried, key=lambda pair: pair[0].worth(pair[1], start)):
-        if window and grid.bound(window) and (window := grid.surely(window, proven)):
-            if loop.d0 or P is None:
-                numbers = None
-            else:
-                numbers = (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
+    numbers = None
+    if P is not None and not loop.d0:
+        numbers = float(P[0, 0]), float(P[0, 1]), float(P[1, 1])
+    for grid, widest in sorted(tried, key=lambda pair: pair[0].worth(pair[1], start)):
+        if not widest or not grid.bound(widest):
+            continue
+        window = grid.surely(widest, proven)
+        if window:
             outer = float(f"{window[1] - 2e-6:.6f}")
-            inner = _inner(window)
             bound = grid.bound(window)
+            inner = _inner(window)
             return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=bound, P=numbers)
     return None
 
@@ -250,11 +244,8 @@ class _Grid:
         """Return the largest |x| of the cells that reach the inner level."""
         if window is None:
             return np.inf
-        return float(
-            np.broadcast_to(self.x[1:, None], self.low.shape)[self.low <= _inner(window)].max(
-                initial=0.0
-            )
-        )
+        ends = np.broadcast_to(self.x[1:, None], self.low.shape)
+        return float(ends[self.low <= _inner(window)].max(initial=0.0))
 
     def worth(
         self, window: tuple[float, float] | None, start: tuple[float, float]
@@ -262,18 +253,15 @@ class _Grid:
         """Return a key that is smaller for better levels."""
         if window is None or not self.bound(window):
             return True, np.inf
-        if start[0] >= 0.0:
-            x, s = start
-        else:
-            x = -start[0]
-            s = -start[1]
-        i = np.searchsorted(self.x, x, side="right") - 1
-        j = np.searchsorted(self.s, s, side="right") - 1
-        within = (
-            i < self.high.shape[0] and 0 <= j < self.high.shape[1] and self.high[i, j] < window[1]
-        )
-        area = float((np.diff(self.x)[:, None] * np.diff(self.s))[self.high < window[1]].sum())
-        return not within, self.bound(window) if self.loop.d0 else -area
+        side = 1.0 if start[0] >= 0.0 else -1.0
+        i = np.searchsorted(self.x, side * start[0], side="right") - 1
+        j = np.searchsorted(self.s, side * start[1], side="right") - 1
+        rows, columns = self.high.shape
+        within = i < rows and 0 <= j < columns and self.high[i, j] < window[1]
+        if self.loop.d0:
+            return not within, self.bound(window)
+        areas = np.diff(self.x)[:, None] * np.diff(self.s)
+        return not within, -float(areas[self.high < window[1]].sum())
 
     def surely(self, window: tuple[float, float], proven: Proven) -> tuple[float, float] | None:
         """Return a range of levels between which W surely falls in each cell, or None."""
@@ -291,7 +279,7 @@ class _Grid:
 
 
 def axis(reach: float, step: float) -> np.ndarray:
-    """Return 2 CELLS + 1 nodes from -reach to reach, `step` apart around 0 and ever wider outwards."""
+    """Return 2 CELLS + 1 nodes from -reach to reach, `step` apart at 0 and ever wider outwards."""
     step = min(step, reach / CELLS * 0.999)
     wide: Any = brentq(lambda a: reach / np.sinh(a) * np.sinh(a / CELLS) - step, 1e-6, 60.0)
     half = reach / np.sinh(wide) * np.sinh(wide * np.arange(CELLS + 1) / CELLS)
@@ -318,19 +306,18 @@ def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndar
         ms = S + 0.5 * step * loop.fall(X, S, d)
         px = X + step * (ms - loop.c * mx)
         ps = S + step * loop.fall(mx, ms, d)
-        if loop.switches:
-            px, ps = (
-                np.where(S == 0.0, X - step * loop.c * X, px),
-                np.where(S == 0.0, S + step * loop.fall(X, S, d), ps),
-            )
-        i, j = (np.clip(np.searchsorted(a, p) - 1, 0, a.size - 2) for a, p in ((x, px), (s, ps)))
+        if loop.switches:  # along s = 0
+            px = np.where(S == 0.0, X - step * loop.c * X, px)
+            ps = np.where(S == 0.0, S + step * loop.fall(X, S, d), ps)
+        i = np.clip(np.searchsorted(x, px) - 1, 0, x.size - 2)
+        j = np.clip(np.searchsorted(s, ps) - 1, 0, s.size - 2)
         out = (np.abs(px) > x[-1]) | (np.abs(ps) > s[-1])
         cells.append((np.where(out, -1, i), j))
         shares.append(((px - x[i]) / (x[i + 1] - x[i]), (ps - s[j]) / (s[j + 1] - s[j])))
-    W, cells, shares = np.where(cost > 0.0, 1.0, 0.0), np.array(cells), np.array(shares)
+    W = np.where(cost > 0.0, 1.0, 0.0)
     decay = np.exp(-step * cost)
     for _ in range(SWEEPS):
-        if _sweep(W, cost > 0.0, cells, shares, decay) < SWEEP_TOLERANCE:
+        if _sweep(W, cost > 0.0, np.array(cells), np.array(shares), decay) < SWEEP_TOLERANCE:
             break
     return W
 

@@ -12,13 +12,12 @@ import math
 import os
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs.rig import Rig, Values
 from smc_mujoco.simulation import coerce
@@ -162,19 +161,15 @@ def _machines(rig: Rig) -> dict[str, dict[str, Any]]:
 
 def verdict(boards: Sequence[Any]) -> str:
     """Return a line for each metric of `smc.leaderboard`: whether one law wins on every parameter
-    set.
+    set, and who wins on how many.
     """
-    return "\n".join(f"{board.metric}: {sentence(board)}" for board in boards)
-
-
-def sentence(board: Any, labels: Mapping[str, str] = frozen({})) -> str:
-    """Return whether one law wins on every parameter set, and who wins on how many.
-
-    `labels`: law -> its label.
-    """
-    count = len(board.blocks)
-    if board.winner:
-        return f"{labels.get(board.winner, board.winner)} wins on all {count} parameter sets"
-    wins = Counter(block.winner for block in board.blocks if block.winner).most_common()
-    others = [f"{labels.get(law, law)} on {number}" for law, number in wins]
-    return f"no law wins on all {count} parameter sets ({', '.join(others) or 'none on any'})"
+    lines = []
+    for board in boards:
+        count = len(board.blocks)
+        if board.winner:
+            lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
+            continue
+        wins = Counter(block.winner for block in board.blocks if block.winner).most_common()
+        others = ", ".join(f"{law} on {number}" for law, number in wins) or "none on any"
+        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
+    return "\n".join(lines)
