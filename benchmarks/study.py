@@ -62,7 +62,7 @@ def slices() -> list[list[smc.Scenario]]:
 def plain(scenarios: Sequence[smc.Scenario], threads: int) -> float:
     """Seconds of stepping the plants of these scenarios, in the same batches, without the callback."""
     spent = 0.0
-    for prepared in executors.batches(scenarios, threads):
+    for prepared in executors.batches(scenarios):
         scenario = prepared[0].scenario
         batch = plain_batch(scenario, len(prepared), min(threads, len(prepared)))
         start = time.perf_counter()

@@ -18,7 +18,7 @@ def answer(runs):
     last = list(runs.traces)[-1]
     return (
         f"the strongest gust of those tried up to which the pendulum stays off the floor: {runs.up_to(stands)}; "
-        f"after {last} {runs[last].who('ends upright', 'end upright')}"
+        f"after {last} {runs[last].who('end upright')}"
     )
 
 

@@ -14,7 +14,7 @@ import smc_mujoco as smc
 def answer(runs):
     settled = runs.those()
     return (
-        f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}; last: {runs.most('settling_time')}; "
+        f"{runs.who('settle')}; first: {runs.least('settling_time')}; last: {runs.most('settling_time')}; "
         f"of those that settle, u varies least under {settled.least('tv_rate')}, most under {settled.most('tv_rate')}"
     )
 

@@ -16,7 +16,7 @@ def gentle(trace):
 
 def answer(runs):
     return (
-        f"{runs.who('settles without a clash', 'settle without a clash', gentle)}; first of those: "
+        f"{runs.who('settle without a clash', gentle)}; first of those: "
         f"{runs.those(gentle).least('settling_time')}; hardest blow: {runs.most('peak_reaction')}"
     )
 

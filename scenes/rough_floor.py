@@ -18,7 +18,7 @@ def restarts(trace):
 def answer(runs):
     return (
         f"farthest from the centre: {runs.most('steady_error')}; nearest: {runs.least('steady_error')}; "
-        f"{runs.who('sticks and slips', 'stick and slip', restarts)}"
+        f"{runs.who('stick and slip', restarts)}"
     )
 
 

@@ -13,7 +13,7 @@ def answer(runs):
     paper = runs.only("observer_free")
     settled = runs.those()
     return (
-        f"{paper.who('settles', 'settle')} (settling time {paper.size('settling_time')}, TV rate at the end "
+        f"{paper.who('settle')} (settling time {paper.size('settling_time')}, TV rate at the end "
         f"{paper.size('tv_rate')}); first of all: {settled.least('settling_time')}; least TV rate: "
         f"{settled.least('tv_rate')}"
     )

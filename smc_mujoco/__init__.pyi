@@ -60,7 +60,7 @@ from smc_mujoco.simulation.signals import Sine as Sine
 from smc_mujoco.simulation.signals import Step as Step
 from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
-from smc_mujoco.studies.adviser import which as which
+from smc_mujoco.studies.which import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.scene import Scene as Scene

@@ -47,7 +47,7 @@ OTHERS = {  # title -> names of modules that are no public names
     evidence.certificates.certificate.Certificate
     evidence.rigs.rig.Rig
     envs.flight_env.FlightEnv
-    studies.advice.Advice
+    studies.which.Advice
     analysis.tuning.result.Tuned
     analysis.gains_for.Design
     evidence.rigs.identify.Identified

@@ -5,7 +5,7 @@ which every law ran.
 import contextlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -13,7 +13,6 @@ import numpy as np
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
-from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -25,12 +24,12 @@ EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have fou
 ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are compared
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
-# of what boards compare
-UNITS = {SETTLES: "", OBJECTIVE: "s^2"} | {metric.name: metric.unit for metric in metrics()}
+UNITS = {metric.name: metric.unit for metric in metrics()}  # of what boards compare
+UNITS |= {SETTLES: "", OBJECTIVE: "s^2"}
 GROUPS = ("plant", "condition")
-# of a description; they may differ within a cell
-LAW_ENTRIES = "law", "model", "surface", "velocity", "versions"
-GAIN_ENTRIES = ("law", "surface", "velocity")  # those of them that have gains
+# of a scenario's description: what has gains, and what else may differ within a cell
+GAIN_ENTRIES = ("law", "surface", "velocity")
+OTHER_ENTRIES = ("model", "versions")
 
 
 class Columns(Protocol):
@@ -47,29 +46,6 @@ class Columns(Protocol):
         ...
 
 
-def values(table: Columns, metric: str) -> np.ndarray:
-    """Return a metric by row: inf for a failed run, NaN where it does not apply.
-
-    "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no
-    successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
-    `Metric.absent`.
-    """
-    if metric == SETTLES:
-        name = "settling_time"
-    else:
-        name = metric
-    scores = np.array(table.column(name), float)
-    scores[np.isnan(scores)] = CATALOGUE[name].absent
-    plants = np.asarray(table.column("plant"), str)
-    missing = np.isnan(scores) & ~failed(table)
-    without_metric = set(plants[missing]) - set(plants[~missing & ~failed(table)])
-    scores[failed(table)] = np.inf
-    scores[np.isin(plants, list(without_metric))] = np.nan
-    if metric == SETTLES:
-        return np.isinf(scores).astype(float)
-    return scores
-
-
 class ByRow(NamedTuple):
     """A metric of the rows of a table, each (rows,)."""
 
@@ -79,39 +55,49 @@ class ByRow(NamedTuple):
     trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
 
 
+def values(table: Columns, metric: str) -> np.ndarray:
+    """Return a metric by row: inf for a failed run, NaN where it does not apply.
+
+    "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no
+    successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
+    `Metric.absent`.
+    """
+    name = "settling_time" if metric == SETTLES else metric
+    scores = np.array(table.column(name), float)
+    scores[np.isnan(scores)] = CATALOGUE[name].absent
+    plants = np.asarray(table.column("plant"), str)
+    lost = failed(table)
+    missing = np.isnan(scores) & ~lost
+    lacking = set(plants[missing]) - set(plants[~missing & ~lost])
+    scores[lost] = np.inf
+    scores[np.isin(plants, list(lacking))] = np.nan
+    if metric == SETTLES:
+        return np.isinf(scores).astype(float)
+    return scores
+
+
 def by_row(table: Columns, metric: str) -> ByRow:
     """Return a metric of the rows of a table, with what is charged to it."""
     name = "settling_time" if metric == SETTLES else metric
     whole = values(table, metric)
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
-    halves = np.where(np.isnan(whole), np.nan, halves)
+    halves[np.isnan(whole)] = np.nan
+    trends = _from_json(table, "trends", name, np.nan)
     if metric == SETTLES:
-        return ByRow(
-            whole,
-            np.where(np.isnan(halves), np.nan, np.isinf(halves)),
-            np.full(whole.shape, np.nan),
-        )
-    return ByRow(whole, halves, _from_json(table, "trends", name, np.nan))
+        halves = np.where(np.isnan(halves), np.nan, np.isinf(halves))
+        trends[:] = np.nan
+    return ByRow(whole, halves, trends)
 
 
 def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndarray:
     """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run
     that failed.
     """
-    try:
-        texts = table.column(column)
-    except ScenarioError:  # a table without the column
-        return np.full(len(table.column("seed")), np.nan)
-    known: dict[str, float] = {}
-    for text in {text for text in texts.tolist() if isinstance(text, str)}:
-        numbers = from_json(text)
-        if numbers:
-            known[text] = float(numbers.get(name, absent))
-        else:
-            known[text] = np.inf
-    return np.array(
-        [known[text] if isinstance(text, str) else np.nan for text in texts.tolist()], float
-    )
+    found = []
+    for text in table.column(column).tolist():
+        numbers = from_json(text) if text else {name: np.nan}
+        found.append(numbers.get(name, absent) if numbers else np.inf)
+    return np.array(found, float)
 
 
 def failed(table: Columns) -> np.ndarray:
@@ -124,14 +110,11 @@ def failures(table: Columns) -> list[str]:
     """Return a sentence for each law with failed runs: how many, and how the first one failed."""
     laws = np.asarray(table.column("law"), str)
     lost = failed(table)
-    how = table.column("failure")
     sentences = []
     for law in dict.fromkeys(laws[lost].tolist()):
-        its = how[lost & (laws == law)]
-        runs = counted(int((laws == law).sum()), "run")
-        sentences.append(
-            f"{law} failed in {len(its)} of {runs}, the first: {one_line(its[0] or 'it diverged')}."
-        )
+        how = table.column("failure")[lost & (laws == law)]
+        first = one_line(how[0] or "it diverged")
+        sentences.append(f"{law} failed in {len(how)} of {sum(laws == law)} runs, first: {first}.")
     return sentences
 
 
@@ -159,30 +142,26 @@ class Group:
         self, name: Mapping[str, str], rows: np.ndarray, columns: Mapping[str, np.ndarray]
     ):
         self.name = name  # the plant that they share, or plant and condition, as column -> value
-        laws, law = np.unique(columns["law"], return_inverse=True)
         keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
-        # names; (plant, condition)
-        self.laws, self.blocks = tuple(laws.tolist()), tuple(dict.fromkeys(keys))
-        index = {key: i for i, key in enumerate(self.blocks)}
+        self.blocks = tuple(dict.fromkeys(keys))  # (plant, condition)
+        laws, law = np.unique(columns["law"], return_inverse=True)
+        self.laws = tuple(laws.tolist())
+        block = [self.blocks.index(key) for key in keys]
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
-        cells = law, np.array([index[key] for key in keys]), seed
-        # the run's row in the table; a number equal for runs that differ by rounding alone; one
-        # equal for equal gains
-        self.rows, self.outcome, self.sets = np.full(
-            (3, len(laws), len(self.blocks), len(numbers)), -1
-        )
-        if (twice := np.bincount(np.ravel_multi_index(cells, self.rows.shape)) > 1).any():
-            a, b, c = np.unravel_index(int(np.argmax(twice)), self.rows.shape)
-            cell = f"{laws[a]} on {', '.join(self.blocks[b])}, seed {numbers[c]}"
-            raise ScenarioError(
-                f"the table has several runs of {cell}: give those of one set of gains and one "
-                "duration"
-            )
-        self.rows[cells], self.outcome[cells], self.sets[cells] = (
-            rows,
-            columns["outcome"],
-            columns["sets"],
-        )
+        empty = np.full((len(laws), len(self.blocks), len(numbers)), -1)
+        self.rows = empty.copy()  # the run's row in the table
+        self.outcome = empty.copy()  # a number equal for runs that differ by rounding alone
+        self.sets = empty.copy()  # a number equal for equal gains
+        for i, cell in enumerate(zip(law, block, seed, strict=True)):
+            if self.rows[cell] >= 0:
+                where = ", ".join(keys[i])
+                raise ScenarioError(
+                    f"the table has several runs of {laws[law[i]]} on {where}, seed "
+                    f"{numbers[seed[i]]}: give those of one set of gains and one duration"
+                )
+            self.rows[cell] = rows[i]
+            self.outcome[cell] = columns["outcome"][i]
+            self.sets[cell] = columns["sets"][i]
 
     @property
     def common(self) -> np.ndarray:
@@ -196,97 +175,84 @@ class Group:
 
     def scores(self, by_row: ByRow) -> Scores:
         """Return the scores of the laws in the blocks in which a metric applies."""
-        cube, *charged = (np.where(self.rows >= 0, of_row[self.rows], np.nan) for of_row in by_row)
+        cube, halves, trends = (np.where(self.rows >= 0, row[self.rows], np.nan) for row in by_row)
         if np.isnan(cube).all():
             return Scores([], {}, {}, {}, {}, {})
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
-            laws = ", ".join(self.laws)
             where = ", ".join(self.name.values())
             raise ScenarioError(
-                f"{laws} have no run of {where} in common: run them in the same conditions and "
-                "seeds"
+                f"{', '.join(self.laws)} have no run of {where} in common: run them in the same "
+                "conditions and seeds"
             )
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks = np.flatnonzero(common.any(axis=1))
-        seeds = np.flatnonzero(common.any(axis=0))
-        cubes = cube, self.outcome, self.sets, *charged
-        parts = (dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in cubes)
+        kept = np.ix_(range(len(self.laws)), blocks, np.flatnonzero(common.any(axis=0)))
+        parts = []
+        for values in (cube, self.outcome, self.sets, halves, trends):
+            parts.append(dict(zip(self.laws, values[kept], strict=True)))
         return Scores(blocks.tolist(), *parts)
 
 
-def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
+def groups(table: Columns, by: Sequence[str]) -> list[Group]:
     """Return the groups of a table, one for each plant, or for each plant and condition, in the
     order of its rows.
     """
     if tuple(items_of("by", by)) not in (GROUPS[:1], GROUPS):
         raise ScenarioError(f"by is {shown(by)}: give ('plant',) or ('plant', 'condition')")
     columns = {name: np.asarray(table.column(name), str) for name in (*GROUPS, "law")}
-    seeds = np.asarray(table.column("seed"), int)
-    if not seeds.size:
+    columns["seed"] = np.asarray(table.column("seed"), int)
+    if not columns["seed"].size:
         raise ScenarioError("the table has no runs: run a study first")
-    columns |= {"seed": seeds, "outcome": _outcomes(table)}
+    columns["outcome"] = _outcomes(table)
     columns["sets"] = _checked_sets(table, columns)
     rows_of: dict[tuple[str, ...], list[int]] = {}
-    for row in range(seeds.size):
-        rows_of.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
+    for row, key in enumerate(zip(*(columns[name].tolist() for name in by), strict=True)):
+        rows_of.setdefault(key, []).append(row)
+    made = []
     for key, rows in rows_of.items():
-        of_group = {name: values[rows] for name, values in columns.items()}
-        yield Group(dict(zip(by, key, strict=True)), np.array(rows), of_group)
+        of_group = {name: column[rows] for name, column in columns.items()}
+        made.append(Group(dict(zip(by, key, strict=True)), np.array(rows), of_group))
+    return made
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return a number for each row, equal for equal gains; refuse runs of a cell that differ in
     more than the law.
     """
-    try:
-        texts = table.column("scenario")
-    except ScenarioError:
-        return np.zeros(columns["seed"].size, np.int64)
-    cells = list(zip(columns["plant"], columns["condition"], columns["seed"].tolist(), strict=True))
-    first: dict[tuple, tuple[str, dict[str, Any]]] = {}
-    known_gains: dict[str, int] = {}
     sets = []
-    for cell, law, text in zip(cells, columns["law"], texts, strict=True):
-        conditions = json.loads(text)
-        of_law = {name: conditions.pop(name, None) for name in LAW_ENTRIES}
-        sets.append(
-            known_gains.setdefault(
-                json.dumps({name: of_law[name] for name in GAIN_ENTRIES}), len(known_gains)
-            )
-        )
-        # models are identified by their contents
-        conditions["plant"].get("mjcf", {}).pop("path", None)
-        first_law, expected = first.setdefault(cell, (law, conditions))
-        if differing := [
-            name for name in expected if expected[name] != conditions.get(name, expected[name])
-        ]:
-            what = f"{', '.join(differing)} of {first_law} and {law} differ"
-            where = f"{cell[0]}, {cell[1]}, seed {cell[2]}"
+    first: dict[tuple, tuple[str, dict[str, Any]]] = {}
+    known: dict[str, int] = {}
+    names = "plant", "condition", "seed", "law"
+    runs = zip(*(columns[name].tolist() for name in names), table.column("scenario"), strict=True)
+    for *cell, law, text in runs:
+        about = json.loads(text)
+        gains = json.dumps([about.pop(name, None) for name in GAIN_ENTRIES])
+        sets.append(known.setdefault(gains, len(known)))
+        for name in OTHER_ENTRIES:
+            about.pop(name, None)
+        about["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
+        first_law, expected = first.setdefault(tuple(cell), (law, about))
+        if differing := [name for name in expected if expected[name] != about.get(name)]:
             raise ScenarioError(
-                f"runs of {where} are not alike: {what}: give runs that differ only in the law"
+                f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: "
+                f"{', '.join(differing)} of {first_law} and {law} differ: give runs that differ "
+                "only in the law"
             )
     return np.array(sets, np.int64)
 
 
 def _outcomes(table: Columns) -> np.ndarray:
-    """Return a number for each row: the same for runs whose metrics are all equal up to
-    rounding.
-    """
-    columns = []
-    for name in [*(metric.name for metric in metrics()), "diverged_at"]:
-        with contextlib.suppress(ScenarioError):  # a metric that is newer than the table
-            columns.append(np.array(table.column(name), float))
+    """Return a number for each row: equal for runs whose metrics are all equal up to rounding."""
+    columns = [np.array(table.column(name), float) for name in (*CATALOGUE, "diverged_at")]
     # to 20 binary digits, and below 1e-9 to 0
     share, exponent = np.frexp(np.stack(columns, axis=1))
     with np.errstate(over="ignore", invalid="ignore"):
-        numbers = np.ascontiguousarray(np.ldexp(np.round(share * 2**20), exponent - 20))
+        numbers = np.ldexp(np.round(share * 2**20), exponent - 20)
     numbers[np.abs(numbers) < ROUNDING] = 0.0
-    numbers[np.isnan(numbers)] = math.nan  # a single bit pattern
-    return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[
-        1
-    ].ravel()
+    numbers[np.isnan(numbers)] = -np.inf  # which no metric is; NaN would differ from itself
+    return np.unique(numbers, axis=0, return_inverse=True)[1].ravel()
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
@@ -305,25 +271,20 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not
     known.
     """
-    known = [catalogue().get(plant), *(one.plant for one in ran if one)]
-    return next((one.unit for one in known if one), "")
+    known = [catalogue().get(plant), *(scenario.plant for scenario in ran if scenario)]
+    return next((machine.unit for machine in known if machine), "")
 
 
 def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
-    """Return law -> sources of its gains in some rows, by default in all; {} for a table without
-    these columns.
-    """
-    try:
-        columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
-    except ScenarioError:
-        return {}
-    by_law: dict[str, list[Source]] = {}
-    every = zip(*(column if rows is None else column[rows] for column in columns), strict=True)
-    for law, kind, search in sorted(dict.fromkeys(every), key=str):
-        by_law.setdefault(law, []).append(
-            restore({"kind": kind, "search": search and json.loads(search)})
-        )
-    return {law: tuple(known) for law, known in by_law.items()}
+    """Return law -> sources of its gains in some rows, by default in all."""
+    columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
+    if rows is not None:
+        columns = [column[rows] for column in columns]
+    by_law: dict[str, tuple[Source, ...]] = {}
+    for law, kind, search in sorted(set(zip(*columns, strict=True)), key=str):
+        about = {"kind": kind, "search": search and json.loads(search)}
+        by_law[law] = (*by_law.get(law, ()), restore(about))
+    return by_law
 
 
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
@@ -347,21 +308,16 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     driven = [group for group in channel_groups(scenario) if group.driven]
     T = scenario.duration
     # a free body may rest anywhere
-    if scenario.plant.pose:
-        rest = scenario.plant.rest
-    else:
-        rest = (0.0,) * scenario.plant.n
-    off = [abs(x - r) for x, r in zip(scenario.resolved.x0, rest, strict=True)]
-    start = max((off[i] for group in driven for i in group.channels), default=0.0)  # X0
+    rest = scenario.plant.rest if scenario.plant.pose else np.zeros(scenario.plant.n)
+    off = np.abs(np.subtract(scenario.resolved.x0, rest))
+    start = max((float(off[i]) for group in driven for i in group.channels), default=0.0)  # X0
     least = eps * start
+    seen = max(scenario.noise.position, least)
     if scenario.sensor:
-        counts = [scenario.sensor.quantum(group.unit == "rad") / 2 for group in driven]
-    else:
-        counts = []
-    seen = max(scenario.noise.position, *counts, least)
-    u = MIN_COMMAND_SHARE * max(
-        (bound for bound in scenario.limits if math.isfinite(bound)), default=0.0
-    )
+        for group in driven:
+            seen = max(seen, scenario.sensor.quantum(group.unit == "rad") / 2)
+    bounds = [bound for bound in scenario.limits if math.isfinite(bound)]
+    u = MIN_COMMAND_SHARE * max(bounds, default=0.0)
     by_unit = {
         "s": scenario.control_period,
         "{x}": seen if entry.late else least,

@@ -44,15 +44,15 @@ No winner. Two laws are level only if there are 12 units or more and the interva
 the pairs' level, lies within 10 %. Otherwise one cannot tell, and `least_visible_lead` says which
 lead would have been seen.
 
-A block without a test has one value of each law, which is no sample. There a law is better if d
-exceeds -log(1 - r). The block belongs to neither family. A law with a run that failed, or has no
-value, wins nothing. In every order the laws with fewer such runs come first.
+A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such
+runs come first.
 
 A law is among the best if no other is better. One exception: where another law's median is
 relevantly lower, and two laws have too few units for any verdict, the law is undecided, and not
 among the best.
 """
 
+import copy
 import functools
 import math
 from collections.abc import Mapping, Sequence
@@ -98,7 +98,6 @@ class Effect(NamedTuple):
     ahead: int  # number of units in which the law is better by more than what is relevant
     samples: int  # number of units
     sets: bool  # whether the units are sets of gains; otherwise they are seeds
-    visible: float  # the least lead that would have been seen, as a share; 1 if none would
 
 
 class Limits(NamedTuple):
@@ -114,14 +113,16 @@ class Limits(NamedTuple):
 class Comparison:
     """Every law compared with every other in every block.
 
-    Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a
-    run. If they are `shares`, 0.0 or 1.0, means are compared instead of medians. One for all
-    blocks, or one for each: floors are their q, `untested` says whether a value is no sample, such
-    as a worst case, and `first_order` whether the integrator is of first order. Outcomes and sets
-    are law -> a number per cell, equal if two seeds gave the same result, or had the same gains;
-    default: all results differ, and all gains are the same. Limits are given where the blocks
-    belong to a larger family. `halves` and `trends` are law -> y' and rho of each run, NaN where
-    they are not known; default: nowhere.
+    Args:
+      scores: law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a
+        run. The other mappings have the same shapes.
+      floors: q of all blocks, or of each.
+      shares: whether the scores are 0.0 or 1.0, whose means are compared instead of medians.
+      outcomes: a number per run, equal if two seeds gave the same result. Default: none did.
+      sets: a number per run, equal if two seeds had the same gains. Default: all had.
+      relevant: r.
+      halves, trends: y' and rho of each run, NaN where they are not known. Default: nowhere.
+      first_order: whether the integrator of all blocks, or of each, is of first order.
     """
 
     @constrained
@@ -133,74 +134,61 @@ class Comparison:
         outcomes: Mapping[str, ArrayLike] | None = None,
         sets: Mapping[str, ArrayLike] | None = None,
         relevant: Relevant = RELEVANT,
-        limits: Limits | None = None,
-        untested: ArrayLike = False,
         halves: Mapping[str, ArrayLike] | None = None,
         trends: Mapping[str, ArrayLike] | None = None,
         first_order: ArrayLike = False,
     ):
-        def stacked(by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
-            return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
-
         self.laws = tuple(sorted(scores))
         self.shares = shares
         self.relevant = relevant
-        self.cells = cells = stacked(scores, float)  # (laws, blocks, seeds)
-        unknown = np.full(cells.shape, math.nan)
-        # as cells, at half the physics step
-        if halves is None:
-            self.halves = unknown
-        else:
-            self.halves = stacked(halves, float)
-        if trends is None:
-            rises = unknown
-        else:
-            rises = stacked(trends, float)
-        blocks = range(cells.shape[1])
-        self.floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
-        self.untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
-        self.first_order = np.broadcast_to(np.asarray(first_order, bool), len(blocks))
-        if sets is None:
-            gains = np.zeros(cells.shape, np.int64)
-        else:
-            gains = stacked(sets, np.int64)
-        if outcomes is None:
-            results = None
-        else:
-            results = stacked(outcomes, np.int64)
-        ran = ~np.isnan(cells[0])
-        # (laws, blocks), number of sets of gains of a law's runs
-        self.sets = np.array(
-            [[np.unique(of_law[k, ran[k]]).size for k in blocks] for of_law in gains]
-        )
-        low, high = bounds(cells, self.halves, rises, self.floors, shares, self.relevant)
-        # what d must exceed
+        self.cells = self._cube(scores, float)  # (laws, blocks, seeds)
+        count, blocks, seeds = self.cells.shape
+        unknown = dict.fromkeys(self.laws, np.full((blocks, seeds), math.nan))
+        self.halves = self._cube(halves or unknown, float)  # y'
+        rises = self._cube(trends or unknown, float)
+        alike = dict.fromkeys(self.laws, np.zeros((blocks, seeds)))
+        gains = self._cube(sets or alike, np.int64)
+        own = dict.fromkeys(self.laws, np.tile(np.arange(seeds), (blocks, 1)))
+        results = self._cube(outcomes or own, np.int64)
+        self.floors = np.broadcast_to(np.asarray(floors, float), blocks)
+        self.first_order = np.broadcast_to(np.asarray(first_order, bool), blocks)
+        low, high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
         if shares:
-            self.beyond = self.relevant
+            plain = self.cells
+            self.beyond = relevant  # what d must exceed
         else:
-            self.beyond = -math.log1p(-self.relevant)
-        # (blocks, laws, laws, seeds), d of the first law over the second by unit, then NaN
-        if results is None:
-            of_block = [None] * len(blocks)
-        else:
-            of_block = results.swapaxes(0, 1)
-        self.leads = np.stack(
-            [_leads(low[:, k], high[:, k], ran[k], of_block[k], gains[:, k]) for k in blocks]
-        )
-        # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself;
-        # 0 or 1 if untested
-        exceeding = self.leads - self.beyond
-        self.p = np.where(
-            self.untested[:, None, None], 1.0 - np.any(exceeding > 0.0, axis=3), p_values(exceeding)
-        )
-        self.p[:, *np.diag_indices(len(self.laws))] = 1.0
-        self.limits = limits or corrected_limits([self])  # of the p-values, after the correction
-        if shares:
-            self._plain = cells
-        else:
-            self._plain = _logarithms(cells, self.floors)
-        self._gains = gains
-        self._results = results
+            plain = _logarithms(self.cells, self.floors)
+            self.beyond = -math.log1p(-relevant)
+        ran = ~np.isnan(self.cells[0])
+        self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
+        # d of the first law over the second by unit, then NaN; and without halves and trends
+        self.leads = np.full((blocks, count, count, seeds), math.nan)
+        self.plain = self.leads.copy()
+        for k in range(blocks):
+            for a in range(count):
+                self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
+                for b in range(a):
+                    first = first_of_kind(results[[a, b], k][:, None], ran[[k]])[0]
+                    units = linked(gains[a, k, first], gains[b, k, first])
+                    for i, j in ((a, b), (b, a)):
+                        charged = _difference(low[j, k], high[i, k])[first]
+                        self.leads[k, i, j] = _by_unit(charged, units, seeds)
+                        as_run = _difference(plain[j, k], plain[i, k])[first]
+                        self.plain[k, i, j] = _by_unit(as_run, units, seeds)
+        # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
+        self.p = p_values(self.leads - self.beyond)
+        self.limits = corrected_limits([self])  # of the p-values, after the correction
+
+    def _cube(self, by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
+        return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
+
+    def limited(self, limits: Limits) -> "Comparison":
+        """Return the same comparison as part of a larger family, which has these limits."""
+        other = copy.copy(self)
+        for name in ("winners", "better"):
+            other.__dict__.pop(name, None)
+        other.limits = limits
+        return other
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
@@ -228,28 +216,19 @@ class Comparison:
     def _eligible(self) -> np.ndarray:
         """Whether a law has no more runs without a value than another, (blocks, laws, laws)."""
         lacking = self.without_value.T
-        return np.asarray(lacking[:, :, None] <= lacking[:, None, :])
-
-    @functools.cached_property
-    def _relevantly_lower(self) -> np.ndarray:
-        """Whether the median of a law is lower than another's by what is relevant, (blocks, laws,
-        laws).
-        """
-        centre = self.centres.T
-        floors = self.floors[:, None, None]
-        if self.shares:
-            return centre[:, None, :] - centre[:, :, None] > self.relevant
-        return exceeds(centre[:, None, :], centre[:, :, None], floors, self.relevant)
+        return lacking[:, :, None] <= lacking[:, None, :]
 
     @functools.cached_property
     def winners(self) -> list[str | None]:
         """The law of each block that is better than every other, if there is one."""
         winners = []
-        for p, eligible, lacking in zip(self.p, self._eligible, self.without_value.T, strict=True):
-            wins = np.all(
-                (p <= self.limits.winner) & eligible | np.eye(len(p), dtype=bool), axis=1
-            ) & (lacking == 0)
-            winners.append(self.laws[int(wins.argmax())] if wins.any() and len(p) > 1 else None)
+        itself = np.eye(len(self.laws), dtype=bool)
+        beats = (self.p <= self.limits.winner) & self._eligible
+        wins = np.all(beats | itself, axis=2) & (self.without_value.T == 0)
+        for block in wins:
+            winners.append(self.laws[int(block.argmax())] if block.any() else None)
+        if len(self.laws) == 1:
+            return [None] * len(winners)
         return winners
 
     @functools.cached_property
@@ -259,86 +238,67 @@ class Comparison:
         for block, winner in zip(better, self.winners, strict=True):
             if winner is not None:
                 at = self.laws.index(winner)
-                block[at], block[:, at] = True, False
-                block[at, at] = False
+                block[at] = True
+                block[:, at] = False
         return better
 
-    @functools.cached_property
+    @property
     def worse(self) -> np.ndarray:
         """Whether another law is better, (laws, blocks)."""
-        return np.asarray(np.any(self.better, axis=1).T)
+        return self.better.any(axis=1).T
 
-    @functools.cached_property
+    @property
     def beaten(self) -> np.ndarray:
         """Whether another law is better, or a run of the law failed or has no value, (laws,
         blocks).
         """
         return self.worse | (self.without_value > 0)
 
-    @functools.cached_property
+    @property
     def level(self) -> np.ndarray:
         """Whether two laws are level: the interval of their ratio lies within 10 %, (blocks, laws,
         laws).
         """
-        if self.shares:
-            margin = LEVEL_SHARE
-        else:
-            margin = -math.log1p(-LEVEL_SHARE)
+        margin = LEVEL_SHARE if self.shares else -math.log1p(-LEVEL_SHARE)
         within = p_values(self.leads + margin) <= self.limits.pair
-        level = (
-            within
-            & within.swapaxes(1, 2)
-            & (self.samples >= MIN_LEVEL_UNITS)
-            & ~self.untested[:, None, None]
-        )
-        level[:, *np.diag_indices(len(self.laws))] = True
-        return level
+        level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS)
+        return level | np.eye(len(self.laws), dtype=bool)
 
-    @functools.cached_property
-    def tied(self) -> np.ndarray:
-        """Whether two laws are level in every block, (laws, laws)."""
-        return np.asarray(self.level.all(axis=0))
-
-    @functools.cached_property
+    @property
     def undecided(self) -> np.ndarray:
-        """Whether only a lack of samples keeps a law from being beaten, (laws, blocks); False in
-        `untested` blocks.
-        """
-        few = np.vectorize(min_p)(self.samples) > self.limits.pair
-        few[self.untested] = False
-        return np.any(self._relevantly_lower & self._eligible & few, axis=1).T & ~self.beaten
+        """Whether only a lack of samples keeps a law from being beaten, (laws, blocks)."""
+        centre = self.centres.T
+        first, second = centre[:, :, None], centre[:, None, :]
+        if self.shares:
+            lower = second - first > self.relevant
+        else:
+            lower = exceeds(second, first, self.floors[:, None, None], self.relevant)
+        few = 2.0**-self.samples > self.limits.pair
+        return np.any(lower & self._eligible & few, axis=1).T & ~self.beaten
 
     @property
     def best(self) -> list[tuple[str, ...]]:
         """The laws of each block that are not beaten, with enough samples to tell."""
-        return [
-            tuple(np.array(self.laws)[row].tolist()) for row in ~(self.beaten | self.undecided).T
-        ]
+        names = np.array(self.laws)
+        return [tuple(names[block].tolist()) for block in ~(self.beaten | self.undecided).T]
 
-    def effect(self, block: int, law: str, rival: str, winner: bool = True) -> Effect:
-        """Return how a law compares with a rival in a block, at the level of a winner's comparison
-        or of any pair's.
-        """
+    def effect(self, block: int, law: str, rival: str) -> Effect:
+        """Return how a law compares with a rival in a block, at a winner's level."""
         a = self.laws.index(law)
         b = self.laws.index(rival)
-        if winner:
-            error = self.limits.winner
-        else:
-            error = self.limits.pair
+        error = self.limits.winner
         leads = self.leads[block, a, b]
-        lags = self.leads[block, b, a]
         with np.errstate(over="ignore"):
-            ends = np.exp([interval(lags, error)[1], -interval(leads, error)[1]])
-            plain = _difference(self._plain[b, block], self._plain[a, block])
-            value = np.exp(-interval(self._by_unit(plain, block, a, b), error)[0])
+            low = np.exp(interval(self.leads[block, b, a], error)[1])
+            high = np.exp(-interval(leads, error)[1])
+            value = np.exp(-interval(self.plain[block, a, b], error)[0])
         return Effect(
-            value=float(np.clip(value, *ends)),
-            low=float(ends[0]),
-            high=float(ends[1]),
+            value=float(np.clip(value, low, high)),
+            low=float(low),
+            high=float(high),
             ahead=int((leads > self.beyond).sum()),
             samples=int(self.samples[block, a, b]),
             sets=bool(self.sets[[a, b], block].max() > 1),
-            visible=self.visible(block, law, rival),
         )
 
     def visible(self, block: int, law: str, rival: str) -> float:
@@ -347,13 +307,9 @@ class Comparison:
 
         It makes up for what half the step and trends charge, too.
         """
-        a = self.laws.index(law)
-        b = self.laws.index(rival)
-        lead = least_visible_lead(self.leads[block, a, b], self.limits.first, self.relevant)
-        plain = self._by_unit(
-            _difference(self._plain[b, block], self._plain[a, block]), block, a, b
-        )
-        charged = _difference(plain, self.leads[block, a, b])
+        at = block, self.laws.index(law), self.laws.index(rival)
+        lead = least_visible_lead(self.leads[at], self.limits.first, self.relevant)
+        charged = _difference(self.plain[at], self.leads[at])
         known = charged[np.isfinite(charged)]
         if known.size:
             return 1.0 - (1.0 - lead) * math.exp(-max(float(np.median(known)), 0.0))
@@ -361,29 +317,16 @@ class Comparison:
 
     def step_change(self, block: int, law: str) -> tuple[float, float] | None:
         """Return the medians of a law's runs that were repeated at half the physics step, before
-        and after; else None.
-
-        They are returned where they are `apart`, as for any other number.
+        and after; None where they are not `apart`.
         """
         a = self.laws.index(law)
-        whole = self.cells[a, block]
         half = self.halves[a, block]
-        if self.shares or not (again := ~np.isnan(half)).any():
+        again = ~np.isnan(half)
+        if self.shares or not again.any():
             return None
-        before, after = (float(middle(values[again])) for values in (whole, half))
-        differ = apart((before, after), float(self.floors[block]), bool(self.first_order[block]))
-        return (before, after) if differ else None
-
-    def _by_unit(self, by_run: np.ndarray, block: int, a: int, b: int) -> np.ndarray:
-        """Return values by run, (seeds,), as values by unit of two laws."""
-        if self._results is None:
-            results = None
-        else:
-            results = self._results[[a, b], block]
-        there = ~np.isnan(self.cells[0, block])
-        return _centres(
-            by_run, *_units(there, results, self._gains[a, block], self._gains[b, block])
-        )
+        pair = float(middle(self.cells[a, block, again])), float(middle(half))
+        differ = apart(pair, float(self.floors[block]), bool(self.first_order[block]))
+        return pair if differ else None
 
 
 def bounds(
@@ -397,49 +340,28 @@ def bounds(
     """Return low and high of every run, (laws, blocks, seeds): logarithms, or the shares
     themselves.
     """
-    repeated = ~np.isnan(halves)
     if shares:
-        return np.where(repeated, np.fmin(cells, halves), cells), np.where(
-            repeated, np.fmax(cells, halves), cells
-        )
-    no_floor = np.zeros(len(floors))
-    whole = _logarithms(cells, no_floor)
-    half = _logarithms(halves, no_floor)
+        return np.fmin(cells, halves), np.fmax(cells, halves)
+    whole = _logarithms(cells, np.zeros(len(floors)))
+    half = _logarithms(halves, np.zeros(len(floors)))
     change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
-    widening = np.zeros(cells.shape[:2])
-    known = repeated.any(axis=2)
-    # of a law in a block
-    widening[known] = np.minimum(np.nanmedian(change[known], axis=1), MAX_WIDENING)
-    low = np.where(repeated, np.fmin(whole, half), whole - widening[..., None])
-    high = np.where(repeated, np.fmax(whole, half), whole + widening[..., None])
-    rising = _rises(trends, relevant)[..., None]
+    # of a law in a block, for its runs that were not repeated
+    widening = np.minimum(np.nan_to_num(middle(change)), MAX_WIDENING)[..., None]
+    with np.errstate(divide="ignore"):
+        rise = np.log(middle(trends))[..., None]
+    matters = np.abs(rise) > (relevant or RELEVANT)
+    rise = TREND_POWER * np.where(matters, np.clip(rise, -MAX_RISE, MAX_RISE), 0.0)
     q = np.log(np.maximum(floors, np.finfo(float).tiny))[None, :, None]
-    low, high = (
-        low + TREND_POWER * np.minimum(rising, 0.0),
-        high + TREND_POWER * np.maximum(rising, 0.0),
-    )
+    once = np.isnan(half)
+    low = np.fmin(whole, np.where(once, whole - widening, half)) + np.minimum(rise, 0.0)
+    high = np.fmax(whole, np.where(once, whole + widening, half)) + np.maximum(rise, 0.0)
     return np.maximum(low, q), np.maximum(high, q)
 
 
-def _rises(trends: np.ndarray, relevant: float) -> np.ndarray:
-    """Return log rho of each law in each block, (laws, blocks); 0 where it is not relevant, or not
-    known.
-    """
-    rho = np.ones(trends.shape[:2])
-    known = ~np.isnan(trends).all(axis=2)
-    rho[known] = np.nanmedian(trends[known], axis=1)
-    with np.errstate(divide="ignore"):
-        rise = np.log(rho)
-    return np.where(np.abs(rise) > (relevant or RELEVANT), np.clip(rise, -MAX_RISE, MAX_RISE), 0.0)
-
-
 def _logarithms(values: np.ndarray, floors: np.ndarray) -> np.ndarray:
-    """Return the logarithms of values (laws, blocks, seeds), at least those of the blocks'
-    floors.
-    """
-    return np.log(
-        np.maximum(np.abs(values), np.maximum(floors, np.finfo(float).tiny)[None, :, None])
-    )
+    """Return the logarithms of values (laws, blocks, seeds), at least those of the floors."""
+    least = np.maximum(floors, np.finfo(float).tiny)[None, :, None]
+    return np.log(np.maximum(np.abs(values), least))
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -448,47 +370,18 @@ def _difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return np.where((a == b) & np.isinf(a), 0.0, a - b)
 
 
-def _leads(
-    low: np.ndarray, high: np.ndarray, ran: np.ndarray, results: np.ndarray | None, sets: np.ndarray
-) -> np.ndarray:
-    """Return `Comparison.leads` of one block, (laws, laws, units); low, high, results and sets are
-    (laws, seeds).
-    """
-    k = len(low)
-    leads = np.full((k, *low.shape), math.nan)
-    for a in range(k):
-        for b in range(a + 1, k):
-            units = _units(ran, None if results is None else results[[a, b]], sets[a], sets[b])
-            leads[a, b] = _centres(_difference(low[b], high[a]), *units)
-            leads[b, a] = _centres(_difference(low[a], high[b]), *units)
-    return leads
-
-
-def _units(
-    ran: np.ndarray, results: np.ndarray | None, sets: np.ndarray, rival_sets: np.ndarray
-) -> tuple[np.ndarray, tuple[int, ...] | None]:
-    """Return the runs of two laws that count, without those that repeat earlier ones, and the
-    number of their unit.
-    """
-    runs = np.flatnonzero(ran if results is None else first_of_kind(results[:, None], ran[None])[0])
-    return runs, linked(sets[runs], rival_sets[runs])
-
-
-def _centres(by_run: np.ndarray, runs: np.ndarray, labels: tuple[int, ...] | None) -> np.ndarray:
-    """Return the median of each unit, then NaN; without labels each run is a unit, in its place."""
-    centres = np.full(by_run.shape, math.nan)
-    if labels is None:
-        centres[runs] = by_run[runs]
+def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np.ndarray:
+    """Return the median of each unit, then NaN, (size,); without units each run is one."""
+    centres = np.full(size, math.nan)
+    if units is None:
+        centres[: by_run.size] = by_run
         return centres
-    for unit in range(max(labels) + 1):
-        ordered = np.sort(by_run[runs[np.array(labels) == unit]])
+    for unit in range(max(units) + 1):
+        ordered = np.sort(by_run[np.array(units) == unit])
         low = ordered[(ordered.size - 1) // 2]
         high = ordered[ordered.size // 2]
-        # also of two opposite infinite values
-        if low == -high:
-            centres[unit] = 0.0
-        else:
-            centres[unit] = (low + high) / 2
+        # the sum of two opposite infinite values is no number
+        centres[unit] = 0.0 if low == -high else (low + high) / 2
     return centres
 
 
@@ -519,9 +412,7 @@ def least_visible_lead(leads: ArrayLike, error: float, relevant: float = RELEVAN
     i, j = np.triu_indices(n, 1)
     spread = float(np.median(np.abs(_difference(known[i], known[j])))) / NORMAL_SPREAD
     quantiles = stdtrit(n - 1, 1.0 - error) + stdtrit(n - 1, POWER)
-    return float(
-        1.0 - (1.0 - relevant) * math.exp(-quantiles * spread * math.sqrt(math.pi / (3 * n)))
-    )
+    return 1.0 - (1.0 - relevant) * math.exp(-quantiles * spread * math.sqrt(math.pi / (3 * n)))
 
 
 def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
@@ -531,35 +422,24 @@ def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
     Each of `sets` has the number of the set of each run, -1 where there is no run. A law with one
     set links nothing. None if no two runs are linked.
     """
-    return _linked(*(numbers.astype(np.int64).tobytes() for numbers in sets))
+    return _linked(*(tuple(numbers.tolist()) for numbers in sets))
 
 
-@functools.lru_cache(
-    4096
-)  # laws use the same sets in all blocks and metrics: boards take a fifth of the time
-def _linked(*sets: bytes) -> tuple[int, ...] | None:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    # a node for each run, then one for each set of gains; no matrix of pairs of runs
-    count = nodes = len(sets[0]) // 8
-    runs = []
-    their_sets = []
-    for numbers in (np.frombuffer(one, np.int64) for one in sets):
-        there = np.flatnonzero(numbers >= 0)
-        distinct, which = np.unique(numbers[there], return_inverse=True)
+@functools.lru_cache(4096)  # laws use the same sets in all blocks and metrics
+def _linked(*sets: tuple[int, ...]) -> tuple[int, ...] | None:
+    of_one_set = []
+    for numbers in map(np.array, sets):
+        distinct = np.unique(numbers[numbers >= 0])
         if distinct.size > 1:
-            runs.append(there)
-            their_sets.append(nodes + which.ravel())
-            nodes += distinct.size
-    if not runs:
-        return None
-    edges = np.concatenate(runs), np.concatenate(their_sets)
-    graph = coo_array((np.ones(edges[0].size), edges), shape=(nodes, nodes))
-    samples, labels = connected_components(graph, directed=False)
-    if samples == count:
-        return None
-    return tuple(labels[:count].tolist())
+            of_one_set += [numbers == number for number in distinct]
+    labels = np.arange(len(sets[0]))
+    before = None
+    while before is None or np.any(labels != before):
+        before = labels.copy()
+        for runs in of_one_set:
+            labels[runs] = labels[runs].min()
+    units, numbers = np.unique(labels, return_inverse=True)
+    return None if units.size == labels.size else tuple(numbers.tolist())
 
 
 def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
@@ -567,29 +447,27 @@ def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
     of earlier ones.
     """
     first = np.zeros(exists.shape, bool)
-    for block, of_block in enumerate(exists):
-        seeds = np.flatnonzero(of_block)
-        first[block, seeds[np.unique(outcomes[:, block, seeds], axis=1, return_index=True)[1]]] = (
-            True
-        )
+    for k, block in enumerate(exists):
+        seeds = np.flatnonzero(block)
+        _, kept = np.unique(outcomes[:, k, seeds], axis=1, return_index=True)
+        first[k, seeds[kept]] = True
     return first
 
 
 def corrected_limits(comparisons: Sequence[Comparison]) -> Limits:
     """Return the limits of p-values for comparisons that form one family."""
-    pairs = []
-    winners = []
+    pairs = [np.zeros(0)]
+    winners = [np.zeros(0)]
     for one in comparisons:
-        if len(one.laws) > 1:
-            p = one.p[~one.untested]
-            diagonal = np.eye(len(one.laws), dtype=bool)
-            pairs.append(
-                np.minimum(p, p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel()
-            )
-            winners.append(np.where(diagonal, 0.0, p).max(axis=2).min(axis=1))
+        count = len(one.laws)
+        if count > 1:
+            both = np.minimum(one.p, one.p.swapaxes(1, 2))
+            pairs.append(both[:, *np.triu_indices(count, 1)].ravel())
+            winners.append(np.where(np.eye(count), 0.0, one.p).max(axis=2).min(axis=1))
     error = (1.0 - LEVEL) / 2  # two-sided
-    of_pair, of_winner = (np.concatenate([*each, []]) for each in (pairs, winners))
-    return Limits(_holm(of_pair, error), _holm(of_winner, error), error / max(of_winner.size, 1))
+    of_winner = np.concatenate(winners)
+    first = error / max(of_winner.size, 1)
+    return Limits(_holm(np.concatenate(pairs), error), _holm(of_winner, error), first)
 
 
 def _holm(p: np.ndarray, error: float) -> float:
@@ -602,31 +480,23 @@ def _holm(p: np.ndarray, error: float) -> float:
 def ranks(comparison: Comparison) -> list[Rank]:
     """Return the laws' ranks: fewest runs without a value first, then by mean rank; irrelevant
     differences are ties.
-    """
-    by_block = ranked(
-        comparison.centres, comparison.floors, comparison.without_value, comparison.relevant
-    )
-    mean = by_block.mean(axis=1)
-    lacking = comparison.without_value.sum(axis=1)
-    order = [tuple(row) for row in zip(lacking.tolist(), mean.round(9).tolist(), strict=True)]
-    places = [sum(other < one for other in order) + (1 + order.count(one)) / 2 for one in order]
-    best = [not any(row) for row in (comparison.beaten | comparison.undecided).tolist()]
-    rows = [Rank(*row) for row in zip(comparison.laws, mean.tolist(), places, best, strict=True)]
-    return sorted(rows, key=lambda rank: (rank.place, rank.law))
 
-
-def ranked(
-    centres: np.ndarray, floors: np.ndarray, lacking: ArrayLike = 0, relevant: float = RELEVANT
-) -> np.ndarray:
-    """Return the ranks of laws in each block (laws, blocks): by numbers of runs without a value,
-    then by medians.
+    In each block a law's rank is by its number of runs without a value, then by its median.
     """
-    lacking = np.broadcast_to(lacking, centres.shape)
-    behind = lacking[:, None] > lacking[None]
-    behind |= (lacking[:, None] == lacking[None]) & exceeds(
-        centres[:, None], centres[None], floors, relevant
-    )
-    return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
+    lacking = comparison.without_value
+    centres = comparison.centres
+    behind = lacking[:, None] > lacking
+    larger = exceeds(centres[:, None], centres, comparison.floors, comparison.relevant)
+    behind |= (lacking[:, None] == lacking) & larger
+    by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
+    means = by_block.mean(axis=1).tolist()
+    doubted = (comparison.beaten | comparison.undecided).any(axis=1).tolist()
+    order = [(int(n), round(mean, 9)) for n, mean in zip(lacking.sum(axis=1), means, strict=True)]
+    found = []
+    for i, law in enumerate(comparison.laws):
+        place = sum(other < order[i] for other in order) + (1 + order.count(order[i])) / 2
+        found.append(Rank(law, means[i], place, not doubted[i]))
+    return sorted(found, key=lambda rank: (rank.place, rank.law))
 
 
 # relevant differences
@@ -653,25 +523,22 @@ def p_values(differences: ArrayLike) -> np.ndarray:
     The statistic is the number of pairs i <= j whose sum is above 0: without ties and zeros, the
     sum of the positive ranks. Ties and zeros lower it, so that the test keeps its level.
     """
-    rows = np.atleast_2d(np.asarray(differences, float))
-    shape, rows = rows.shape[:-1], rows.reshape(-1, rows.shape[-1])
-    sizes = (~np.isnan(rows)).sum(axis=1)
-    p = np.ones(len(rows))
-    for n in np.unique(sizes[sizes > 0]).tolist():
-        same = sizes == n
-        p[same] = _tail(n, np.array([_positive_pairs(row[~np.isnan(row)]) for row in rows[same]]))
-    return p.reshape(shape)
+    given = np.asarray(differences, float)
+    p = np.ones(given.shape[:-1])
+    for at in np.ndindex(p.shape):
+        known = given[at][~np.isnan(given[at])]
+        if known.size:
+            p[at] = _tail(known.size, _positive_pairs(known))
+    return p
 
 
 def _positive_pairs(values: np.ndarray) -> int:
     """Return the number of pairs i <= j of values (n,) whose sum is above 0; opposite infinities
     have none.
     """
-    ordered = np.sort(values)
-    # of each value, by all values, itself too
-    above = values.size - np.searchsorted(ordered, -values, side="right")
+    above = values.size - np.searchsorted(np.sort(values), -values, side="right")
     alone = int((values > 0).sum())
-    return (int(above.sum()) - alone) // 2 + alone
+    return (int(above.sum()) - alone) // 2 + alone  # `above` counts a pair twice, i = j once
 
 
 def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]:
@@ -688,9 +555,9 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
     i, j = np.triu_indices(n)
     with np.errstate(invalid="ignore"):
         means = (known[i] + known[j]) / 2  # NaN of two opposite infinite values
-    value = float(np.median(np.where(np.isnan(means), 0.0, means)))
-    tails = _tail(n, np.arange(means.size + 1))
-    if not (enough := np.flatnonzero(tails <= error)).size:
+    value = float(np.median(np.nan_to_num(means, nan=0.0, posinf=math.inf, neginf=-math.inf)))
+    enough = np.flatnonzero(_tail(n, np.arange(means.size + 1)) <= error)
+    if not enough.size:
         return value, -math.inf, math.inf
     low = np.sort(np.where(np.isnan(means), -math.inf, means))[means.size - enough[0]]
     high = np.sort(np.where(np.isnan(means), math.inf, means))[enough[0] - 1]
@@ -702,7 +569,7 @@ def min_p(n: int) -> float:
     return 2.0**-n
 
 
-def _tail(n: int, sums: np.ndarray) -> np.ndarray:
+def _tail(n: int, sums: int | np.ndarray) -> np.ndarray:
     """Return the probability that random signs of the ranks 1 to n give a sum at least as large as
     these.
     """

@@ -1,8 +1,7 @@
-"""Comparison of laws on plants in conditions, in one call: gains, runs, tables, verdicts, figures."""
+"""Comparison of laws on plants in conditions, in one call: gains, runs, tables and verdicts."""
 
 import dataclasses
 import functools
-import itertools
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,7 @@ from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, s
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.law import Law, catalogue, suits
@@ -26,17 +25,17 @@ from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import Starts, case, check_moving, check_names, listed, listed_laws
+from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
-from smc_mujoco.studies.study import FULL, QUICK, Extent, Traces
+from smc_mujoco.studies.study import FULL, QUICK, Traces
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.worst_case import DURATION, WorstCases
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
@@ -48,6 +47,11 @@ if TYPE_CHECKING:
 QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
 # plants times conditions that have a table each; if there are more, each plant has one table
 MAX_BLOCKS = 12
+MAX_SEED = 10**6
+DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
+TIMES = "Time of the laws' compiled code a sample on this machine"
+TIME_HEADINGS = "plant", "law", "of pid's", "median (s)", "99 % quantile (s)"
+GAINS = "plant", "law", "gains", "sets", "best set"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -55,33 +59,34 @@ class Compared(Tables):
     """Laws compared on plants in conditions. `print` and notebooks show its tables and verdicts."""
 
     table: Table  # a row for each run, with all its scores, as `smc.study` returns it
-    # Plant -> the laws with all sets of gains that their runs used, and remarks on them
+    # plant -> the laws with all sets of gains that their runs used, and remarks on them
     candidates: Mapping[str, Sequence[Candidate]]
-    # A board for each metric on each plant in each condition; on each plant, if that makes more
+    # a board for each metric on each plant in each condition; on each plant, if that makes more
     # than 12 blocks
     leaderboard: Boards
-    worst: Mapping[
-        str, Mapping[str, "WorstCase"]
-    ]  # plant -> law -> its `worst_case`; empty if it was not searched
-    times: Mapping[
-        str, Mapping[str, LawTime]
-    ]  # plant -> law -> time of its compiled code a sample, on this machine
+    # plant -> law -> its `worst_case`; empty if it was not searched
+    worst: Mapping[str, Mapping[str, "WorstCase"]]
+    # plant -> law -> time of its compiled code a sample, on this machine; in no file
+    times: Mapping[str, Mapping[str, LawTime]]
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
         """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says
         their source.
         """
-        return {plant: {c.law.name: c.law for c in laws} for plant, laws in self.candidates.items()}
+        found: dict[str, dict[str, Law]] = {}
+        for plant, candidates in self.candidates.items():
+            found[plant] = {candidate.law.name: candidate.law for candidate in candidates}
+        return found
 
     @functools.cached_property
     def traces(self) -> list[Trace]:
         """The traces of the first seed: of each plant, in each condition, of each law; computed
         when first used.
         """
-        first = min(self.table.column("seed").tolist())
-        rows = [i for i, seed in enumerate(self.table.column("seed").tolist()) if seed == first]
-        return run([self.table.scenario(i) for i in rows])
+        seeds = self.table.column("seed")
+        rows = (seeds == seeds.min()).nonzero()[0].tolist()
+        return run([self.table.scenario(row) for row in rows])
 
     @property
     def verdicts(self) -> list[str]:
@@ -96,38 +101,41 @@ class Compared(Tables):
         plants_of: dict[str, list[str]] = {}
         for plant, candidates in self.candidates.items():
             for candidate in candidates:
-                default = "default gains" * (candidate.law.source.kind == source.DEFAULT)
-                if words := "; ".join(filter(None, (default, candidate.remark))):
-                    plants_of.setdefault(f"{candidate.law.name}: {words}", []).append(plant)
+                words = [candidate.remark]
+                if candidate.law.source.kind == source.DEFAULT:
+                    words.insert(0, "default gains")
+                if any(words):
+                    text = f"{candidate.law.name}: {'; '.join(filter(None, words))}"
+                    plants_of.setdefault(text, []).append(plant)
         return [f"{words} (on {joined(plants)})" for words, plants in plants_of.items()]
 
     @property
     def tables(self) -> list[Tabular]:
-        """The tables of the `leaderboard`, then one of the gains with their sources."""
-        rows = []
+        """The tables of the `leaderboard`, of worst cases, of times, and of gains."""
+        tables = self._without_times
+        times = []
+        gains = []
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
                 # inf: no bound, or a number of the plant
-                told = {name: value for name, value in law.gains.items() if value != math.inf}
-                best = ", ".join(f"{name}={gain_text(value)}" for name, value in told.items())
-                rows.append((plant, law.name, law.source.kind, f"{len(sets)}", best))
-        heads = ["plant", "law", "gains", "sets", "best set"]
-        gains = Tabular(
-            headings=heads, rows=rows, title="Gains", notes=self.remarks, left=len(heads)
-        )
-        return [*self.leaderboard.tables, *self._worst_tables, gains]
+                best = [f"{k}={gain_text(v)}" for k, v in law.gains.items() if v != math.inf]
+                gains.append((plant, law.name, law.source.kind, f"{len(sets)}", ", ".join(best)))
+            for name, time in self.times.get(plant, {}).items():
+                of_law = (number(value) for value in (time.ratio, time.median, time.high))
+                times.append((plant, name, *of_law))
+        if times:
+            tables.append(Tabular(headings=TIME_HEADINGS, rows=times, title=TIMES, left=2))
+        notes = self.remarks
+        return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=5)]
 
     @property
-    def _worst_tables(self) -> list[Tabular]:
-        if not self.worst:
-            return []
-        from smc_mujoco.studies.worst_case import WorstCases
-
-        return [
-            table
-            for worst_cases in self.worst.values()
-            for table in WorstCases(worst_cases.values()).tables
-        ]
+    def _without_times(self) -> list[Tabular]:
+        """The tables that are the same in every call: of the `leaderboard`, and of worst cases."""
+        tables = self.leaderboard.tables
+        if self.worst:
+            for cases in self.worst.values():
+                tables += WorstCases(cases.values()).tables
+        return tables
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return a LaTeX tabular for each plant in each condition, below comments with the
@@ -136,9 +144,7 @@ class Compared(Tables):
         Args:
           path: of a file to which it is written too.
         """
-        text = "\n".join(
-            table.to_latex() for table in [*self.leaderboard.tables, *self._worst_tables]
-        )
+        text = "\n".join(table.to_latex() for table in self._without_times)
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")
@@ -148,10 +154,8 @@ class Compared(Tables):
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.
 
         Its columns are plant, condition, law, gains (their source), metric, unit, median, low and
-        high (the interval), failed (runs without a value), runs, best (whether no law is better),
-        winner, worst_found: the rms error of the worst run that an adversary found on the plant,
-        NaN without a search, and time, s, and time_ratio, see `times`. All runs are in
-        `table.data.to_pandas()`.
+        high (the interval), failed (runs without a value), runs, best (whether no law is better)
+        and winner. All runs are in `table.data.to_pandas()`.
 
         Raises:
           MissingPackageError: pandas is not installed.
@@ -164,14 +168,12 @@ class Compared(Tables):
     def _rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of `to_pandas`."""
         for board in self.leaderboard:
-            plant = board.group.get("plant", "")
-            worst = self.worst.get(plant, {})
-            times = self.times.get(plant, {})
             for entry in board.entries:
                 yield {
-                    **{"plant": "", "condition": ""} | dict(board.group),
+                    "plant": board.group.get("plant", ""),
+                    "condition": board.group.get("condition", ""),
                     "law": entry.law,
-                    "gains": ", ".join(dict.fromkeys(origin.kind for origin in entry.sources)),
+                    "gains": source.kinds(entry.sources),
                     "metric": board.metric,
                     "unit": board.unit,
                     "median": entry.interval.median,
@@ -181,9 +183,6 @@ class Compared(Tables):
                     "runs": entry.runs,
                     "best": entry.rank.best,
                     "winner": board.winner == entry.law,
-                    "worst_found": worst[entry.law].value if worst else math.nan,
-                    "time": times[entry.law].median if entry.law in times else math.nan,
-                    "time_ratio": times[entry.law].ratio if entry.law in times else math.nan,
                 }
 
     def plot(
@@ -226,6 +225,7 @@ def compare(
     traces: Traces = "none",
     threads: int | None = None,
     progress: bool = True,
+    seed: DrawSeed = 0,
 ) -> Compared:
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better
     and how sure it is.
@@ -258,6 +258,8 @@ def compare(
       budget: largest number of sets of gains that a search tries, for each gain.
       quick: shorter runs and fewer searches; by default three plants and three conditions.
       threads, progress: as in `run`.
+      seed: another one draws other instances, starts and noise. The files are the same in every
+        call, with any number of threads.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
@@ -265,97 +267,73 @@ def compare(
     workers = executors.as_executor("local" if executor is None else executor)
     for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
-    _check_worst(worst)
-    trial = _trial(
-        QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress
+    within = _class(worst)
+    extent = QUICK if quick else FULL
+    machines = [as_plant(plant) for plant in listed("plants", plants or extent.plants)]
+    length = duration or extent.duration
+    given = conditions or applicable(extent.conditions, machines, length)
+    tested = [find_condition(name) for name in listed("conditions", given)]
+    trial = Trial(machines, tested, length, starts, Path(out), threads, progress, seed)
+    chosen: dict[str, list[Law | Template]] = {}
+    of_all = None if laws is None else [law_or_template(law) for law in listed_laws(laws)]
+    for plant in machines:
+        chosen[plant.name] = of_all or [law_or_template(law) for law in _usual(plant)]
+    trial.check(chosen)
+    candidates = trial.gains(
+        chosen,
+        defaults,
+        searches or (QUICK_SEARCHES if quick else SEARCHES),
+        budget,
+        tune and gains == "tuned",
+        gains,
     )
-    if searches is None:
-        number = QUICK_SEARCHES if quick else SEARCHES
-    else:
-        number = searches
-    options = {
-        "tune": tune and gains == "tuned",
-        "gains": gains,
-        "searches": number,
-        "budget": budget,
-    }
-    candidates = trial.gains(_checked(trial, laws), defaults, **options)
     table = trial.run(candidates, seeds, executor=workers, traces=traces)
+    found = {}
     if worst:
-        found = _worst_cases(trial, candidates, None if worst is True else worst, duration)
-    else:
-        found = {}
-    if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS:
-        by = paired_runs.GROUPS
-    else:
+        found = _worst_cases(trial, candidates, within, duration or DURATION)
+    by = paired_runs.GROUPS
+    if len(machines) * len(tested) > MAX_BLOCKS:
         by = ("plant",)
-    boards = leaderboard(table, metrics, by, defaults, relevant, found)
+    boards = leaderboard(table, metrics, by, defaults, relevant)
     unseen = trial.unseen(candidates, seeds)
     sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
     boards[:0] = objective_boards(unseen, sources, defaults, relevant)
-    boards.times = times = _times(trial, candidates)
     return Compared(
-        table=table, candidates=candidates, leaderboard=boards, worst=found, times=times
+        table=table,
+        candidates=candidates,
+        leaderboard=boards,
+        worst=found,
+        times=_times(trial, candidates),
     )
 
 
-def _trial(
-    extent: Extent,
-    plants: str | Plant | Sequence[str | Plant] | None,
-    conditions: str | Condition | Sequence[str | Condition] | None,
-    duration: float | None,
-    starts: Starts | None,
-    out: Path,
-    threads: int | None,
-    progress: bool,
-) -> Trial:
-    """Return the plants and conditions to compare laws on. The extent has the defaults."""
-    if duration is None:
-        length = extent.duration
-    else:
-        length = duration
-    machines = []
-    for plant in extent.plants if plants is None else listed("plants", plants):
-        machines.append(as_plant(plant))
-    if conditions is None:
-        given = applicable(extent.conditions, machines, length)
-    else:
-        given = listed("conditions", conditions)
-    return Trial(
-        machines, [find_condition(name) for name in given], length, starts, out, threads, progress
-    )
-
-
-def _check_worst(worst: object) -> None:
-    """Refuse what is neither a flag nor a class of disturbances."""
-    if isinstance(worst, bool):
-        return
+def _class(worst: object) -> "Uncertainty | None":
+    """Return the class in which worst cases are searched, None for the default one."""
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 
-    if not isinstance(worst, Uncertainty):
+    if isinstance(worst, Uncertainty):
+        return worst
+    if not isinstance(worst, bool):
         raise ScenarioError(
-            f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)"
+            f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1)"
         )
+    return None
 
 
 def _worst_cases(
     trial: Trial,
     candidates: Mapping[str, Sequence[Candidate]],
     within: "Uncertainty | None",
-    duration: float | None,
+    duration: float,
 ) -> "dict[str, dict[str, WorstCase]]":
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
-    from smc_mujoco.studies.worst_case import DURATION
-
-    def attacked(plant: Plant, law: Law) -> "WorstCase":
-        scenario = case(
-            plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts
-        )
-        return trial.attack(f"{plant.name}-{law.name}", scenario, within)
-
-    return {
-        p.name: {c.law.name: attacked(p, c.law) for c in candidates[p.name]} for p in trial.plants
-    }
+    found: dict[str, dict[str, WorstCase]] = {}
+    for plant in trial.plants:
+        found[plant.name] = {}
+        for law in (candidate.law for candidate in candidates[plant.name]):
+            run = case(plant, law, "nominal", duration, starts=trial.starts)
+            found[plant.name][law.name] = trial.attack(f"{plant.name}-{law.name}", run, within)
+    return found
 
 
 def _times(
@@ -364,36 +342,13 @@ def _times(
     """Return `Compared.times`, of the laws with their best gains, without those that do not
     compile.
     """
-
-    def timed(plant: Plant) -> Iterator[tuple[str, LawTime]]:
-        for candidate in candidates[plant.name]:
-            if found := law_time(
-                case(plant, candidate.law, trial.conditions[0], trial.duration, starts=trial.starts)
-            ):
-                yield candidate.law.name, found
-
-    return {plant.name: dict(timed(plant)) for plant in trial.plants}
-
-
-def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
-    """Return plant -> laws to compare on it.
-
-    What cannot run is refused here, before gains are searched.
-    """
-    # a file is read once
-    if laws is None:
-        given = None
-    else:
-        given = [law_or_template(law) for law in listed_laws(laws)]
-    compared = {
-        plant.name: given or [law_or_template(law) for law in _usual(plant)]
-        for plant in trial.plants
-    }
-    every = {id(law): law for its in compared.values() for law in its}.values()
-    check_names(trial.plants, [coerce.law(law) for law in every], trial.conditions)
-    for plant, condition in itertools.product(trial.plants, trial.conditions):
-        check_moving([case(plant, "none", condition, trial.duration, starts=trial.starts)])
-    return compared
+    found: dict[str, dict[str, LawTime]] = {}
+    for plant in trial.plants:
+        found[plant.name] = {}
+        for law in (candidate.law for candidate in candidates[plant.name]):
+            if time := law_time(trial.case(plant, law, trial.conditions[0])):
+                found[plant.name][law.name] = time
+    return found
 
 
 def _usual(plant: Plant) -> list[Any]:

@@ -10,10 +10,10 @@ started again.
 import contextlib
 import copyreg
 import io
-import logging
 import math
 import pickle
 import platform
+import re
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent import futures
@@ -25,23 +25,19 @@ from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import to_json
 from smc_mujoco.control.component import Component
 from smc_mujoco.metrics.catalogue import score, trends
+from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.run import Report, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key
 
-MAX_WORK_PER_THREAD = 500_000  # of a batch, see `Scenario.work`: 2 to 5 s of a core
-MAX_WORK = 1_000_000  # of a batch: bounds the memory
+# of a batch, see `Scenario.work`: 4 to 10 s of a core. It does not depend on the number of threads,
+# so that a study writes the same parts with any
+MAX_WORK = 1_000_000
 MAX_RUNS = 1000  # of a batch
-PYTHON_SLOWDOWN = 10  # time of a law that is called in Python over that of a compiled one, roughly
 MAX_BATCHES_SENT = 1000  # to workers, and not finished; chosen
-ADDRESS, DASK_ADDRESS = "dask://", "tcp://"  # beginnings of a scheduler's address, here and in dask
-LOGGERS = (
-    "distributed",
-    "distributed.client",
-    "tornado.application",
-)  # of dask, which set their own level
+ADDRESS = re.compile(r"(dask|tcp)://[^:]+:\d{1,5}")  # of a dask scheduler
 TIMEOUT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
 if TYPE_CHECKING:
@@ -65,17 +61,15 @@ def result_columns(trace: Trace) -> ResultColumns:
         return failed | {"failure": str(error)}
 
 
-def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Prepared]]:
+def batches(scenarios: Iterable[Scenario]) -> Iterator[list[Prepared]]:
     """Yield prepared scenarios in batches of one layout, each several seconds of work."""
     groups: dict[Hashable, list[Prepared]] = {}
     for prepared in map(prepare, scenarios):
-        groups.setdefault((prepared.key, bool(prepared.why_not)), []).append(prepared)
+        groups.setdefault(prepared.key, []).append(prepared)
     for group in groups.values():
-        work = max(1, group[0].scenario.work) * (
-            PYTHON_SLOWDOWN * threads if group[0].why_not else 1
-        )
-        size = max(1, min(MAX_RUNS, min(MAX_WORK_PER_THREAD * threads, MAX_WORK) // work))
-        yield from (group[i : i + size] for i in range(0, len(group), size))
+        size = min(max(1, MAX_WORK // group[0].scenario.work), MAX_RUNS)
+        for first in range(0, len(group), size):
+            yield group[first : first + size]
 
 
 def run_batch(
@@ -143,7 +137,7 @@ def compute_elsewhere(
         ) from None
     except ImportError as error:
         raise ScenarioError(
-            f"a worker says {error}: install smc-mujoco there, the same version as here"
+            f"a worker says {error}: install there what is installed here"
         ) from None
     finally:
         for future in sent:
@@ -154,17 +148,15 @@ def run_on_worker(packed: bytes, keys: Sequence[str]) -> list[ResultColumns]:
     """Run and score scenarios, on a worker."""
     try:
         scenarios: list[Scenario] = pickle.loads(packed)
-    except (ImportError, AttributeError) as error:
-        raise ScenarioError(f"a worker says {error}: install there what your laws import") from None
+    except AttributeError as error:
+        raise ImportError(str(error)) from None
     plants: run_key.Hashes = {}
     for scenario, sent in zip(scenarios, keys, strict=True):
         if run_key.key(scenario, plants=plants) != sent:
-            versions = {"Python": platform.python_version()} | run_key.description(scenario)[
-                "versions"
-            ]
-            here = ", ".join(f"{name} {version}" for name, version in versions.items())
+            here = {"Python": platform.python_version(), **serialise.describe(scenario)["versions"]}
             raise ScenarioError(
-                f"a worker has other code for {scenario.law} ({here}): install the same there as here"
+                f"a worker has other code for {scenario.law} ({here}): install the same there as "
+                "here"
             )
     return [result_columns(trace) for trace in run_batch(scenarios, _threads())]
 
@@ -182,21 +174,14 @@ def _threads() -> int:
 
 
 def as_executor(executor: object) -> str | Executor:
-    """Return "local", an address that begins with ADDRESS, or an Executor.
-
-    A dask Client becomes an Executor.
-    """
+    """Return "local", an ADDRESS, or an Executor, which a dask Client becomes."""
     dask = sys.modules.get("distributed")
     if dask is not None and isinstance(executor, dask.Client):
         return _DaskExecutor(executor)
     if isinstance(executor, Executor):
         return executor
-    if isinstance(executor, str):
-        address = executor.replace(DASK_ADDRESS, ADDRESS, 1)
-        host, _, port = address.removeprefix(ADDRESS).rpartition(":")
-        remote = address.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16
-        if remote or executor == "local":
-            return address
+    if isinstance(executor, str) and (executor == "local" or ADDRESS.fullmatch(executor)):
+        return executor
     raise ScenarioError(
         f"executor is {shown(executor)}: give 'local', 'dask://HOST:PORT', a dask Client or a "
         "concurrent.futures.Executor"
@@ -212,17 +197,9 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
     with extra("cluster", f"executor {executor!r}"):
         from distributed import Client
         from distributed.scheduler import KilledWorker
-    # an error is one sentence here, not also a traceback
-    logs = []
-    for name in LOGGERS:
-        logs.append(logging.getLogger(name))
-    before = [log.level for log in logs]
+    address = f"tcp://{executor.partition('://')[2]}"
     try:
-        for log in logs:
-            log.setLevel(logging.CRITICAL)
-        with Client(
-            f"tcp://{executor.removeprefix(ADDRESS)}", timeout=TIMEOUT, set_as_default=False
-        ) as client:
+        with Client(address, timeout=TIMEOUT, set_as_default=False) as client:
             with contextlib.suppress(TimeoutError):
                 client.wait_for_workers(1, timeout=TIMEOUT)
             if not client.ncores():
@@ -238,9 +215,6 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
         raise ScenarioError(
             f"no dask at {executor} ({error}): start `dask scheduler` and `dask worker` there"
         ) from None
-    finally:
-        for log, level in zip(logs, before, strict=True):
-            log.setLevel(level)
 
 
 class _DaskExecutor(Executor):
@@ -311,7 +285,7 @@ def _by_value(thing: Any, why: str) -> bytes:
         Pickler(buffer).dump(thing)
     except Exception as error:  # whatever an object's own methods raise
         raise ScenarioError(
-            f"a law, signal or part cannot be sent to another process ({one_line(str(error))}): use plain functions "
-            "and numbers"
+            f"a law, signal or part cannot be sent to another process ({one_line(str(error))}): "
+            "use plain functions and numbers"
         ) from None
     return buffer.getvalue()

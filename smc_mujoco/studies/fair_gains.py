@@ -20,8 +20,13 @@ import numpy as np
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
-from smc_mujoco.common.progress import about, bar, note
+from smc_mujoco.common.errors import (
+    MAX_ITEMS,
+    BrokenLawError,
+    ScenarioError,
+    ScenarioWarning,
+)
+from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -30,10 +35,10 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, applicable
-from smc_mujoco.simulation.grid import Starts, all_combinations
+from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names
+from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.board import first_of
 from smc_mujoco.studies.leaderboard import Unseen
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
@@ -43,8 +48,8 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.studies.worst_case import WorstCase
 
-LONG = 120.0  # s of tuning, from which on it is said what takes less; chosen
 NOT_TUNED, UNTUNABLE = "not tuned: ", "tuning is not possible here: "  # at the start of a remark
+Laws = Sequence[Component | Template]  # those without given gains are templates
 
 
 class Candidate(NamedTuple):
@@ -56,25 +61,22 @@ class Candidate(NamedTuple):
 
     def __call__(self, seed: int) -> Component:
         """Return the law with the gains of the run with this seed."""
-        return self.sets[seed % len(self.sets)]
+        return self.sets[seed % MAX_ITEMS % len(self.sets)]
 
     def unseen(
-        self, plant: Plant, goal: Objective, count: int, threads: int | None
+        self, plant: Plant, goal: Objective, instances: Sequence[int], threads: int | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return J on instances 0, 1, ..., that of one in four at half the physics step, and the
-        sets' numbers.
+        """Return J on instances, that of one in four at half the physics step, and the sets'
+        numbers.
         """
         from smc_mujoco.analysis.tuning.evaluator import objectives
 
-        instances = range(count)
-        again = range(0, count, REPEATED_SEEDS)
-        options = {"threads": threads}
-        values = objectives(plant, [self(i) for i in instances], goal, instances, **options)
-        halves = np.full(count, math.nan)
-        halves[::REPEATED_SEEDS] = objectives(
-            plant, [self(i) for i in again], goal, again, halved=True, **options
-        )
-        return values, halves, np.arange(count) % len(self.sets)
+        laws = [self(instance) for instance in instances]
+        values = objectives(plant, laws, goal, instances, threads)
+        every = slice(None, None, REPEATED_SEEDS)
+        halves = np.full(len(laws), math.nan)
+        halves[every] = objectives(plant, laws[every], goal, instances[every], threads, halved=True)
+        return values, halves, np.arange(len(laws)) % len(self.sets)
 
 
 def law_or_template(law: Component | Template | str) -> Component | Template:
@@ -96,15 +98,11 @@ def _without_search(plant: Plant, law: Component | Template, gains: str) -> Cand
     if not law.gains or gains == "default":
         return _default(law)
     library = plants_known().get(plant.name)
-    ours = (
-        catalogue().get(law.name) is law
-        and library is not None
-        and library.parameters == plant.parameters
-    )
+    of_library = library is not None and library.parameters == plant.parameters
+    ours = of_library and catalogue().get(law.name) is law
     if ours and not plant.unscaled and gain_sets.in_set(plant, law.name, gains):
-        if gains == "study":
-            count = 1
-        else:
+        count = 1
+        if gains != "study":
             count = len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(gain_sets.law(plant, law.name, gains), sets)
@@ -125,28 +123,21 @@ def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
     """
     from smc_mujoco.analysis.tuning import search_space
 
-    its = tuned.law.source
+    found = tuned.law.source
     if tuned.before < tuned.objective:
-        if default.source.kind == source.DEFAULT:
-            its_own = "defaults"
-        else:
-            its_own = "own gains"
-        default = default.sourced(its.kind, its.search)
-        return Candidate(default, (default,), f"its {its_own}, better than those tried")
-    gains = []
+        own = "defaults" if default.source.kind == source.DEFAULT else "own gains"
+        kept = default.sourced(found.kind, found.search)
+        return Candidate(kept, (kept,), f"its {own}, better than those tried")
+    sets = []
     for tried in tuned.sets:
-        gains.append(dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True)))
-    sets = tuple(
-        dataclasses.replace(default, gains=values).sourced(its.kind, its.search) for values in gains
-    )
-    without_unit = list(search_space.without_unit(default))
-    if len(without_unit) > 1:
-        have = "have no unit, so their"
-    else:
-        have = "has no unit, so its"
-    words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"
-    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(its.kind, its.search)
-    return Candidate(best, sets, words * bool(without_unit))
+        gains = dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True))
+        with_gains = dataclasses.replace(default, gains=gains)
+        sets.append(with_gains.sourced(found.kind, found.search))
+    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
+    remark = ""
+    if names := list(search_space.without_unit(default)):
+        remark = f"no unit, so searched about the default: {joined(names)}"
+    return Candidate(best, tuple(sets), remark)
 
 
 class Trial(NamedTuple):
@@ -161,150 +152,99 @@ class Trial(NamedTuple):
     folder: Path
     threads: int | None
     progress: bool
+    seed: int = 0  # another one draws other instances, noise and starts
+
+    def seeds(self, count: int) -> range:
+        """Return the seeds of that many runs, which are also the numbers of unseen instances."""
+        first = self.seed * MAX_ITEMS
+        return range(first, first + count)
+
+    def case(
+        self, plant: Plant, law: Component | Template | str, condition: Condition | str
+    ) -> Scenario:
+        """Return a run of a law, from the start of the first seed."""
+        (seed,) = self.seeds(1)
+        return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=self.starts)
+
+    def check(self, laws: Mapping[str, Laws]) -> None:
+        """Refuse, before gains are searched, two things of one name, and what moves nothing."""
+        every = [coerce.law(law) for of_plant in laws.values() for law in of_plant]
+        check_names(self.plants, every, self.conditions)
+        for plant in self.plants:
+            for condition in self.conditions:
+                check_moving([self.case(plant, "none", condition)])
 
     def gains(
-        self, laws: Mapping[str, Sequence[Component | Template]], defaults: bool, **options: Any
+        self,
+        laws: Mapping[str, Laws],
+        defaults: bool,
+        searches: int = SEARCHES,
+        budget: int = BUDGET,
+        tune: bool = True,
+        gains: str = "tuned",
     ) -> dict[str, list[Candidate]]:
-        """Return plant -> its laws with gains, see `gains_on` for the options.
+        """Return plant -> its laws with gains: given, shipped, tuned or default ones, in this order
+        of preference.
+
+        If some laws have shipped gains, the others are tuned from the starts of those. The folder
+        keeps each search.
 
         Raises:
           ScenarioError: none of several laws can be tuned on a plant, so that there could be no
             winner, unless `defaults`. It is raised before the first search.
         """
-        for plant in () if defaults else self.plants:
-            self._check_tunable(plant, laws[plant.name], **options)
-        if self.progress:
-            self._announce(laws, **options)
-        return {
-            plant.name: self.gains_on(plant, laws[plant.name], **options) for plant in self.plants
-        }
-
-    def gains_on(
-        self,
-        plant: Plant,
-        laws: Sequence[Component | Template],
-        searches: int = SEARCHES,
-        budget: int = BUDGET,
-        tune: bool = True,
-        gains: str = "tuned",
-    ) -> list[Candidate]:
-        """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order
-        of preference.
-
-        If some laws have shipped gains, the others are tuned from the starts of those. Laws without
-        given gains come as templates. The folder keeps each search.
-        """
-        known, starts = self._known(plant, laws, gains)
-
-        def missing(law: Component | Template) -> Candidate:
-            if tune:
-                return self.tuned(plant, law, starts, searches, budget)
-            return _default(law)
-
-        return [candidate or missing(law) for law, candidate in zip(laws, known, strict=True)]
-
-    def _known(
-        self, plant: Plant, laws: Sequence[Component | Template], gains: str
-    ) -> tuple[list[Candidate | None], Starts | None]:
-        """Return the laws that need no search, None for others, and the starts of the searches for
-        those.
-        """
-        known = [_without_search(plant, law, gains) for law in laws]
-        shipped = any(
-            candidate and candidate.law.source.kind == source.SHIPPED for candidate in known
-        )
-        return known, None if shipped else self.starts
+        known: dict[str, list[Candidate | None]] = {}
+        starts: dict[str, Starts | None] = {}
+        for plant in self.plants:
+            candidates = [_without_search(plant, law, gains) for law in laws[plant.name]]
+            kinds = {candidate.law.source.kind for candidate in candidates if candidate}
+            known[plant.name] = candidates
+            starts[plant.name] = None if source.SHIPPED in kinds else self.starts
+            if tune and not defaults:
+                self._check_tunable(plant, laws[plant.name], candidates, starts[plant.name])
+        made: dict[str, list[Candidate]] = {}
+        for plant in self.plants:
+            made[plant.name] = []
+            for law, found in zip(laws[plant.name], known[plant.name], strict=True):
+                candidate = found or _default(law)
+                if found is None and tune:
+                    candidate = self.tuned(plant, law, starts[plant.name], searches, budget)
+                made[plant.name].append(candidate)
+        return made
 
     def _check_tunable(
         self,
         plant: Plant,
-        laws: Sequence[Component | Template],
-        tune: bool = True,
-        gains: str = "tuned",
-        **_: Any,
+        laws: Laws,
+        known: Sequence[Candidate | None],
+        starts: Starts | None,
     ) -> None:
         """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a
         plant.
         """
-        if len(laws) < 2 or not tune:
-            return
-        known, starts = self._known(plant, laws, gains)
-        reasons = []
-        for law, candidate in zip(laws, known, strict=True):
-            if candidate is not None and not candidate.remark.startswith(UNTUNABLE):
-                return
-            if not (why := candidate.remark if candidate else self._why_not(plant, law, starts)):
-                return
-            reasons.append(why)
-        raise ScenarioError(
-            f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default gains"
-        )
-
-    def _announce(
-        self,
-        laws: Mapping[str, Sequence[Component | Template]],
-        searches: int = SEARCHES,
-        budget: int = BUDGET,
-        tune: bool = True,
-        gains: str = "tuned",
-    ) -> None:
-        """Say which laws are tuned on which plants, by how many searches, and for about how long,
-        on stderr.
-        """
-        seconds = 0.0
-        named = dict[str, list[str]]()
-        for plant in self.plants if tune else ():
-            known, starts = self._known(plant, laws[plant.name], gains)
-            new = [
-                law
-                for law, candidate in zip(laws[plant.name], known, strict=True)
-                if candidate is None
-            ]
-            files = [self._file(plant, law, searches, budget) for law in new]
-            new = [
-                law
-                for law, file in zip(new, files, strict=True)
-                if not any(file.parent.glob(f"{file.stem}-*"))
-            ]
-            if new := [law for law in new if not self._why_not(plant, law, starts)]:
-                from smc_mujoco.analysis.tuning import search
-
-                goal = self._goal(plant, starts)
-                seconds += searches * search.expected_seconds(
-                    plant, new, goal, budget, self.threads
-                )
-                for law in new:
-                    named.setdefault(law.name, []).append(plant.name)
-        if named:
-            groups: dict[str, list[str]] = {}
-            for law, plants in named.items():
-                groups.setdefault(joined(plants), []).append(law)
-            what = "; ".join(f"{first_of(its)} on {plants}" for plants, its in groups.items())
-            if searches > 1:
-                each = f"{searches} searches each"
-            else:
-                each = "1 search each"
-            cures = ["name some of the laws (laws=, --law)"] * (len(named) > 1)
-            cures += ["quick=True (--quick)"] * (searches >= SEARCHES)
-            less = f". For less time: {' or '.join(cures)}" * (seconds > LONG and bool(cures))
-            note(f"tuning {what}: {each}, {about(seconds)}{less}")
-
-    def _file(self, plant: Plant, law: Component | Template, searches: int, budget: int) -> Path:
-        """Return the path of a tuning, without its hashes."""
-        return self.folder / "gains" / f"{plant.name}-{law.name}-{searches}-{budget}.json"
-
-    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
-        """Return why a law cannot be tuned on a plant, "" if it can, as `search.why_not`."""
         from smc_mujoco.analysis.tuning import search
 
-        return search.why_not(plant, law, self._goal(plant, starts))
+        reasons = []
+        goal = self._goal(plant, starts)
+        for law, candidate in zip(laws, known, strict=True):
+            if candidate is None:
+                reason = search.why_not(plant, law, goal)
+            else:
+                reason = candidate.remark
+            if not reason:
+                return
+            reasons.append(reason)
+        if len(laws) > 1:
+            raise ScenarioError(
+                f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default "
+                "gains"
+            )
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
         usual = Objective()
-        conditions = tuple(
-            c for c in usual.conditions if applicable([c.name], [plant], usual.duration)
-        )
+        fit = applicable([c.name for c in usual.conditions], [plant], usual.duration)
+        conditions = tuple(c for c in usual.conditions if c.name in fit)
         return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
     def tuned(
@@ -322,35 +262,36 @@ class Trial(NamedTuple):
 
         goal = self._goal(plant, starts)
         default = coerce.law(law)
-        try:
-            (first, *_) = goal.scenarios(plant, default)
-            if isinstance(law, Template):
-                template = law
-            else:
-                template = default.template
-            ranges = template and (dict(template.gains), dict(template.conditions))
-            depends = [
-                run_key.key(first),
-                goal.describe(),
-                fingerprint.of((default.function, ranges)),
-            ]
-            with warnings.catch_warnings():
-                for words in (
-                    "no set of gains tried",
-                    ".* no unit, and so a search",
-                ):  # the remark says so
-                    warnings.filterwarnings("ignore", words, ScenarioWarning)
-                file = self._file(plant, law, searches, budget)
-                options = {"searches": searches, "folder": file.parent / "searches"}
-                tuned = cached(
-                    file,
-                    depends,
-                    lambda: search.tune(
-                        plant, law, budget, 0, goal, self.threads, self.progress, **options
-                    ),
-                    lambda made, path: made.save(path),
-                    lambda path: result.load(path, plant),
+        template = law if isinstance(law, Template) else default.template
+        ranges = template and (dict(template.gains), dict(template.conditions))
+        folder = self.folder / "gains"
+
+        def searched() -> "Tuned":
+            with warnings.catch_warnings():  # the remark says so
+                warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
+                warnings.filterwarnings("ignore", ".* no unit, and so a search", ScenarioWarning)
+                return search.tune(
+                    plant,
+                    law,
+                    budget,
+                    0,
+                    goal,
+                    self.threads,
+                    self.progress,
+                    searches=searches,
+                    folder=folder / "searches",
                 )
+
+        try:
+            first = goal.scenarios(plant, default)[0]
+            code = fingerprint.of((default.function, ranges))
+            tuned = cached(
+                folder / f"{plant.name}-{law.name}-{searches}-{budget}.json",
+                [run_key.key(first), goal.describe(), code],
+                searched,
+                lambda made, path: made.save(path),
+                lambda path: result.load(path, plant),
+            )
         except BrokenLawError:
             raise
         except ScenarioError as error:
@@ -360,11 +301,17 @@ class Trial(NamedTuple):
     def run(
         self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any
     ) -> Table:
-        """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options
-        of `study`.
+        """Run the laws of each plant in each condition from that many seeds, with the options of
+        `study`.
         """
-        grid = self.plants, lambda plant: candidates[plant.name], self.conditions, range(seeds)
-        runs = all_combinations(*grid, self.duration, self.starts)
+        runs = all_combinations(
+            self.plants,
+            lambda plant: candidates[plant.name],
+            self.conditions,
+            self.seeds(seeds),
+            self.duration,
+            self.starts,
+        )
         options |= {"half_steps": True, "threads": self.threads, "progress": self.progress}
         return study(runs, self.folder, **options)
 
@@ -375,24 +322,20 @@ class Trial(NamedTuple):
         left out.
         """
         found = {}
-        several = [(plant, c) for plant in self.plants for c in candidates[plant.name]]
-        with bar(
-            "J on runs that no search has seen", len(several), self.progress, counted=True
-        ) as shown:
+        words = "J on runs that no search has seen"
+        laws = sum(map(len, candidates.values()))
+        with bar(words, laws, self.progress, counted=True) as shown:
             for plant in self.plants:
                 goal = self._goal(plant, self.starts)
-                its = {}
-                for candidate in candidates[plant.name]:
-                    with contextlib.suppress(ScenarioError):
-                        its[candidate.law.name] = candidate.unseen(plant, goal, count, self.threads)
-                    shown.advance(1.0)
-                if len(its) == len(candidates[plant.name]):
-                    values, halves, sets = (
-                        {law: one[k] for law, one in its.items()} for k in range(3)
-                    )
-                    found[plant.name] = Unseen(
-                        values, halves, sets, len(goal.conditions) * goal.duration**2 / 2.0
-                    )
+                least = len(goal.conditions) * goal.duration**2 / 2.0
+                runs = Unseen({}, {}, {}, least)
+                with contextlib.suppress(ScenarioError):
+                    for candidate in candidates[plant.name]:
+                        parts = candidate.unseen(plant, goal, self.seeds(count), self.threads)
+                        for of_law, values in zip(runs[:3], parts, strict=True):
+                            of_law[candidate.law.name] = values
+                        shown.advance(1.0)
+                    found[plant.name] = runs
         return found
 
     def attack(

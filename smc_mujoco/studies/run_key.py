@@ -29,13 +29,8 @@ NOT_OF_CONDITION = (
     "versions",
     "condition",
 )
-UNRELATED_FOLDERS = (  # of this package, which do not affect runs
-    "evidence/audit",
-    "evidence/papers",
-    "draw",
-    "testing",
-    "control/tuned_gains",
-)
+# of this package, which do not affect runs
+UNRELATED = ("evidence/audit", "evidence/papers", "draw", "testing", "control/tuned_gains")
 MAX_NAME = 60  # characters of a condition's name
 
 
@@ -60,7 +55,7 @@ def key(
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
     codes = code_hashes(scenario, {} if plants is None else plants)
-    text = to_json([data, codes, fingerprint.package(*UNRELATED_FOLDERS)], sort_keys=True)
+    text = to_json([data, codes, fingerprint.package(*UNRELATED)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
@@ -68,13 +63,10 @@ def portable_key(scenario: Scenario) -> str:
     """Return a hash, 16 hex digits, of the scenario and of the code of its parts alone: the same on
     every machine.
     """
-    data = description(scenario) | {
-        "versions": None,
-        "condition": None,
-    }  # the condition's name adds nothing
-    return hashlib.sha256(
-        to_json([data, code_hashes(scenario, {})], sort_keys=True).encode()
-    ).hexdigest()[:16]
+    # the condition's name adds nothing
+    data = description(scenario) | {"versions": None, "condition": None}
+    text = to_json([data, code_hashes(scenario, {})], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
@@ -110,13 +102,13 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     nominal = _nominal(scenario.plant, scenario.duration)
     if text == nominal:
         return "nominal"
-    changed = [
-        name for name, value in json.loads(text).items() if json.loads(nominal).get(name) != value
-    ]
-    differ = [
-        name for name in changed if getattr(scenario, name) is not None
-    ]  # the rest are defaults
-    name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
+    usual = json.loads(nominal)
+    parts = []
+    for field, value in json.loads(text).items():
+        given = getattr(scenario, field)
+        if usual.get(field) != value and given is not None:  # None is a default
+            parts.append(f"{field}={' '.join(repr(given).split())}")
+    name = ", ".join(parts)
     if len(name) <= MAX_NAME:
         return name
     return f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
@@ -132,18 +124,11 @@ def _nominal(plant: Plant, duration: float) -> str:
     """Return the `_condition_text` of the nominal condition on a plant, "{}" where it does not fit
     the plant.
     """
-    common: dict[str, Any] = {
-        "plant": plant,
-        "law": "none",
-        "duration": duration,
-        "control_period": CONTROL_PERIOD,
-    }
+    fields = {"plant": plant, "law": "none", "duration": duration, "control_period": CONTROL_PERIOD}
     if not plant.limits:  # with limits, its motors bound u
-        common["u_max"] = U_MAX
-    with contextlib.suppress(
-        ScenarioError
-    ):  # `recorded`: x0 may be outside a joint's range, as this is not run
-        return _condition_text(
-            description(Scenario.recorded(**common | find_condition("nominal").on(plant, duration)))
-        )
+        fields["u_max"] = U_MAX
+    with contextlib.suppress(ScenarioError):
+        fields |= find_condition("nominal").on(plant, duration)
+        # `recorded`: x0 may be outside a joint's range, as this is not run
+        return _condition_text(description(Scenario.recorded(**fields)))
     return "{}"

@@ -55,20 +55,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 METRIC = "rms_error"
-DEFAULT_STEPS = (
-    3_600_000  # physics steps by default, for a plant of one channel: up to 20 s of a core
-)
+# physics steps by default, for a plant of one channel: up to 20 s of a core
+DEFAULT_STEPS = 3_600_000
 MIN_POINTS, MAX_POINTS = 8, 4096  # of the default, powers of 2
-ROUGH_POINTS = (
-    32  # with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
-)
+# with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
+ROUGH_POINTS = 32
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
-DELAY_PERIODS, NOISE, COUNTS = (
-    20.0,
-    1e-3,
-    (2.0**11, 2.0**15),
-)  # of the default class: control periods, rad or m; chosen
+# of the default class: control periods, rad or m; chosen
+DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
+KEY = (
+    "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 % "
+    "intervals. A run fails, too, if it ends beyond 5 % of its scale."
+)
 HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 
 
@@ -87,12 +86,6 @@ class Sensitivity(Tables, SobolResult):
         return f"{self.scenario.law.name} on {self.scenario.plant.name}: {' '.join(self.sentences)}"
 
     @property
-    def sentences(self) -> list[str]:
-        """The result in words: what explains the spread, where runs fail, and what to improve."""
-        told = [self._culprit, *self._failures, *self._improvement]
-        return [sentence[0].upper() + sentence[1:] for sentence in told]
-
-    @property
     def label(self) -> str:
         """The metric's name in texts."""
         return CATALOGUE[self.metric].label
@@ -102,47 +95,34 @@ class Sensitivity(Tables, SobolResult):
         return f"{CATALOGUE[self.metric].text(value)} {self.unit}".strip()
 
     @property
-    def _culprit(self) -> str:
-        if 2 * self.unscored > len(self.values):
-            told = f"{self.unscored} of {len(self.values)} runs have no {self.label}, too many to explain it"
-            return f"{told}: take another metric, or longer runs."
+    def sentences(self) -> list[str]:
+        """The result: the spread, what explains it, where runs fail, and what to narrow."""
         low, high = np.quantile(self.values, [0.05, 0.95])
-        spread = f"the spread of {self.label} ({self.text(low)} to {self.text(high)} in 90 % of the runs)"
-        if not self.axes or not np.ptp(self.values):
-            return f"All of {len(self.values)} runs have the same {self.label}, {self.text(float(self.values[0]))}."
-        first, *others = self.axes
-        ends = f"{100 * first.total.low:.0f} to {100 * first.total.high:.0f} %"
-        rivals = [axis for axis in others if axis.total.high > first.total.low]
-        if not rivals:
-            share = f"{100 * first.total.median:.0f} %"
-            return f"{in_words(first.name)} explains {share} of {spread}, 95 % interval {ends}."
-        named = joined(in_words(axis.name) for axis in (first, *rivals))
-        return f"Which axis explains most of {spread} is open: the intervals of {named} overlap, so give more points."
-
-    @property
-    def _failures(self) -> list[str]:
-        count = int(self.failed.sum())
         n = len(self.failed)
-        if not count:
-            return [f"None of {n} runs fails (at most {100 * share_interval(0.0, n).high:.2g} %)."]
-        if count == n:
-            return [f"All of {n} runs fail."]
-        told = []
-        for its in self.regions:
-            told.append(f"It fails where {_words(self.space, its.cuts)}: {_rate(its.rate)}")
-        if not told:
-            return [f"{count} of {n} runs fail, in no region that two bounds could tell."]
-        rest = self.regions[-1].outside
-        return [f"{'; '.join(told)}; elsewhere {round(rest.median * rest.n)} of {rest.n}."]
+        lines = [
+            f"Of {n} runs 90 % have a {self.label} of {self.text(low)} to {self.text(high)}; "
+            f"{self.unscored} have none and count as the worst.",
+            f"First: {self._first}.",
+            f"Failed: {_rate(share_interval(float(self.failed.mean()), n))}.",
+        ]
+        for region in self.regions:
+            rates = f"{_rate(region.rate)}, elsewhere {_rate(region.outside)}"
+            lines.append(f"Failed where {_words(self.space, region.cuts)}: {rates}.")
+        if half := self.improvement:
+            change = f"the median is {self.text(half.median)} in place of {self.text(half.before)}"
+            lines.append(f"Narrow first: to {_words(self.space, [half.half])}; {change}.")
+        return lines
 
     @property
-    def _improvement(self) -> list[str]:
-        if not (its := self.improvement):
-            return []
-        now = self.text(its.median)
-        before = self.text(its.before)
-        words = _words(self.space, [its.half]).replace("<", "to below").replace(">", "to above")
-        return [f"Narrow {words} first: the median {self.label} is then {now}, not {before}."]
+    def _first(self) -> str:
+        """The axis that explains most, if the intervals tell."""
+        if not self.axes or not np.ptp(self.values) or 2 * self.unscored > len(self.values):
+            return "no axis, as the scores do not differ, or most runs have none"
+        first, *others = self.axes
+        if any(axis.total.high > first.total.low for axis in others):
+            return "open, as intervals overlap (give more points)"
+        share = _percent(first.total)
+        return f"{in_words(first.name)}, {share.text} % ({share.below} %)"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -151,34 +131,19 @@ class Sensitivity(Tables, SobolResult):
         """
         rows = []
         for axis in self.axes:
-            chance = axis.name == CHANCE
-            if chance:
-                ends = ["–", "–"]
-            else:
-                ends = [_with_unit(end, axis.unit) for end in (axis.low, axis.high)]
-            if chance or abs(axis.direction) < 0.1:
-                trend = "–"
-            else:
-                trend = "worse" if axis.direction > 0.0 else "better"
-            rows.append(
-                [in_words(axis.name), *ends, _percent(axis.first), _percent(axis.total), trend]
-            )
-        title = f"{self.scenario.law.name} on {self.scenario.plant.name}: shares of the variance of {self.label}, %"
-        key = "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 % intervals."
-        if self.failed.any():
-            fails = ["A run fails, too, if it ends beyond 5 % of its scale."]
-        else:
-            fails = []
-        if self.unscored:
-            missing = [f"{self.unscored} runs have no score and count as the worst."]
-        else:
-            missing = []
-        points = len(self.values) // 2
-        if points < ROUGH_POINTS:
-            few = [f"{points} points, which is few: intervals are rough, so give more."]
-        else:
-            few = []
-        notes = [*self.sentences, *few, *missing, key, *fails]
+            ends = ["–", "–"]
+            trend = "–"
+            if axis.name != CHANCE:
+                ends = [_with_unit(axis.low, axis.unit), _with_unit(axis.high, axis.unit)]
+                if abs(axis.direction) >= 0.1:
+                    trend = "worse" if axis.direction > 0.0 else "better"
+            shares = _percent(axis.first), _percent(axis.total)
+            rows.append([in_words(axis.name), *ends, *shares, trend])
+        where = f"{self.scenario.law.name} on {self.scenario.plant.name}"
+        title = f"{where}: shares of the variance of {self.label}, %"
+        notes = [*self.sentences, KEY]
+        if len(self.values) < 2 * ROUGH_POINTS:
+            notes.insert(0, f"Fewer than {ROUGH_POINTS} points: intervals are rough, give more.")
         return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
 
     def about(self) -> dict[str, Any]:
@@ -344,35 +309,35 @@ def _score(trace: Trace, metric: str) -> float:
     return entry.absent if math.isnan(value) else value
 
 
-def _rate(its: Interval) -> str:
+def _rate(rate: Interval) -> str:
     """Return a share of runs as words, with its interval."""
-    return f"{round(its.median * its.n)} of {its.n} runs ({100 * its.low:.0f} to {100 * its.high:.0f} %)"
+    share = _percent(rate)
+    return f"{round(rate.median * rate.n)} of {rate.n} ({share.below} %)"
 
 
 def _words(space: Space, cuts: Sequence[Cut]) -> str:
     """Return cuts as words, such as "delay > 9 ms and mass < 0.8 of nominal"."""
-    return joined(
-        f"{in_words(space.names[cut.axis])} {'<>'[cut.above]} "
-        f"{_with_unit(space.value(cut.axis, cut.share), space.ends[cut.axis][2])}"
-        for cut in cuts
-    )
+    words = []
+    for cut in cuts:
+        bound = _with_unit(space.value(cut.axis, cut.share), space.ends[cut.axis][2])
+        words.append(f"{in_words(space.names[cut.axis])} {'<>'[cut.above]} {bound}")
+    return joined(words)
 
 
 def _with_unit(value: float, unit: str) -> str:
     """Return a value of an axis as text, such as "9 ms" or "0.8 of nominal"."""
     if not unit:
         return f"{value:.3g} of nominal"
-    if unit == "counts":
-        return f"{value:.0f} counts"
-    if unit == "periods":
-        return f"{value:.3g} periods"
     if unit == "%":
         return f"{100 * value:+.3g} %"
     if unit == "added":
         return f"+{value:.3g}"
+    if unit in ("counts", "periods"):
+        return f"{value:.5g} {unit}"
     factor, prefixed = style.prefixed(value, unit)
     return f"{factor * value:.3g} {prefixed}"
 
 
-def _percent(its: Interval) -> Cell:
-    return Cell(f"{100 * its.median:.0f}", f"{100 * its.low:.0f}–{100 * its.high:.0f}")
+def _percent(share: Interval) -> Cell:
+    low, middle, high = (f"{100 * value:.0f}" for value in (share.low, share.median, share.high))
+    return Cell(middle, f"{low}–{high}")

@@ -284,12 +284,12 @@ def _compute(
     with counter(len(missing), sum(s.work for s in missing.values()), progress) as stepped:
         if where == "local":
             executors.compute_here(
-                executors.batches(missing.values(), threads), threads, finish_here, stepped
+                executors.batches(missing.values()), threads, finish_here, stepped
             )
         else:
             with executors.opened(where) as pool:
                 executors.compute_elsewhere(
-                    executors.batches(missing.values(), 1), pool, finish, stepped
+                    executors.batches(missing.values()), pool, finish, stepped
                 )
 
 
@@ -367,6 +367,6 @@ def _save_traces(table: Table, choice: str, folder: Path, threads: int, progress
         if not (file := trace_file(folder, row)).exists():
             files[table.scenario(i)] = file
     with counter(len(files), sum(s.work for s in files), progress) as stepped:
-        for batch in executors.batches(files, threads):
+        for batch in executors.batches(files):
             for i, trace in stream(batch, threads, stepped):
                 trace.save(files[batch[i].scenario])

@@ -35,7 +35,9 @@ CALLS = {
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 --figure f "
-    "--latex t.tex --executor dask://a:1 --traces all --threads 2": ["studies.compare.compare"],
+    "--latex t.tex --executor dask://a:1 --traces all --seed 5 --threads 2": [
+        "studies.compare.compare"
+    ],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [
@@ -47,9 +49,11 @@ CALLS = {
         "studies.study.study",
         "studies.leaderboard.leaderboard",
     ],
-    "which duffing": ["studies.adviser.which"],
+    "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
-    "--relevant 0.05 --out there --defaults --disturbance 2 --threads 2": ["studies.adviser.which"],
+    "--relevant 0.05 --out there --defaults --seed 5 --threads 2": [
+        "studies.which.which"
+    ],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],

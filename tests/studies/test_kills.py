@@ -29,7 +29,7 @@ from smc_mujoco.simulation.callback import callback as compiled_callback, silenc
 from smc_mujoco.simulation.prepare import prepare
 import pyarrow.parquet
 
-out, executors.MAX_WORK_PER_THREAD = Path(sys.argv[1]), 60
+out, executors.MAX_WORK = Path(sys.argv[1]), 60
 plants, laws, conditions = ["duffing", "van_der_pol"], ["observer_free", "classical"], ["nominal", "noise"]
 scenarios = grid(plants, laws, conditions, 10, "study", 0.05)
 """

@@ -10,21 +10,15 @@ from pathlib import Path
 import arms
 import numpy as np
 import pytest
-from helpers.sketch import made
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.bootstrap import Interval
-from smc_mujoco.analysis.ranking import Rank
 from smc_mujoco.common import cache
-from smc_mujoco.common.tabular import plain
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
-from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, Run, Setup
-from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
+from smc_mujoco.evidence.accuracy.accuracy import Run, Setup
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import executors, run_key, study, worst_case
-from smc_mujoco.studies.advice import Choice, ties
 from smc_mujoco.studies.scene import slug
-from smc_mujoco.studies.worst_case import WorstCase, WorstCases, default_budget
+from smc_mujoco.studies.worst_case import WorstCase, default_budget
 
 RUN = smc.Scenario(plant="duffing", law="classical", duration=8.0)
 WITHIN = smc.Uncertainty(disturbance=0.5, mass=(0.8, 1.2))
@@ -43,52 +37,6 @@ def attacked(law: str, value: float, median: float, **fields: object) -> WorstCa
     }
     both = {"scenario": scenario, "nominal": scenario, "within": WITHIN}
     return WorstCase(value=value, median=median, **given | both | fields)
-
-
-def rows_of(text: str) -> dict[str, list[str]]:
-    """The cells of a printed table by the name that begins a row, without its mark."""
-    return {
-        line.split()[0].rstrip("*"): line.split()[1:] for line in text.splitlines() if line.strip()
-    }
-
-
-def test_worst_cases_stand_from_the_least_with_their_places_by_median_their_class_and_what_lies_outside():
-    cases = [
-        attacked("classical", 0.2, 0.05, outside="the law is for |d| <= 0.1 N", sets=3),
-        attacked("pid", math.inf, 0.04, found_by="sine"),
-        attacked("adaptive", 0.1, 0.07, unit=""),
-    ]
-    text = plain(WorstCases(cases), 100)
-    rows = rows_of(text)
-    assert [law for law in rows if law in ("adaptive", "classical", "pid")][:3] == [
-        "adaptive",
-        "classical",
-        "pid",
-    ]
-    assert rows["adaptive"] == ["0.100", "0.0700", "3", "bang-bang"]
-    assert rows["pid"] == ["fails", "0.0400", "1", "sine"]
-    assert "tau between the two orders: -1.00" in text
-    assert "tau" not in plain(
-        WorstCases(cases[:2]), 100
-    )  # of two laws there is no order to speak of
-    assert ["in m," in plain(WorstCases(those), 100) for those in (cases, cases[:2])] == [
-        False,
-        True,
-    ]
-    for said in (text, plain(cases[0], 100)):
-        assert "classical: the law is for |d| <= 0.1 N" in said
-    for case, sets in ((cases[0], True), (cases[1], False)):
-        assert ("any of 3 parameter sets" in case.heading) is sets
-        assert all(
-            part in case.heading
-            for part in ("Duffing oscillator", "|d| <= 0.5 N", "mass x 0.8 to 1.2")
-        )
-    assert all(
-        part in repr(cases[1])
-        for part in ("pid on duffing", "rms error fails", "0.0400 m", "|d| <= 0.5 N")
-    )
-    names = "value median unit found_by tried metric outside seed sets within scenario"
-    assert list(cases[0].about()) == names.split()
 
 
 @pytest.mark.parametrize(
@@ -121,43 +69,6 @@ def test_a_default_budget_is_as_many_runs_as_take_the_time_of_that_many_steps():
     assert default_budget(network, WITHIN) == 2_500_000 // (8000 * 6)
     assert default_budget(dataclasses.replace(RUN, duration=500.0), WITHIN) == 24
     assert default_budget(dataclasses.replace(RUN, duration=0.5), WITHIN) == 1024
-
-
-def measured(
-    law: str, condition: str = "constant", gains: str = "shipped", why: str = "", failed: int = 0
-) -> Accuracy:
-    periods = (4e-3, 2e-3, 1e-3)
-    errors = ((0.8, 0.2, 0.05), (0.4, 0.11, 0.03))
-    scaling = Scaling(
-        errors=errors, used=periods, order=1.9, low=1.8, high=2.1, theory=2.0, why=why
-    )
-    free = dataclasses.replace(scaling, theory=1.0, order=math.nan, low=math.nan, high=math.nan)
-    names = {
-        "plant": "duffing",
-        "condition": condition,
-        "law": law,
-        "gains": gains,
-        "unit": "m",
-        "runs": 6,
-    }
-    return Accuracy(**names, periods=periods, e=scaling, s=free, failed=failed, floor=1e-9)
-
-
-def test_a_table_of_accuracies_marks_laws_with_a_reason_and_says_whose_gains_are_not_tuned():
-    rows = [
-        measured("classical"),
-        measured("pid", gains="default", why="the gains violate k > d", failed=2),
-    ]
-    table = AccuracyTable([*rows, measured("adaptive", "coulomb", gains="default")])
-    first, second = plain(table, 100).split("duffing, coulomb")
-    lines = rows_of(first)
-    assert lines["classical"] == ["8.0e-01", "5.0e-02", "1.90", "±0.20", "none", "2,", "1"]
-    assert "pid* " in first
-    assert "classical* " not in first
-    assert "* pid: the gains violate k > d" in first
-    assert "default gains: pid; tuned: classical" in first
-    assert "|e| in m, gains: default" in second
-    assert "default gains" not in second
 
 
 PROMISED = [  # change of the run, what keeps theory from promising an order
@@ -262,25 +173,6 @@ def test_a_mechanism_with_parts_takes_sixteen_steps_a_period_and_half_of_them_on
     assert whole[2].x0 == whole[3].x0
 
 
-def test_a_choice_has_an_interval_below_a_median_that_has_one_and_the_median_below_a_worst_case():
-    cases = (attacked("classical", 0.2, 0.05), attacked("classical", 0.3, 0.02))
-    first = Choice(
-        law=smc.law("classical"),
-        remark="",
-        rank=Rank("classical", 1.0, 1.0, True),
-        settles=1.0,
-        reliable=True,
-        fit=True,
-        worst=cases,
-        medians={"fast": Interval(0.5, 0.4, 0.6, 8), "calm": Interval(1.0, 1.0, 1.0, 8)},
-    )
-    assert [first.below(need) for need in ("fast", "calm")] == ["0.400–0.600", ""]
-    assert "0.0200" in first.below("robust")  # of the case with the largest worst found
-    assert "a remark" in dataclasses.replace(first, remark="a remark").gains
-    for plant in ("duffing", "pendulum_network", "panda"):
-        assert [metric.name for metric in ties(smc.plant(plant))] == ["overshoot", "energy"]
-
-
 def test_names_of_files(tmp_path):
     row = {
         "plant": "my plant",
@@ -327,36 +219,6 @@ def test_a_task_of_the_arm_has_its_part_its_seed_and_all_that_disturbs_it(task):
     assert (one.contact is not None and one.contact.kind == "wall") is (task in ("wall", "behind"))
 
 
-@pytest.mark.parametrize("name", arms.GAINS)
-def test_gains_of_laws_of_the_arm_are_those_that_a_search_found_within_its_torques(name):
-    law = arms.gained(name)
-    assert law.source.search is not None
-    assert law.source.kind == "shipped"
-    assert law.gains != smc.law(arms.OUTER.get(name, name)).gains
-    assert all(
-        np.isfinite(np.ravel(value)).all() for key, value in law.gains.items() if key != "w_max"
-    )
-
-
-def test_the_figures_of_worst_cases_are_of_their_runs_with_their_names(monkeypatch):
-    monkeypatch.setattr(worst_case, "run", lambda scenarios: [made(one) for one in scenarios])
-    one = attacked("classical", 0.2, 0.05)
-    other = attacked("adaptive", 0.3, 0.06)
-    for page, labels in (
-        (one.figure(), ["as given", "worst found, rms error 0.200 m"]),
-        (WorstCases([one]).figure(), ["as given", "worst found, rms error 0.200 m"]),
-        (
-            WorstCases([one, other]).figure(),
-            ["Classical: rms error 0.200 m", "Adaptive: rms error 0.300 m"],
-        ),
-    ):
-        assert [text.get_text() for text in page.legends[0].get_texts()][:2] == labels
-        assert page.legends[0].get_title().get_text() == one.heading
-        names = ["error e (m)", "control u (N)", "disturbance d (N)", "velocity v (m/s)"]
-        assert sorted(ax.get_ylabel() for ax in page.axes) == sorted(names)
-    assert one.plot(title="mine", panels=["x"]).legends[0].get_title().get_text() == "mine"
-
-
 SETUP = (
     smc.plant("duffing"),
     find_condition("constant"),
@@ -393,17 +255,8 @@ def test_an_accuracy_has_three_starts_at_five_periods_and_one_run_at_half_the_st
 
 def test_what_cannot_be_sent_is_refused_with_the_cure_for_each_side(monkeypatch, refused):
     refused(lambda: executors.packed(threading.Lock()), "plain functions")
-    refused(lambda: executors.run_on_worker(b"cnot_there\nf\n.", []), "not_there", "install there")
-    monkeypatch.setattr(
-        run_key, "description", lambda one: {"versions": {"mujoco": "1", "numba": "2"}}
-    )
     monkeypatch.setattr(run_key, "key", lambda *_, **__: "other")
-    monkeypatch.setattr(executors.platform, "python_version", lambda: "3")
-    refused(
-        lambda: executors.run_on_worker(pickle.dumps([RUN]), ["key"]),
-        "classical",
-        "Python 3, mujoco 1, numba 2",
-    )
+    refused(lambda: executors.run_on_worker(pickle.dumps([RUN]), ["key"]), "classical", "mujoco")
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
     refused(lambda: executors.packed(threading.Lock()), "pip install cloudpickle")
 

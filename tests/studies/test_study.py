@@ -174,7 +174,7 @@ def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path,
         *small(1),
     ]
     study(failing, tmp_path / "together")
-    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 1)
+    monkeypatch.setattr(executors, "MAX_WORK", 1)
     table = study(failing, tmp_path / "alone")
     assert bytes_of(tmp_path / "together") == bytes_of(tmp_path / "alone")
     said = table.column("failure")
@@ -240,7 +240,7 @@ def other_scores(path: Path) -> None:
 
 @pytest.mark.parametrize("harm", [cut, foreign, other_scores, lambda path: path.write_bytes(b"")])
 def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, ran, harm):
-    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 50)
+    monkeypatch.setattr(executors, "MAX_WORK", 50)
     study(small(), tmp_path)
     before = bytes_of(tmp_path)
     parts = sorted((tmp_path / "parts").iterdir())
@@ -279,7 +279,7 @@ def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
 def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
     scenarios = small(seeds=4)
     study(scenarios, tmp_path / "one")
-    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 1)
+    monkeypatch.setattr(executors, "MAX_WORK", 1)
     monkeypatch.setattr(store, "MAX_OPEN_PARTS", 1)
     shuffled = [scenarios[i] for i in np.random.default_rng(0).permutation(len(scenarios))]
     study(shuffled, tmp_path / "two")

@@ -8,7 +8,7 @@ import typer
 from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
-from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
 
@@ -17,16 +17,21 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
 
+Seed = Annotated[
+    int, typer.Option(min=0, help="Another seed draws other instances, starts and noise.")
+]
+
+
 def which(
     plant: options.PlantName,
     needs: Annotated[
-        str | None,
+        str,
         typer.Option(
-            help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, no-overshoot, robust; "
-            "default fast,accurate,calm. And what the law must have: no-velocity, continuous, finite-time, ..., "
+            help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, "
+            "no-overshoot; and what the law must have: no-velocity, continuous, finite-time, ..., "
             "as for `smc-mujoco list --needs`."
         ),
-    ] = None,
+    ] = "fast,accurate,calm",
     condition: options.Conditions = None,
     law: options.Laws = None,
     quick: options.Quick = False,
@@ -40,17 +45,14 @@ def which(
     relevant: options.Relevant = RELEVANT,
     out: options.Folder = Path("which"),
     defaults: options.Defaults = False,
-    disturbance: options.Disturbance = None,
+    seed: Seed = 0,
     threads: options.Threads = None,
 ) -> None:
-    """Advise a law for a plant: which to use, with which gains, why, the second choice, and how
-    sure that is.
+    """Advise a law for a plant: which to use, with which gains, the second, and how sure that is.
 
     All laws that suit the plant are compared by the rules of `compare`, with gains of the package
     or tuned now. On a model of your own that takes minutes for each law: --quick takes a sixteenth
-    of it, --law fewer laws. If no law is better than another, the answer says so. If you stop the
-    command, it continues when you start it again. For the need robust, an adversary attacks each
-    law within --disturbance, see `smc-mujoco worst`.
+    of it, --law fewer laws. If you stop the command, it continues when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
@@ -58,31 +60,27 @@ def which(
     sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-        from smc_mujoco.studies.adviser import which as advise
+        from smc_mujoco.studies.which import which as advise
 
     terminal = Terminal()
-    tested = options.conditions(condition) or None
-    start = options.starts(x0)
     advice = advise(
         plant,
-        tested,
-        options.names(needs),
+        options.conditions(condition) or None,
+        needs,
         options.laws(law) or None,
         seeds,
         duration,
-        start,
+        options.starts(x0),
         out,
         quick,
         threads,
         progress=True,
         defaults=defaults,
         relevant=relevant,
-        within=None if disturbance is None else Uncertainty(disturbance=disturbance),
+        seed=seed,
     )
     terminal.print(advice)
-    runs = f"{len(advice.table)} runs are in {printable(str(out / 'results.parquet'))}"
-    terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
+    _finish(advice.table, out, terminal)
 
 
 def compare(
@@ -127,6 +125,7 @@ def compare(
     traces: Annotated[
         str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")
     ] = "none",
+    seed: Seed = 0,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is
@@ -152,10 +151,11 @@ def compare(
     terminal = Terminal()
     start = options.starts(x0)
     if rig is not None:
-        if plants or condition or gains != "tuned" or worst or figure or latex or traces != "none":
-            others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
+        own = (plants, condition, gains != "tuned", worst, figure, latex, traces != "none", seed)
+        if any(own):
             raise ScenarioError(
-                f"--rig brings its own plant, parameter sets and gains: leave out {others}"
+                "--rig brings its own plant, parameter sets and gains: leave out the plants, "
+                "--condition, --gains, --worst, --figure, --latex, --traces and --seed"
             )
         _compare_on_rig(
             rig,
@@ -193,6 +193,7 @@ def compare(
         relevant=relevant,
         traces=traces,
         threads=threads,
+        seed=seed,
     )
     terminal.print(comparison)
     if latex:
@@ -228,16 +229,15 @@ def _compare_on_rig(
     chosen = options.laws(law, of_rig=machine.laws) or None
     length = FULL.duration if duration is None else duration
     tuning = {"starts": starts, "folder": out / "searches", "threads": threads, "progress": True}
-    if searches is None:
-        found = []
-    else:
+    found = []
+    if searches is not None:
         found = ensemble.tuned(machine, chosen, searches, **tuning)
     scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, starts)
     table = study(scenarios, out, True, executor, threads, progress=True, half_steps=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant)
     terminal.print(boards)
-    for one in found:
-        terminal.note(f"{one.law}{one.remark and f': {one.remark}'}", wrap=True)
+    for candidate in found:
+        terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
     terminal.note(ensemble.verdict(boards))
     _finish(table, out, terminal)
 

@@ -1,0 +1,125 @@
+"""Gains by one rule: which law is tuned, from which starts, and when a kept search is searched
+again.
+"""
+
+import dataclasses
+import functools
+import types
+from pathlib import Path
+
+import mujoco
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.control.law import catalogue, law_function
+from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
+from smc_mujoco.studies import fair_gains
+from smc_mujoco.studies.fair_gains import Trial
+
+FAST = smc.law("observer_free", lam=6.0, k1=2.0)
+DUFFING = smc.plant("duffing")
+
+
+def trial(folder, plants=(), starts=None) -> Trial:
+    return Trial(plants, [], 1.0, starts, folder, None, False)
+
+
+def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
+    asked = []
+
+    def tuned(self, plant, law, starts, *effort):
+        asked.append((starts, *effort))
+
+    monkeypatch.setattr(Trial, "tuned", tuned)
+    other = smc.starts(x0=0.5)
+    mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
+    laws = [catalogue()["classical"], mine]
+    for plant in (DUFFING, smc.plant("duffing", M=2.0)):
+        trial(Path("gains"), [plant], other).gains({"duffing": laws}, True, 3, 16)
+    assert asked == [(None, 3, 16), (other, 3, 16), (other, 3, 16)]
+
+
+def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_path, monkeypatch):
+    gains = {"kp": Gain(0.01, FORCE_PER_POSITION), "kd": Gain(0.01, FORCE_PER_SPEED)}
+
+    @law_function(gains=gains, continuous=True)
+    def my_pd(y, gains, memory):
+        return -gains.kp * y.e - gains.kd * y.de, y.e
+
+    tuned = []
+    tune = search.tune
+
+    def counted(*args, **options):
+        tuned.append(tune(*args, **options))
+        return tuned[-1]
+
+    monkeypatch.setattr(search, "tune", counted)
+    monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
+    # no catalogue has it, so its name says nothing to what reads the file of a tuning
+    heavy = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
+    for _ in range(2):
+        (found,) = trial(tmp_path, [heavy]).gains({"mine": [my_pd]}, False, 2, 8)["mine"]
+        assert found.law.function is my_pd.function
+        assert found.law.gains == tuned[0].law.gains != my_pd.defaults
+        assert [dict(law.gains) for law in found.sets] == [
+            dict(zip(("kp", "kd"), one.gains, strict=True)) for one in tuned[0].sets
+        ]
+        assert (found.law.source.kind, found.remark) == ("tuned here", "")
+    assert len(tuned) == 1
+
+
+def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_differs(
+    tmp_path, monkeypatch
+):
+    @law_function(gains={"kp": Gain(1.0, FORCE_PER_POSITION), "kd": Gain(1.0, FORCE_PER_SPEED)})
+    def my_spring(y, gains, memory):
+        return -gains.kp * y.e - gains.kd * y.de, y.e
+
+    def build(n):
+        return mujoco.MjSpec.from_string("<mujoco/>")
+
+    asked = []
+
+    def cached(path, depends, *rest):
+        asked.append(str(depends))
+        return types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
+
+    monkeypatch.setattr(fair_gains, "cached", cached)
+    fixed = Gain(1.0, FORCE_PER_SPEED, held=True)
+    held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": fixed})
+    other = dataclasses.replace(DUFFING, build=build)
+    for plant, law in ((DUFFING, my_spring), (DUFFING, my_spring), (DUFFING, held), (other, held)):
+        trial(tmp_path).tuned(plant, law, None, 3, 16)
+    assert asked[0] == asked[1]
+    assert len(set(asked)) == 3
+
+
+def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monkeypatch):
+    sets = []
+    for gains in (tuple(FAST.gains.values()), (5.0, 2.5)):
+        sets.append(types.SimpleNamespace(gains=gains))
+    tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST, sets=sets, bounds=FAST.gains)
+    monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
+    default = smc.law("observer_free")
+    own = trial(tmp_path).tuned(DUFFING, default, None, 3, 16)
+    assert (own.law, own.remark) == (default, "its defaults, better than those tried")
+    assert own.law.source.kind == FAST.source.kind
+    tuned.before = 3.0
+    found = trial(tmp_path).tuned(DUFFING, default, None, 3, 16)
+    assert (found.law, found.remark) == (FAST, "")
+    # also with another seed of the comparison run i has the gains of search i
+    for first in (0, 1_000_000):
+        assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]
+
+
+def test_a_plant_on_which_no_law_can_be_tuned_is_refused_before_any_search(tmp_path):
+    laws = {"overhead_crane": [smc.law("hierarchical").template, smc.law("pid").template]}
+    crane = trial(tmp_path, [smc.plant("overhead_crane")])
+    with pytest.raises(smc.ScenarioError, match=r"tuning is not possible here: .* defaults=True"):
+        crane.gains(laws, False)
+    assert not list(tmp_path.iterdir())
+    for found in crane.gains(laws, True)["overhead_crane"]:
+        assert found.law.source.kind == "default"
+        assert found.remark.startswith("tuning is not possible here: ")

@@ -1,0 +1,137 @@
+"""Which law: the order follows from the runs, and the last line says where they cannot decide."""
+
+import dataclasses
+import re
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search
+from smc_mujoco.cli import main
+from smc_mujoco.control import gain_sets
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.properties import searched
+from smc_mujoco.studies import which as module
+
+FAST = smc.law("observer_free", lam=6.0, k1=2.0)
+SLOW = smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
+IDLE = smc.law("none").named("idle")
+COMMON = {"duration": 2.5, "seeds": 16, "conditions": ["nominal", "noise"]}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("which")
+
+
+@pytest.fixture(scope="module")
+def advice(folder):
+    """A law that chatters, a fast one, a slow one, and none, which is the calmest."""
+    laws = ["classical", FAST, SLOW, IDLE]
+    return smc.which("duffing", needs="fast,calm", laws=laws, out=folder, **COMMON)
+
+
+def test_laws_stand_by_their_mean_rank_and_doing_nothing_is_not_compared(advice):
+    ranks = dict.fromkeys(("observer_free", "slow", "classical"), 0.0)
+    for board in advice.leaderboard:
+        for entry in board.entries:
+            ranks[entry.law] += entry.rank.mean
+    assert [law.name for law in advice.laws] == sorted(ranks, key=ranks.__getitem__)
+    assert (advice.law, advice.second) == (FAST, SLOW)
+    calm = advice.table.select(law="idle").column("tv_rate")
+    assert calm.max() == 0.0  # no law is calmer
+    assert advice.settles["idle"] < 0.5 * advice.settles["observer_free"] == 0.5
+
+
+def test_a_law_whose_runs_fail_comes_after_one_whose_runs_do_not(advice):
+    fast, calm = advice.leaderboard
+    first, *others = fast.entries
+    assert module._order([fast, calm])[0] == first.law
+    failing = dataclasses.replace(first, failed=first.failed + 99)
+    changed = dataclasses.replace(fast, entries=(failing, *others))
+    assert module._order([changed, calm])[-1] == first.law
+
+
+def test_the_answer_has_four_lines_and_counts_comparisons(advice):
+    wins = sum(len(board.wins("observer_free")) for board in advice.leaderboard)
+    assert advice.answer == [
+        "Use: observer_free",
+        "Gains: lam=6, k1=2 (yours)",
+        f"Second: {SLOW}",
+        f"How sure: it wins {wins} of 4 comparisons, and another law is better in 0",
+    ]
+    assert advice.tables[-1].notes[-4:] == advice.answer
+
+
+def test_what_cannot_be_decided_is_said(advice, folder):
+    few = smc.which("duffing", needs="fast", laws=[FAST, SLOW], out=folder, duration=2.5, seeds=3)
+    assert few.answer[3].startswith("How sure: first so far: too few runs (3), ")
+    same = smc.which("duffing", laws=[FAST, FAST.named("same")], out=folder, **COMMON)
+    assert same.answer[3].startswith("How sure: first so far: it wins 0 of 6 comparisons, ")
+    alone = smc.which("duffing", laws=FAST, out=folder, **COMMON)
+    assert (alone.second, alone.answer[2:]) == (
+        None,
+        ["Second: none", "How sure: there is no second law"],
+    )
+    short = smc.which("duffing", laws=[FAST, SLOW], out=folder, duration=0.1, seeds=4)
+    assert "no law is reliable here, this one settles in 0 %" in short.answer[3]
+    barred = dataclasses.replace(advice.leaderboard[0].blocks[0], untuned=("slow",))
+    board = dataclasses.replace(advice.leaderboard[0], blocks=(barred,))
+    untuned = dataclasses.replace(advice, leaderboard=[board])
+    assert untuned.answer[3].startswith("How sure: first so far: slow has default gains")
+
+
+def test_gains_of_the_package_are_taken_where_there_are_some(folder):
+    found = smc.which("duffing", laws=["classical"], out=folder, **COMMON)
+    assert found.law == gain_sets.law("duffing", "classical")
+    assert found.law.source.kind == "shipped"
+
+
+def test_properties_choose_laws_and_laws_with_given_gains_keep_them(tmp_path):
+    machine = smc.plant("duffing")
+    names = {law.name for law in module._suited(machine, ["continuous", "two-gains"], None)}
+    assert "observer_free" in names
+    assert not names & {"none", "classical", "observer_free_q15", "hierarchical"}
+    for law in map(catalogue().__getitem__, names):
+        assert law.continuous
+        assert len(searched(law)) in (1, 2)
+    code = "import smc_mujoco as smc\n@smc.law_function(gains={'k': 2.0})\n"
+    (tmp_path / "mine.py").write_text(f"{code}def mine(y, gains, memory):\n    return -y.e, y.e\n")
+    file = str(tmp_path / "mine.py")
+    chosen = module._suited(machine, (), [file, smc.law(file), f"{file}(k=2)", "pid", FAST])
+    assert [law.name for law in chosen] == ["mine", "mine", "mine", "pid", FAST.name]
+    assert [isinstance(law, Template) for law in chosen] == [True, True, False, True, False]
+
+
+REFUSED = [
+    ({"needs": "quick"}, "quick"),
+    ({"needs": "one-gain"}, "no law for duffing has one-gain"),
+    ({"needs": "continuous", "laws": ["twisting"]}, "no law for duffing has continuous"),
+    ({"plant": "acrobot"}, "no law for acrobot has gains"),
+    ({"laws": [FAST, smc.law("observer_free")]}, "two laws have the name"),
+    ({"conditions": "jump_mil"}, "did you mean 'jump_mild'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), REFUSED)
+def test_what_cannot_be_is_said_before_anything_is_searched(
+    arguments, sentence, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(search, "tune", None)
+    with pytest.raises(smc.ScenarioError, match=re.escape(sentence)):
+        smc.which(**{"plant": "duffing", "out": tmp_path} | arguments)
+
+
+def test_the_command_prints_the_tables_and_the_answer(folder, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    laws = "fast: observer_free(lam=6,k1=2),slow: observer_free(lam=6,k1=5)"
+    options = ["--needs", "fast", "--condition", "nominal", "--duration", "2.5", "--seed", "1"]
+    with pytest.raises(SystemExit) as end:
+        main.main(["which", "duffing", "--law", laws, *options, "--out", str(folder)])
+    assert not end.value.code
+    printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 80
+    assert re.search(r"Use: fast\nGains: lam=6, k1=2 \(yours\)\nSecond: slow\(", printed)
+    seeds = smc.Table.read(folder).column("seed")
+    assert seeds.min() == 1_000_000
