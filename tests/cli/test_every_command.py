@@ -51,9 +51,7 @@ CALLS = {
     ],
     "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
-    "--relevant 0.05 --out there --defaults --seed 5 --threads 2": [
-        "studies.which.which"
-    ],
+    "--relevant 0.05 --out there --defaults --seed 5 --threads 2": ["studies.which.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],
