@@ -60,13 +60,13 @@ from smc_mujoco.simulation.signals import Sine as Sine
 from smc_mujoco.simulation.signals import Step as Step
 from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
-from smc_mujoco.studies.which import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.sensitivity import sensitivity as sensitivity
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
+from smc_mujoco.studies.which import which as which
 from smc_mujoco.studies.worst_case import worst_case as worst_case
 
 __version__: str
