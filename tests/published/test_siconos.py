@@ -142,7 +142,7 @@ def implicit_twisting(y, gains, memory):
 
 @functools.cache
 def twisting_runs():
-    """Traces of Siconos' implicit twisting and of the library's explicit twisting, from (10, 10)."""
+    """Traces of Siconos' implicit twisting and of the library's explicit one, from (10, 10)."""
     common = {
         "plant": mass(),
         "x0": 10.0,

@@ -83,7 +83,7 @@ def test_conditioned_super_twisting_tolerates_disturbances_up_to_its_bound(force
 @pytest.mark.parametrize("name", ["proper_super_twisting", "proper_conditioned_super_twisting"])
 @pytest.mark.parametrize("period", [1e-2, 2e-3])
 def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, name):
-    """L h^2: what d can do to s, from a period that ends at s = 0, before the law can know of it."""
+    """L h^2: what d can do to s, from a period that ends at s = 0, before the law knows of it."""
     d = smc.Sine(1.0, L)
     if name == "proper_conditioned_super_twisting":
         bound = BOUND
@@ -95,7 +95,7 @@ def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, 
 
 
 @pytest.mark.slow
-def test_proper_conditioned_super_twisting_is_the_proper_law_until_u_is_saturated_and_then_does_not_wind_up():
+def test_proper_conditioned_super_twisting_is_proper_until_saturated_and_does_not_wind_up():
     """Of the inner branch too, where |s| <= dt^2 k2; and from s = 20 with |u| <= U, it overshoots
     by a fraction.
     """

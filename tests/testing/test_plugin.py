@@ -399,7 +399,7 @@ def test_a_golden_metric_is_within_its_tolerance_or_off(
     stored = json.loads(file.read_text())
     stored["test"]["overshoot"]["value"] = str(recorded)
     file.write_text(json.dumps(stored))
-    said = pytest.raises(AssertionError, match="^overshoot is 0 %") if off else None
+    said = pytest.raises(AssertionError, match=r"^overshoot is 0 %") if off else None
     with said or contextlib.nullcontext():
         golden.compare(file, "test", response, of_test)
 
