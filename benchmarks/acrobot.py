@@ -27,7 +27,8 @@ def fold(trace):
 
 def answer(runs):
     return (
-        f"swung up and held with {runs.those(stands).named}; the elbow ends farthest from straight, in degrees, with "
+        f"swung up and held with {runs.those(stands).named}; the elbow ends farthest from "
+        "straight, in degrees, with "
         f"{runs.most(fold)}"
     )
 

@@ -148,7 +148,8 @@ def main() -> None:
             print(name, *search(name), flush=True)
     for task, payload in (("sway", PAYLOAD), ("payload", 0.0), ("blow", PAYLOAD)):
         print(
-            f"\n{task}, {len(SEEDS)} seeds\n\n| law | {' | '.join(COLUMNS)} |\n|---|{'---|' * len(COLUMNS)}"
+            f"\n{task}, {len(SEEDS)} seeds\n\n| law | {' | '.join(COLUMNS)} "
+            f"|\n|---|{'---|' * len(COLUMNS)}"
         )
         for name in arms.GAINS:
             runs = [arms.scenario(task, arms.gained(name), seed, payload) for seed in SEEDS]
@@ -158,7 +159,8 @@ def main() -> None:
             else:
                 print(row(name, np.array([measured(trace) for trace in traces])), flush=True)
     print(
-        "\nwall\n\n| law | mean force, N | off the wanted force, % | in contact, % of the time | deepest, mm |"
+        "\nwall\n\n| law | mean force, N | off the wanted force, % | in contact, % of the time "
+        "| deepest, mm |"
     )
     print("|---|---|---|---|---|")
     laws = {"hybrid": arms.hybrid(), "hybrid, friction known": arms.hybrid(friction=True)}

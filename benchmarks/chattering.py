@@ -1,7 +1,7 @@
 """Calibrate the ranges of predicted chattering on random loops that are integrated exactly.
 
     python benchmarks/chattering.py [--loops 200] [--seed 0]
-    python benchmarks/chattering.py --halving duffing    # whose cycles half the physics step changes, by drive
+    python benchmarks/chattering.py --halving duffing    # whose cycles change at half the step
 
 A range is widened by a factor, so that it holds the exact amplitude, or frequency, in more than 95
 % of the loops. The script prints the factors, which `smc_mujoco/analysis/chattering.py` has as
@@ -67,7 +67,8 @@ def halving(plant: str) -> None:
         for law, change in found.items():
             parts.append(f"{law} {100 * change.amplitude:.0f} %, {100 * change.frequency:.0f} %")
         print(
-            f"{name}: {len(found)} of {len(runs)}{', amplitude and frequency: ' * bool(parts)}{'; '.join(parts)}"
+            f"{name}: {len(found)} of "
+            f"{len(runs)}{', amplitude and frequency: ' * bool(parts)}{'; '.join(parts)}"
         )
     print(*(f"{name}: {marked[name]} of {cases[name]}" for name in cases), sep=", ")
 
@@ -122,7 +123,8 @@ def main() -> None:
         ]
         errors = np.abs(ratio[~np.isnan(ratio)] - 1.0)
         print(
-            f"{name}: factor {max(needed, 1.0):.4f} for {100 * SHARE:g} %; with {factor:g} the ranges hold "
+            f"{name}: factor {max(needed, 1.0):.4f} for {100 * SHARE:g} %; with {factor:g} the "
+            "ranges hold "
             f"{100 * held:.1f} %; the median error is {100 * np.median(errors):.2g} %, "
             f"{100 * np.mean(errors < 0.05):.0f} % err by less than 5 %"
         )
@@ -134,9 +136,12 @@ def main() -> None:
         errors = np.abs(ratio[~np.isnan(ratio)] - 1.0)
         widths = high / low
         print(
-            f"{words}: {which.sum()} loops, {np.isnan(ratio).sum()} without a prediction; the median error of the "
-            f"amplitude is {100 * np.median(errors):.2g} %, {100 * np.mean(errors < 0.05):.0f} % err by less than 5 %; "
-            f"the range ends at {np.nanmedian(widths):.2f} times its begin in the median, at over 2 times in "
+            f"{words}: {which.sum()} loops, {np.isnan(ratio).sum()} without a prediction; the "
+            "median error of the "
+            f"amplitude is {100 * np.median(errors):.2g} %, {100 * np.mean(errors < 0.05):.0f} "
+            "% err by less than 5 %; "
+            f"the range ends at {np.nanmedian(widths):.2f} times its begin in the median, at "
+            "over 2 times in "
             f"{100 * np.mean(widths > 2.0):.0f} %"
         )
     print(f"{len(rows)} loops, {none} without a predicted cycle")

@@ -436,7 +436,10 @@ def borders(known: Sequence[dict]) -> Iterator[str]:
             else:
                 low, middle, high = [math.nan] * 3
             where = "within" if within else "beyond"
-            yield f"{law}, {what} {where} what its gains admit: {middle:.3g} ({low:.3g} to {high:.3g}), {len(its)} runs"
+            yield (
+                f"{law}, {what} {where} what its gains admit: {middle:.3g} ({low:.3g} to "
+                f"{high:.3g}), {len(its)} runs"
+            )
 
 
 def judged(known: Sequence[dict]) -> Iterator[str]:
@@ -506,10 +509,14 @@ def main() -> None:
         for axis, levels in (LEVELS if asked.lot is None else by_lot(asked.lot)).items():
             for level in levels:
                 for one in cells(it, axis, level, compared):
-                    its = f"{one['lead']:.3g} ({one['low']:.3g} to {one['high']:.3g}; half step {one['half']:.3g})"
+                    its = (
+                        f"{one['lead']:.3g} ({one['low']:.3g} to {one['high']:.3g}; half "
+                        f"step {one['half']:.3g})"
+                    )
                     laws = " | ".join("/".join(dict.fromkeys(one[who])) for who in ("law", "rival"))
                     print(
-                        f"| {it.plant.name} | {axis} {level:.3g} | {one['score']} | {one['kind']} | {its} | {laws} |",
+                        f"| {it.plant.name} | {axis} {level:.3g} | {one['score']} | "
+                        f"{one['kind']} | {its} | {laws} |",
                         flush=True,
                     )
                     known.append(one)

@@ -110,7 +110,10 @@ def main() -> None:
         )
     print("\n".join(rows(found.leaderboard, names)))
     for one in leads(found.table, MEASURE, FAMILIES):
-        sure = f"{one.first} by {one.times:.3g} times ({one.low:.3g} to {one.high:.3g}), {'/'.join(one.laws)}"
+        sure = (
+            f"{one.first} by {one.times:.3g} times ({one.low:.3g} to {one.high:.3g}), "
+            f"{'/'.join(one.laws)}"
+        )
         print(f"{one.condition}: {sure if one.sure else 'no family is surely first'}")
 
 

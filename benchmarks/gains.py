@@ -103,7 +103,7 @@ def write(path: Path, data: dict[str, Any]) -> None:
 
 
 def wanted(laws: list[str], again: bool) -> list[Task]:
-    """Return the tasks to do: all of them, or those whose gains are missing or have another rule."""
+    """Return the tasks to do: all, or those whose gains are missing or have another rule."""
 
     def is_missing(task: Task) -> bool:
         record = known(gain_sets.file_of(task.gains))["plants"].get(task.plant, {}).get(task.law)

@@ -51,7 +51,7 @@ def unrecorded(rng, u, share):
 
 
 def carriage(u):
-    """Return the positions of the axis under a held force, (K,), in closed form between its stops."""
+    """Return the positions of the axis under a held force, (K,), in closed form."""
     M, b, dry, constant = AXIS.values()
     x = 0.0
     v = 0.0

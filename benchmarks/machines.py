@@ -287,13 +287,18 @@ def main() -> None:
     }
     for row in rows:
         if isinstance(row, TwinFigure):
-            told = f"{row.machine:9.4g} {row.twin:9.4g} ({row.low:.4g} to {row.high:.4g}) {row.published:9.4g}"
+            told = (
+                f"{row.machine:9.4g} {row.twin:9.4g} ({row.low:.4g} to {row.high:.4g}) "
+                f"{row.published:9.4g}"
+            )
             print(
-                f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {told} {row.use} {row.variant}"
+                f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {told} {row.use} "
+                f"{row.variant}"
             )
         else:
             print(
-                f"{row.rig:21} {row.condition}: {row.ordered} of {row.sets}, tau {row.tau:.2f} {row.variant}"
+                f"{row.rig:21} {row.condition}: {row.ordered} of {row.sets}, tau {row.tau:.2f} "
+                f"{row.variant}"
             )
     if given.write:
         twin_figures.FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")

@@ -42,7 +42,8 @@ def main() -> None:
     most = peak()
     print(f"{count} runs of 20 ms in {spent:.0f} s, {failed} failed")
     print(
-        f"{held:.0f} MB before, {most:.0f} MB at most, limit {LIMIT} MB: {'kept' if most < LIMIT else 'NOT KEPT'}"
+        f"{held:.0f} MB before, {most:.0f} MB at most, limit {LIMIT} MB: "
+        f"{'kept' if most < LIMIT else 'NOT KEPT'}"
     )
 
 

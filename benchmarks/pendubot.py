@@ -33,7 +33,10 @@ def answer(runs):
     standing = runs.those(stands)
     if not standing.labels:
         return f"it stands after none of the blows, not even that of {runs.labels[0]}"
-    return f"it stands after {standing.named}; of these it leans farthest, in degrees, after {standing.most(lean)}"
+    return (
+        f"it stands after {standing.named}; of these it leans farthest, in degrees, after "
+        f"{standing.most(lean)}"
+    )
 
 
 scene = smc.Scene(

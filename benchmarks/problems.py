@@ -5,16 +5,16 @@
     python benchmarks/problems.py measure controls seen.json --instances 15
     python benchmarks/problems.py freeze visible.json controls.json seen.json  # writes the targets
     into the rules
-    python benchmarks/problems.py hold                     # do both controls hold on every problem of every suite?
+    python benchmarks/problems.py hold                     # do both controls hold everywhere?
     python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets the rules'?
     python benchmarks/problems.py measure laws drawn.json --seed random
-    python benchmarks/problems.py agree visible.json drawn.json       # rank correlations of the boards
-    python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
+    python benchmarks/problems.py agree visible.json drawn.json  # rank correlations of the boards
+    python benchmarks/problems.py enter results            # every general law
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's
 plants, `measure controls` the controls on all problems; ten minutes of processor time each. With
 `--version 2`, `measure` and `freeze` are for the rules of flight, where levels come from no law.
-`measure` and `enter` go on where they were stopped. `smc-mujoco enter --site` shows the results of `enter`.
+`measure` and `enter` go on where they were stopped.
 """
 
 import argparse
@@ -274,7 +274,8 @@ def hold(seed: int, instances: int | None) -> bool:
     for plant, cells_of in table.items():
         print(plant, *(cells_of.get(condition, "–") for condition in conditions), sep=" | ")
     print(
-        f"{len(names)} problems, {len(failing)} where a control does not hold: {'; '.join(failing) or 'none'}"
+        f"{len(names)} problems, {len(failing)} where a control does not hold: "
+        f"{'; '.join(failing) or 'none'}"
     )
     print(
         "least of the oracle:",
@@ -302,7 +303,10 @@ def freeze(visible: Runs, of_controls: Runs, seen: Runs, seed: int, version: int
         )
     write_suites(left_out, version)
     text = path.read_text().partition(MARK)[0] + MARK
-    head = f'[frozen]\nnumber = "{seed:064x}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
+    head = (
+        f'[frozen]\nnumber = "{seed:064x}"  # of the controls\nleft_out = '
+        f"{json.dumps(left_out)}\n\n"
+    )
     path.write_text(text + head + "\n".join(lines) + "\n")
     print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
 

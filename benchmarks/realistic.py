@@ -98,5 +98,6 @@ if __name__ == "__main__":
     console.print(table)
     load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
     console.print(
-        f"mujoco {mujoco.__version__}, {os.cpu_count()} cores, load {load}, median of {ROUNDS} rounds"
+        f"mujoco {mujoco.__version__}, {os.cpu_count()} cores, load {load}, median of {ROUNDS} "
+        "rounds"
     )

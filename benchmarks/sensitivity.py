@@ -42,7 +42,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[[np.ndarray], np.ndarray]]] = {
 
 
 def known(scores: np.ndarray, n: int, **options) -> np.ndarray:
-    """Return the first-order and total indices of a function from the scores of its design, (2, k)."""
+    """Return the first-order and total indices from the scores of a design, (2, k)."""
     a, b, *mixed = scores.reshape(-1, 1, n).copy()
     found = sobol_indices(func={"f_A": a, "f_B": b, "f_AB": np.array(mixed)}, n=n, **options)
     return np.reshape([found.first_order, found.total_order], (2, -1))
@@ -69,7 +69,10 @@ def row(name: str, n: int) -> str:
     for who, found in (("", np.array(ours)), ("Saltelli's ", np.array(saltelli))):
         errors = np.sqrt(np.square(found - true).mean(axis=(0, 2)))
         sums = found.sum(2)
-        told += f"{who}errors {errors[0]:.3f} {errors[1]:.3f}, sums {sums[:, 0].max():.2f} {sums[:, 1].min():.2f}; "
+        told += (
+            f"{who}errors {errors[0]:.3f} {errors[1]:.3f}, sums {sums[:, 0].max():.2f} "
+            f"{sums[:, 1].min():.2f}; "
+        )
     share = [np.array(held)[:, i, true[i] > TOLD].mean() for i in (0, 1)]
     return f"{told}held {share[0]:.2f} {share[1]:.2f}"
 

@@ -1,7 +1,7 @@
 """Parameter sets of the rig stepper_furuta: draws whose simulated recordings have the linear law's
 recorded figures.
 
-    python benchmarks/stepper_furuta.py           # the search whose sets the rig has: 780 draws; prints the nearest
+    python benchmarks/stepper_furuta.py           # the search whose sets the rig has: 780 draws
     python benchmarks/stepper_furuta.py second    # a later one: 400 draws, and 16 trials of 8 seeds
 
 Approximate Bayesian computation in two rounds. The machine is bursty, so its one recording of a

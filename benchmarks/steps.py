@@ -83,7 +83,8 @@ def row(part: str) -> str:
 def main() -> None:
     """Print the table."""
     print(
-        "| part | step | off, of 60 | of them marked | marked | wander | largest change | laws with scores off |"
+        "| part | step | off, of 60 | of them marked | marked | wander | largest change | laws "
+        "with scores off |"
     )
     print("|---|---|---|---|---|---|---|---|")
     for part in sys.argv[1:] or PARTS:

@@ -60,7 +60,7 @@ def slices() -> list[list[smc.Scenario]]:
 
 
 def plain(scenarios: Sequence[smc.Scenario], threads: int) -> float:
-    """Seconds of stepping the plants of these scenarios, in the same batches, without the callback."""
+    """Seconds of stepping these plants, in the same batches, without the callback."""
     spent = 0.0
     for prepared in executors.batches(scenarios):
         scenario = prepared[0].scenario
@@ -95,7 +95,10 @@ def main() -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
         1 if sys.platform == "darwin" else 1024
     )
-    told = f"{len(table)} runs of 10 s, {threads} threads: study {studied:.1f} s, plain mj_step {simulated:.1f} s"
+    told = (
+        f"{len(table)} runs of 10 s, {threads} threads: study {studied:.1f} s, plain "
+        f"mj_step {simulated:.1f} s"
+    )
     console.print(told, highlight=False)
     for what, value, most, unit in (
         ("ratio", studied / simulated, MOST, ""),

@@ -3,8 +3,8 @@
     python benchmarks/swing_up.py acrobot              # optimise, then write the file; a minute
     python benchmarks/swing_up.py acrobot --starts 12  # also tell what other starts of the search
     lead to
-    python benchmarks/swing_up.py --gains              # how k, phi and the filter were chosen, on other machines
-    python benchmarks/swing_up.py acrobot --resets     # gains for the board of 2025 by random search; three minutes
+    python benchmarks/swing_up.py --gains              # how k, phi, the filter were chosen
+    python benchmarks/swing_up.py acrobot --resets     # gains for the board of 2025
 
 The trajectory has the best version-2 score that was found: direct multiple shooting with RK4, u
 linear between NODES points, both ends at rest with u = 0, |u| <= 6 N m, by scipy's SLSQP from a
@@ -292,7 +292,8 @@ def write(robot, seed):
         "s_dq": s[:, 2 + free],
     }
     about = (
-        f"found by benchmarks/swing_up.py {robot}, start {seed}, smc_mujoco {__version__}: x is the driven joint, "
+        f"found by benchmarks/swing_up.py {robot}, start {seed}, smc_mujoco {__version__}: x "
+        "is the driven joint, "
         "q the free one, s_* the row b'P/R; SI units, nodes `step` seconds apart"
     )
     data = {"about": about, "robot": robot, "step": h} | {
@@ -301,7 +302,8 @@ def write(robot, seed):
     entries.TRAJECTORY_FOLDER.mkdir(exist_ok=True)
     (entries.TRAJECTORY_FOLDER / f"{robot}.json").write_text(json.dumps(data, indent=0) + "\n")
     print(
-        f"{robot}: {h * NODES:.3f} s, score about {score:.4f}, largest gap {gap:.1e}, |u| <= {np.abs(u).max():.2f} N m"
+        f"{robot}: {h * NODES:.3f} s, score about {score:.4f}, largest gap {gap:.1e}, |u| <= "
+        f"{np.abs(u).max():.2f} N m"
     )
 
 
@@ -344,7 +346,8 @@ def choose():
             )
             shares.append(np.mean([upright(machine.simulate(case)[0][-1]) for case in cases]))
         print(
-            f"k {k:g}, phi {phi:g}, window {window}: acrobot {shares[0]:.3f}, pendubot {shares[1]:.3f}",
+            f"k {k:g}, phi {phi:g}, window {window}: acrobot {shares[0]:.3f}, pendubot "
+            f"{shares[1]:.3f}",
             flush=True,
         )
 
@@ -368,10 +371,9 @@ def search(robot, sets=900, seed=2):
         else:
             near = found[rng.integers(min(8, len(found)))][1]
             gains = {}
-            for name in RANGES:
-                gains[name] = float(
-                    np.clip(near[name] * math.exp(0.25 * rng.normal()), *RANGES[name])
-                )
+            for name, ends in RANGES.items():
+                value = near[name] * math.exp(0.25 * rng.normal())
+                gains[name] = float(np.clip(value, *ends))
             gains["m"] = near["m"] + 0.1 * rng.normal()
         found.append((score(gains, range(100, 104)), gains))
         found.sort(key=lambda one: -one[0])

@@ -41,7 +41,7 @@ print(spent, time.process_time())
 
 
 def measured(checkout: Path) -> tuple[float, float]:
-    """Return the processor seconds of the tunings and of everything, in a fresh process and folder."""
+    """Return the processor seconds of the tunings and of everything, in a fresh process."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "my_law.py"
         file.write_text(COMPARISON.replace("OUT", repr(str(Path(folder) / "compared"))))

@@ -3,7 +3,7 @@
 PPO trains a policy on the inverted pendulum's environment, and it meets the laws of the shelf.
 
     pip install '.[rl]' stable-baselines3
-    python examples/learned_rival.py            # train five seeds, a minute of processor time each, then compare
+    python examples/learned_rival.py            # train five seeds, a minute each, then compare
 
 The policy sees the angle, its rate, its last action, and the integral of the angle, without which a
 constant load leaves an offset. It is trained for what laws are tuned for, less angle and less

@@ -136,11 +136,13 @@ def sound(trace: smc.Trace) -> None:
         array = getattr(trace, name)
         if array.shape != (samples, n) or array.dtype != np.float64 or array.flags.writeable:
             raise Found(
-                f"{name} has shape {array.shape}, type {array.dtype}, writeable {array.flags.writeable}"
+                f"{name} has shape {array.shape}, type {array.dtype}, writeable "
+                f"{array.flags.writeable}"
             )
         if not np.isfinite(array[:end]).all() or not np.isnan(array[end:]).all():
             raise Found(
-                f"{name} is not finite up to sample {end} and NaN from there: {array[:, 0].tolist()}"
+                f"{name} is not finite up to sample {end} and NaN from there: "
+                f"{array[:, 0].tolist()}"
             )
     for name in ("u", "applied"):
         if not np.all(np.abs(getattr(trace, name)[:end]) <= scenario.resolved.u_max):
@@ -223,7 +225,7 @@ def world() -> None:
 
 
 def _where(error: BaseException) -> str:
-    """The type of an exception and the line of this package, or else of another, that it came from."""
+    """The type of an exception and the file, of this package if it can be, that it came from."""
     step = error.__traceback__
     files = []
     while step is not None:

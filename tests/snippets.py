@@ -1,7 +1,7 @@
 """README's and the tutorial's scripts as files, for the type checkers of `make check`, which see
 them as a user's do.
 
-    python tests/snippets.py FOLDER    # readme_1.py, ..., the tutorial's files; and pyright's settings
+    python tests/snippets.py FOLDER    # readme_1.py, ..., the tutorial's files, settings
 
 The parameters of laws and tests have no types in the pages, so only the other scripts get a strict
 check.

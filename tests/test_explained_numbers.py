@@ -54,15 +54,19 @@ SAID = {
     margins: [
         f"at most {percent(margins.TOLERATED_ERROR)} of its scale",
         f"up to {WORDS[max(len(kind.levels) for kind in margins.MARGIN_KINDS.values())]} levels",
-        f"an {part(1 / uncertainty.JITTER_SHARES)} of one (jitter) or {percent(margins.FINE)} (others)",
+        f"an {part(1 / uncertainty.JITTER_SHARES)} of one (jitter) or {percent(margins.FINE)} "
+        "(others)",
     ],
     margins.margins: [
-        f"runs of {margins.QUICK_DURATION:g} s and search to within {margins.QUANTA[margins.COARSE]} control periods",
+        f"runs of {margins.QUICK_DURATION:g} s and search to within "
+        f"{margins.QUANTA[margins.COARSE]} control periods",
         f"control periods or {percent(margins.COARSE)}, for a first look",
     ],
     region: [
-        f"|e| <= {percent(conventions.SETTLING_BAND)} of X and |v| <= {percent(conventions.SETTLING_BAND)} of V",
-        f"({percent(math.sqrt(region.NEAR_SQUARE))})^2, a {part(math.sqrt(region.NEAR_SQUARE) / 0.02)} of the band",
+        f"|e| <= {percent(conventions.SETTLING_BAND)} of X and |v| <= "
+        f"{percent(conventions.SETTLING_BAND)} of V",
+        f"({percent(math.sqrt(region.NEAR_SQUARE))})^2, a "
+        f"{part(math.sqrt(region.NEAR_SQUARE) / 0.02)} of the band",
         f"for {percent(region.HORIZONS[0])} of the duration",
         f"for {percent(region.HORIZONS[1])}, and those still undecided for the whole duration",
         f"throughout the last {part(1 / region.EARLY_PARTS)} of the run",
@@ -136,7 +140,8 @@ SAID = {
         f"or {short(conventions.REST_SPEED)} rad/s or m/s if that is larger",
     ],
     catalogue.rise_time: [
-        f"from {percent(catalogue.RISE_LEVELS[0])} to {percent(catalogue.RISE_LEVELS[1])} of the way",
+        f"from {percent(catalogue.RISE_LEVELS[0])} to {percent(catalogue.RISE_LEVELS[1])} of "
+        "the way",
         f">= {catalogue.RISE_LEVELS[0]:g} to the first with >= {catalogue.RISE_LEVELS[1]:g}",
     ],
     catalogue.hf_share: [f"above {catalogue.HIGH_FREQUENCY:g} Hz, 0 to 1"],

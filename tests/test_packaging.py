@@ -127,7 +127,10 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
 def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binaries, tmp_path):
     done = run(binaries / "python", "-m", "smc_mujoco", "--version", cwd=tmp_path)
     assert (done.returncode, done.stdout.split()[0]) == (0, "smc-mujoco")
-    code = "from smc_mujoco import *; import smc_mujoco; print(*[n for n in smc_mujoco.__all__ if n not in globals()])"
+    code = (
+        "from smc_mujoco import *; import smc_mujoco; print(*[n for n in smc_mujoco.__all__ "
+        "if n not in globals()])"
+    )
     done = run(
         binaries / "python",
         "-c",
@@ -205,7 +208,8 @@ scene = smc.Scene(title="Short", conditions={"nominal": {"only": run}})
 from smc_mujoco import *
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common import gl
-traces = run([Scenario(plant=name, law="classical", duration=0.01) for name in plants() if name != "quadrotor"])
+names = [name for name in plants() if name != "quadrotor"]
+traces = run([Scenario(plant=name, law="classical", duration=0.01) for name in names])
 table = study(grid(["duffing"], ["classical"], ["nominal"], seeds=2, duration=0.05), "study")
 print(len(traces) + 1 == len(plants()) > 10, score(traces[0])["itae"] > 0.0, len(table), flush=True)
 gl.missing = lambda: None

@@ -19,7 +19,8 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import NAMED, find_condition
 
 ARM = """<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0" damping="0.1"/>
-<geom type="capsule" size="0.05" fromto="0 0 0 0.5 0 0" mass="1"/><body pos="0.5 0 0"><joint name="elbow" axis="0 1 0"/>
+<geom type="capsule" size="0.05" fromto="0 0 0 0.5 0 0" mass="1"/>
+<body pos="0.5 0 0"><joint name="elbow" axis="0 1 0"/>
 <geom type="capsule" size="0.04" fromto="0 0 0 0.4 0 0" mass="0.5"/></body></body></worldbody>
 <actuator><motor joint="shoulder" ctrlrange="-3 3"/></actuator></mujoco>"""
 

@@ -5,7 +5,7 @@ and this package's.
 
     trace = smc.run(realaigym.entry("acrobot"))   # an optimised trajectory under a Riccati law
     realaigym.criteria(trace)                     # swing-up time, energy, ...
-    realaigym.score(trace)                        # of version 2; score(trace, "v1") of the older board
+    realaigym.score(trace)                        # of version 2; "v1" is the older board
     realaigym.robustness(realaigym.entry("acrobot")).percent
 
     trace = smc.run(realaigym.on_board("pendubot", my_law()))

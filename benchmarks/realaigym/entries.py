@@ -140,7 +140,10 @@ def _along(robot: str) -> Template:
     law.__name__ = law.__qualname__ = (
         f"{robot}_swing_up"  # by which files and other processes find it
     )
-    law.__doc__ = f"Swing-up and balance of the {robot} along an optimised trajectory: u = u* - k tanh(s / phi)."
+    law.__doc__ = (
+        f"Swing-up and balance of the {robot} along an optimised trajectory: u = u* "
+        "- k tanh(s / phi)."
+    )
     return law_function(
         gains={
             name: Gain(value, FORCE, positive=True) for name, value in FEEDBACKS["Riccati"].items()

@@ -4,7 +4,7 @@ A run starts at rest, hanging, and lasts 10 s, with RK4 and a command every 2 ms
 last sample, which
 is only the end of the last step:
 
-    swing-up time       first t from which the tip stays above 0.9 (l1 + l2); a run that never does has failed
+    swing-up time       first t from which the tip stays above 0.9 (l1 + l2), else failed
     energy              sum |dq tau|, with dq the step of the driven joint
     max torque          max |tau|
     integrated torque   sum |tau| dt

@@ -1,13 +1,13 @@
 """RealAIGym's robustness test: six ways in which the machine differs from the model, at many
 levels.
 
-    model            one parameter at 21 values: Ir 0 to 1e-4 kg m^2; m1 r1, I1, m2 r2, m2, I2 at 75 to 125 %; b of each
-                     joint -0.1 to 0.1 N m s/rad; cf of each -0.2 to 0.2 N m
+    model            one parameter at 21 values: Ir 0 to 1e-4 kg m^2; m1 r1, I1, m2 r2, m2, I2 at
+                     75 to 125 %; b of each joint -0.1 to 0.1 N m s/rad; cf -0.2 to 0.2 N m
     velocity noise   standard deviation 0 to 0.5 rad/s of both velocities, 10 runs a level
     torque noise     standard deviation 0 to 1.1 N m, 10 runs a level
     torque response  tau_k = tau_(k-1) + r (u_k - tau_(k-1)), r = 0.1 to 2
     delay            positions and velocities 0 to 40 ms late
-    perturbations    50 profiles of 3 pulses, standard width 0.05 to 0.1 s, amplitude 0.5 to 5 N m, beside the motor
+    perturbations    50 profiles of 3 pulses, standard width 0.05 to 0.1 s, 0.5 to 5 N m
 
 A case is survived if after 10 s the state is within (0.35, 0.35, 1, 1) of upright and at rest; a
 level with several runs if more than half of these do. Each test's percentage has the same weight.
@@ -222,7 +222,8 @@ class Machine:
             or scenario.feedforward is not None
         ):
             raise ScenarioError(
-                f"the robustness test of {scenario.plant.name} is only of the law and its estimator: leave out "
+                f"the robustness test of {scenario.plant.name} is only of the law and its "
+                "estimator: leave out "
                 "surface, reference and feedforward"
             )
         law = scenario.law.of_channel(0)

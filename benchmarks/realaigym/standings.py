@@ -22,9 +22,12 @@ from smc_mujoco.simulation.trace import Trace
 NAME = "trajectory + Riccati"  # of this package's entry
 MEASURED_MARK = "*"  # ends the name of a row with measured velocities
 KEY = (
-    "trajectory + ...: this package's optimised trajectory under a feedback. Riccati: the entry, 9 tanh(s / 6 N m); "
-    "linear: its slope, 1.5 s; clipped: s, the Riccati gain itself; sliding: 9 tanh(s / 0.06 N m), which switches. All "
-    "are clipped at 6 N m. *: measured velocities, as in published rows; else velocities from a filter of 5 positions"
+    "trajectory + ...: this package's optimised trajectory under a feedback. Riccati: the "
+    "entry, 9 tanh(s / 6 N m); "
+    "linear: its slope, 1.5 s; clipped: s, the Riccati gain itself; sliding: 9 tanh(s / 0.06 N "
+    "m), which switches. All "
+    "are clipped at 6 N m. *: measured velocities, as in published rows; else velocities from "
+    "a filter of 5 positions"
 )
 # Fields of a Scenario that are an entry's own. The rules fix all others.
 DESIGN_FIELDS = (
@@ -103,7 +106,8 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
     for rule, right in _ruled(on_board(robot, "none")).items():
         if (value := ran.get(rule)) != right:
             raise errors.ScenarioError(
-                f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
+                f"the run has {rule} {errors.shown(value)}, and the boards have "
+                f"{errors.shown(right)}: "
                 "use realaigym.on_board"
             )
     return Row(

@@ -162,7 +162,7 @@ def global_entry(robot: str, **gains: float) -> Scenario:
 
 
 def global_experiments(robot: str) -> dict[str, Scenario]:
-    """Return name of row -> run of the entry on the board of 2025, and of its control experiments."""
+    """Return name of row -> run of the entry on the board of 2025, and of its experiments."""
     made = global_entry(robot)
     gains = GAINS[robot]
     straight = {name: NEVER_BENDS * gains[name] for name in ("K", "phi")}

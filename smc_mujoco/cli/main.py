@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _showing_once() -> Callable[..., None]:
-    """Return a showwarning that prints each sentence once, whichever parts of a command repeat it."""
+    """Return a showwarning that prints each sentence once, also if parts of a command repeat it."""
     shown: set[str] = set()
 
     def show(message: Warning | str, *_: object, **__: object) -> None:

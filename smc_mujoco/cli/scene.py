@@ -91,7 +91,7 @@ def simulate(scene: Scene, threads: int | None) -> Traces:
 
 
 def repeat(scene: Scene, threads: int | None) -> dict[str, dict[str, list[Trace]]]:
-    """Return condition -> label -> the same run at half the physics step, and from a nudged start."""
+    """Return condition -> label -> the run at half the physics step, and from a nudged start."""
     changed: list[tuple[str, str, Scenario]] = []
     for condition, label, scenario in scene.runs():
         try:

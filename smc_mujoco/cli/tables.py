@@ -105,7 +105,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
 
 
 def _noted(tables: list[Table], *words: str) -> list[Table]:
-    """Return tables with words below the last one, and with what a mark means, if a cell has one."""
+    """Return tables with words below the last one, and what a mark means if a cell has one."""
     notes = [word for word in words if word]
     for table in tables:
         for column in table.columns:

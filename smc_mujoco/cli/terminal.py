@@ -33,7 +33,8 @@ def errors_as_sentences() -> Iterator[None]:
             raise SystemExit(1) from None
         if isinstance(error, OSError):
             _fail(
-                f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room"
+                f"{error.filename or 'a file'}: {error.strerror or error}; choose another "
+                "folder or make room"
             )
         if isinstance(error, MemoryError):
             _fail("out of memory: give fewer or shorter runs")

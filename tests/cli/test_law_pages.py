@@ -151,8 +151,8 @@ def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
     code, out, err = call("list", typed)
     assert (code, out) == (2, "")
     assert (
-        err
-        == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
+        err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean "
+        f"{meant!r}?\n"
     )
 
 
@@ -174,7 +174,7 @@ Explicit. Source: N. Body, "Of no use", J. Nothing 1(1):1, 2001.
 from smc_mujoco.control.law import command, law_function, sgn, sliding
 
 
-@law_function(gains={"k": 4.0, "c": 2.5}, nonnegative=("k", "c"), conditions={"k > c": lambda g: g.k > g.c})
+@law_function(gains={"k": 4.0, "c": 2.5}, conditions={"k > c": lambda g: g.k > g.c})
 def brand_new(y, gains, memory):
     s, eq = sliding(y, gains.c)
     return command(y, eq - gains.k * sgn(s)), s

@@ -41,7 +41,8 @@ scene = smc.Scene(
     title="Mine",
     conditions={{
         "calm": {{"{LABEL}": smc.Scenario(plant="duffing", law=mine(), duration=0.2)}},
-        "noisy": {{"rough": smc.Scenario(plant="duffing", law=mine(), duration=0.2, noise=smc.Noise(0.01, 0.05))}},
+        "noisy": {{"rough": smc.Scenario(
+            plant="duffing", law=mine(), duration=0.2, noise=smc.Noise(0.01, 0.05))}},
     }},
 )
 '''
@@ -153,7 +154,9 @@ Look for: nothing.
 """
 import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
-scene = smc.Scene(title="Asked [/s]", conditions={"calm": {"only": run}}, answer=lambda runs: runs.who("rests", "rest"))
+conditions = {"calm": {"only": run}}
+answer = lambda runs: runs.who("rests", "rest")
+scene = smc.Scene(title="Asked [/s]", conditions=conditions, answer=answer)
 ''')
     code, out, _ = call("run", "asks.py", "--no-film", "--out", "out")
     assert code == 0
@@ -169,7 +172,8 @@ def test_what_a_scene_s_answer_raises_is_shown_as_it_is_and_its_runs_are_kept(
 ):
     (folder / "fails.py").write_text("""import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
-scene = smc.Scene(title="Fails", conditions={"calm": {"only": run}}, answer=lambda runs: runs.nothing)
+conditions = {"calm": {"only": run}}
+scene = smc.Scene(title="Fails", conditions=conditions, answer=lambda runs: runs.nothing)
 """)
     with pytest.raises(AttributeError, match="nothing"):
         call("run", "fails.py", "--no-film", "--out", "out")
@@ -574,7 +578,8 @@ def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace
             "from smc_mujoco.cli import scene",
             "from smc_mujoco.cli.main import main",
             "scene.figures = lambda *_: []",
-            "for words in (['list'], ['run', 'mine.py', '--no-film', '--out', 'out'], ['show', 'one.npz']):",
+            "for words in (['list'], ['run', 'mine.py', '--no-film', '--out', 'out'], ['show', "
+            "'one.npz']):",
             "    try: main(words)",
             "    except SystemExit as end: assert not end.code, words",
         ]
@@ -589,7 +594,8 @@ def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace
 LONG = """
 import smc_mujoco as smc
 
-run = smc.Scenario(plant="duffing", law="none", duration=20_000.0, control_period=0.1, physics_step=1e-3)
+steps = {"control_period": 0.1, "physics_step": 1e-3}
+run = smc.Scenario(plant="duffing", law="none", duration=20_000.0, **steps)
 scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
 """
 

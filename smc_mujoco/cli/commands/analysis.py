@@ -21,9 +21,12 @@ Bound = Annotated[
     str | None,
     typer.Option(
         metavar="NAME=BOUND,...",
-        help="Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N m), encoder=2048:32768 "
-        "(counts); factors: mass=0.7:1.3, friction_scale=0.5:2, bound=0.5:1 (on u_max), period=1:4 (on the control "
-        "period; not in worst), parameters of the plant, as payload=0:2. Numbers: slope (of d, per s), "
+        help="Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N "
+        "m), encoder=2048:32768 "
+        "(counts); factors: mass=0.7:1.3, friction_scale=0.5:2, bound=0.5:1 (on u_max), "
+        "period=1:4 (on the control "
+        "period; not in worst), parameters of the plant, as payload=0:2. Numbers: slope (of d, "
+        "per s), "
         "position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
     ),
 ]
@@ -104,7 +107,8 @@ def margins(
     kinds: Annotated[
         str | None,
         typer.Option(
-            help="Any of delay, disturbance, friction, mass, noise, jitter, missed, as a,b; default the first 5."
+            help="Any of delay, disturbance, friction, mass, noise, jitter, missed, as a,b; "
+            "default the first 5."
         ),
     ] = None,
     gains: options.Gains = "tuned",
@@ -153,7 +157,10 @@ def margins(
         )
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
-    words = f"{counted(len(results), 'margin')}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s"
+    words = (
+        f"{counted(len(results), 'margin')}, {options.gains_used(chosen, gains)}, "
+        f"{terminal.seconds:.0f} s"
+    )
     terminal.note(words, "dim", wrap=True)
     if json:
         terminal.wrote(save(results, json))
@@ -281,7 +288,8 @@ def sensitivity(
     found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
     terminal.print(found)
     terminal.note(
-        f"{found.runs} runs, {len(found.values)} of them independent, {options.gains_used([chosen], gains)}",
+        f"{found.runs} runs, {len(found.values)} of them independent, "
+        f"{options.gains_used([chosen], gains)}",
         "dim",
         wrap=True,
     )

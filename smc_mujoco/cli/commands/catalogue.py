@@ -22,13 +22,15 @@ def list_(
         typer.Argument(
             metavar="NAME|FILE",
             autocompletion=options.LAWS,
-            help="A law, surface, velocity estimator or plant, or a file with a law; by default all, and scenes.",
+            help="A law, surface, velocity estimator or plant, or a file with a law; by "
+            "default all, and scenes.",
         ),
     ] = None,
     needs: Annotated[
         str | None,
         typer.Option(
-            help="Only laws that have all these, as a,b: no-velocity, no-acceleration, no-model, continuous (u), "
+            help="Only laws that have all these, as a,b: no-velocity, no-acceleration, "
+            "no-model, continuous (u), "
             "finite-time (of the error), finite-reaching (of s), one-gain, two-gains (at most)."
         ),
     ] = None,

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.grid import Starts
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-GAINS_HELP = "With your own gains: pid(kp=50, ki=1). From a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
+GAINS_HELP = (
+    "With your own gains: pid(kp=50, ki=1). From a file: my_law.py, or gains.json of "
+    "`smc-mujoco tune --out`."
+)
 
 
 def picture(contents: str) -> Any:
@@ -63,7 +66,8 @@ Conditions = Annotated[
         "--condition",
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
-        help='Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your own, as "worn gear: '
+        help="Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your "
+        'own, as "worn gear: '
         'friction=Coulomb(0.05)", or a file with one on each line. May be repeated.',
         show_default=False,
     ),
@@ -74,7 +78,8 @@ Condition = Annotated[
         "--condition",
         metavar="NAME|TEXT",
         autocompletion=CONDITIONS,
-        help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
+        help='The condition of all runs, as encoder, noise+encoder or "worn gear: '
+        'friction=Coulomb(0.05)".',
     ),
 ]
 Defaults = Annotated[
@@ -128,7 +133,8 @@ Plants = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint; default the paper's five.",
+        help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint; default the "
+        "paper's five.",
         show_default=False,
     ),
 ]
@@ -137,7 +143,8 @@ PlantName = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="A plant from `smc-mujoco list`, or yours, a .xml or .urdf: FILE.xml:joint+joint@keyframe, where a joint "
+        help="A plant from `smc-mujoco list`, or yours, a .xml or .urdf: "
+        "FILE.xml:joint+joint@keyframe, where a joint "
         'may be "joint(motor,partner=pole,u_max=9,x0=0.2)".',
     ),
 ]
@@ -283,7 +290,8 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
             and not os.path.exists(text)
         ):
             raise ScenarioError(
-                f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)"
+                f"no file {text!r}: give a file of conditions, or one as worn: "
+                "friction=Coulomb(0.05)"
             )
         if os.path.exists(text):
             chosen += from_file(Path(text))

@@ -1,4 +1,4 @@
-"""smc-mujoco run, show, view: the runs of a scene, a saved trace, and any machine in a browser tab."""
+"""smc-mujoco run, show, view: a scene's runs, a saved trace, any machine in a browser tab."""
 
 from pathlib import Path
 from typing import Annotated
@@ -117,7 +117,8 @@ def view(
         typer.Argument(
             metavar="MACHINE",
             autocompletion=options.PLANTS,
-            help="A plant from `smc-mujoco list`; yours, FILE.xml:joint+joint, or FILE.xml:joint of a free body; or a "
+            help="A plant from `smc-mujoco list`; yours, FILE.xml:joint+joint, or "
+            "FILE.xml:joint of a free body; or a "
             "scene file, FILE.py, of which the first two runs of the film's condition are shown.",
         ),
     ],
