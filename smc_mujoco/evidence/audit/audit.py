@@ -11,6 +11,7 @@ after it. `verdict` says how checks become verdicts.
 from __future__ import annotations
 
 import dataclasses
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,16 +107,13 @@ def audit(
     """
     from smc_mujoco.evidence.audit.runs import Runs, of_table
 
-    if isinstance(paper, Paper):
-        audited = paper
-    else:
-        audited = find_paper(paper)
+    audited = paper if isinstance(paper, Paper) else find_paper(paper)
     rows = {} if table is None else of_table(table)
     shared: dict[str, Result] = {}
     entries = wanted(audited, only)
     names = sets(audited, gains, quick)
-    evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
-    used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
+    evidence: dict[str, dict[str, Evidence]] = defaultdict(dict)
+    used: dict[str, dict[str, dict[str, Used]]] = defaultdict(dict)
     late_last = sorted(entries, key=lambda entry: entry.late)
     for k, name in enumerate(names):
         runs = Runs(audited, name, quick, {}, threads, rows, shared)
@@ -131,7 +129,7 @@ def audit(
             said = f"{entry.measured}; here, quickly, {entry.quick}"
             claim = dataclasses.replace(claim, measured=said)
         verdicts.append(claim)
-    return Audit(audited, verdicts, quick, used, table is None)
+    return Audit(audited, verdicts, quick, dict(used), table is None)
 
 
 def claims(
@@ -167,10 +165,7 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
     """Return the sets of gains that `audit` takes for these arguments; refuse an unknown one."""
     if gains is None:
         return list(paper.quick_sets if quick else paper.sets)
-    if isinstance(gains, str):
-        names = [gains]
-    else:
-        names = items_of("gains", gains)
+    names = [gains] if isinstance(gains, str) else items_of("gains", gains)
     for name in names:
         find("set of gains", name, paper.sets)
     if not names:

@@ -45,10 +45,7 @@ def survivors(
       report: called with how many rounds are done and how many there are: the law itself is one,
         each mutant another.
     """
-    if isinstance(paper, Paper):
-        audited = paper
-    else:
-        audited = find_paper(paper)
+    audited = paper if isinstance(paper, Paper) else find_paper(paper)
     kept = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
     names = sets(audited, gains, quick)
 
@@ -59,10 +56,7 @@ def survivors(
         measure a mutant.
         """
         shared: dict[str, Result] = {}
-        if mutant:
-            replaced = {law: functools.partial(variant, name=mutant)}
-        else:
-            replaced = {}
+        replaced = {law: functools.partial(variant, name=mutant)} if mutant else {}
         for name in names:
             runs = Runs(audited, name, quick, replaced, threads, {}, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):
@@ -73,19 +67,20 @@ def survivors(
                         raise
                     yield entry.id, name, None
 
-    intact = {(id, name): evidence for id, name, evidence in measured(kept.values(), "", "")}
-    holding = {
-        id: any(any(sentences(intact[id, name] or [], entry.quantifier).values()) for name in names)
-        for id, entry in kept.items()
-    }
+    intact: dict[tuple[str, str], Evidence] = {}
+    holding = set()  # claims of which some sentence holds under the law itself
+    for id, name, evidence in measured(kept.values(), "", ""):
+        intact[id, name] = evidence or []
+        if any(sentences(intact[id, name], kept[id].quantifier).values()):
+            holding.add(id)
     for done, mutant in enumerate(MUTANTS, 1):
         report(done, 1 + len(MUTANTS))
         for law in sorted({first_law(entry) for entry in kept.values()}):
             about = [entry for entry in kept.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
-                if id in kept and lost(kept[id], intact[id, name] or [], evidence, holding[id]):
+                if id in kept and lost(kept[id], intact[id, name], evidence, id in holding):
                     del kept[id]
-    return {id: KEPT if holding[id] else BLIND for id in kept}
+    return {id: KEPT if id in holding else BLIND for id in kept}
 
 
 def first_law(entry: Entry) -> str:
@@ -106,9 +101,11 @@ def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool)
         return True
     if holding:
         still = sentences(mutant, entry.quantifier)
-        return any(
-            held and not still.get(one) for one, held in sentences(intact, entry.quantifier).items()
-        )
-    return [repr(item.value) for item in mutant] != [
-        repr(item.value) for item in intact
-    ]  # repr: NaN equals NaN
+        before = sentences(intact, entry.quantifier)
+        return any(held and not still.get(sentence) for sentence, held in before.items())
+    return _numbers(mutant) != _numbers(intact)
+
+
+def _numbers(evidence: Evidence) -> list[str]:
+    """Return the numbers of evidence as texts, in which NaN equals NaN."""
+    return [repr(item.value) for item in evidence]

@@ -217,12 +217,11 @@ class Runs:
             known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
         for name, scenario in wanted:
             self.scored[name] = result = known[name]
-            text = ",".join(
-                f"{metric}={float(value).hex()}" for metric, value in sorted(result.scores.items())
-            )
-            self.used[name] = self.used.get(name, Used(scenario))._replace(
-                scores=_hash(text.encode())
-            )
+            parts = []
+            for metric, value in sorted(result.scores.items()):
+                parts.append(f"{metric}={float(value).hex()}")
+            hashed = _hash(",".join(parts).encode())
+            self.used[name] = self.used.get(name, Used(scenario))._replace(scores=hashed)
         return [known[name].scores for name, _ in wanted]
 
     def score(self, plant: str, law_name: str, condition: str = "nominal") -> Scores:
@@ -242,18 +241,22 @@ class Runs:
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
         wanted = self._keyed(scenarios)
-        traces = dict(stream([scenario for _, scenario in wanted], self.threads))
-        for i, (name, scenario) in enumerate(wanted):
-            hashed = _hash(*(getattr(traces[i], array).tobytes() for array in ARRAYS))
+        done = dict(stream([scenario for _, scenario in wanted], self.threads))
+        traces = [trace for _, trace in sorted(done.items())]
+        for (name, scenario), trace in zip(wanted, traces, strict=True):
+            hashed = _hash(*(getattr(trace, array).tobytes() for array in ARRAYS))
             self.used[name] = self.used.get(name, Used(scenario))._replace(trace=hashed)
-        return [traces[i] for i in range(len(wanted))]
+        return traces
 
     def _keyed(self, scenarios: Iterable[Scenario]) -> list[tuple[str, Scenario]]:
         """Return scenarios with their keys, without the name of their condition, which changes
         nothing in a run.
         """
         plants: Hashes = {}
-        return [(key(scenario.named(None), plants=plants), scenario) for scenario in scenarios]
+        keyed = []
+        for scenario in scenarios:
+            keyed.append((key(scenario.named(None), plants=plants), scenario))
+        return keyed
 
     def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:
         """Return name -> trace of named scenarios, such as those of `grid`."""

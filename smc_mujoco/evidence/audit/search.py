@@ -50,12 +50,11 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
     """
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")
-    entries = {plant: dataclasses.replace(entry, plants=(plant,)) for plant in entry.plants}
-    return [
-        check
-        for p, claim in entries.items()
-        for check in _decisive(claim, runs.on(p), measure, f"{p}: ")
-    ]
+    evidence = []
+    for plant in entry.plants:
+        claim = dataclasses.replace(entry, plants=(plant,))
+        evidence += _decisive(claim, runs.on(plant), measure, f"{plant}: ")
+    return evidence
 
 
 def _decisive(
@@ -77,12 +76,9 @@ def _decisive(
         return tried.rank[0] != (entry.over == "all")
 
     def search() -> None:
+        spread, near = theorem.allowed.spread, theorem.allowed.near
         if runs.quick:
-            spread = QUICK_SPREAD_SETS
-            near = QUICK_NEAR_SETS
-        else:
-            spread = theorem.allowed.spread
-            near = theorem.allowed.near
+            spread, near = QUICK_SPREAD_SETS, QUICK_NEAR_SETS
         if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
             return
         centre = best(quickly, key=lambda tried: tried.rank).gains
@@ -93,11 +89,11 @@ def _decisive(
         search()
         decides(best(quickly, key=lambda tried: tried.rank).gains, False)
     last = best(in_full, key=lambda tried: tried.rank)
-    beside = [Beside(f"{prefix}decided at {gain}", value) for gain, value in last.gains.items()]
-    beside += [
-        Beside(f"{prefix}margin of {name}", value)
-        for name, value in theorem.margins(last.gains).items()
-    ]
+    beside = []
+    for gain, value in last.gains.items():
+        beside.append(Beside(f"{prefix}decided at {gain}", value))
+    for name, value in theorem.margins(last.gains).items():
+        beside.append(Beside(f"{prefix}margin of {name}", value))
     return [*last.evidence, *beside, Beside(f"{prefix}sets of gains tried", len(quickly) + 1)]
 
 

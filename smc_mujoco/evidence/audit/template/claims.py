@@ -5,7 +5,7 @@ threshold in paper.toml are
 checked, the others stand beside. `runs` makes each run once, and has:
 
     runs.plants, runs.laws, runs.conditions, runs.values   # what the claim names
-    runs.grid(**changes)                         # (plant, law, condition) -> scenario, for all of them
+    runs.grid(**changes)                         # (plant, law, condition) -> scenario, of all
     runs.scenario(plant, law, condition, **changes)
     runs.scores(scenarios), runs.traces(scenarios)         # in order; a score is metric -> number
     runs.law(plant, name, **gains), runs.quick

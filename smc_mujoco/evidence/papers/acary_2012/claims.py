@@ -116,10 +116,10 @@ def means(trace):
 def by_condition(runs, measure):
     """Return condition -> measure of its trace; with the law's name if there are several."""
     measured = runs.measured(runs.grid(), measure)
-    return {
-        cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}": value
-        for cell, value in measured.items()
-    }
+    values = {}
+    for (_, law, condition), value in measured.items():
+        values[condition if len(runs.laws) == 1 else f"{law}, {condition}"] = value
+    return values
 
 
 def amplitude(trace):
@@ -178,8 +178,10 @@ def explicit(runs):
         "largest |x|, implicit / explicit": lambda trace: largest(trace.v),
     }
     for name, of in measures.items():
-        pairs = {k: [of(traces[runs.plant, law, k]) for law in runs.laws] for k in runs.conditions}
-        ratios[name] = {condition: a / b for condition, (a, b) in pairs.items()}
+        ratios[name] = {}
+        for condition in runs.conditions:
+            implicit, explicit = (of(traces[runs.plant, law, condition]) for law in runs.laws)
+            ratios[name][condition] = implicit / explicit
     return ratios
 
 
@@ -187,26 +189,21 @@ def at_periods(runs, condition, count=None):
     """Return period -> trace of the claim's law at the first periods, with one step of the plant a
     period.
     """
-    law = runs.laws[0]
-    periods = runs.values["periods"][:count]
-    return runs.traced(
-        {
-            h: runs.scenario(runs.plant, law, condition, control_period=h, physics_step=h)
-            for h in periods
-        }
-    )
+    grid = {}
+    for h in runs.values["periods"][:count]:
+        step = {"control_period": h, "physics_step": h}
+        grid[h] = runs.scenario(runs.plant, runs.laws[0], condition, **step)
+    return runs.traced(grid)
 
 
 def with_a_model(runs):
-    """Exponents of the largest |s_x| and |x| of the last half in the control period, 3 ms to 0.1 s."""
+    """Exponents of the largest |s_x| and |x| of the last half in the period, 3 ms to 0.1 s."""
     traces = at_periods(runs, runs.conditions[0])
+    s = [largest(trace.s) for trace in traces.values()]
+    x = [largest(trace.x) for trace in traces.values()]
     return {
-        "exponent of the largest |s_x| in h": exponent(
-            [*traces], [largest(trace.s) for trace in traces.values()]
-        ),
-        "exponent of the largest |x| in h": exponent(
-            [*traces], [largest(trace.x) for trace in traces.values()]
-        ),
+        "exponent of the largest |s_x| in h": exponent([*traces], s),
+        "exponent of the largest |x| in h": exponent([*traces], x),
     }
 
 
@@ -253,8 +250,6 @@ def converges(runs):
     shares = {}
     for start, speed in runs.values["starts"][: 2 if runs.quick else None]:
         measured = runs.measured(runs.grid(x0=start, v0=speed, physics_step=0.1), share)
-        shares |= {
-            f"{cell[2]}, from {start:g} m at {speed:g} m/s": value
-            for cell, value in measured.items()
-        }
+        for (*_, condition), value in measured.items():
+            shares[f"{condition}, from {start:g} m at {speed:g} m/s"] = value
     return {"largest |x| of the last tenth / (h^2 largest |d|)": shares}

@@ -33,7 +33,7 @@ def gamma(gains):
 
 
 def general_margins(gains):
-    """The conditions of the formula, and what a start at 5000 m/s and a sampling of 10 us ask for."""
+    """The conditions of the formula, and what a start at 5000 m/s and samples of 10 us ask for."""
     A, B, p, q, k = (gains[name] for name in "ABpqk")
     conditions = {"k p < 1": 1.0 - k * p, "k q > 1": k * q - 1.0}
     if min(conditions.values()) <= 0.0:
@@ -90,14 +90,12 @@ def from_anywhere(runs):
     """Time from which |s| stays within 1e-6 m/s, from 0.1 to 100 m/s on three plants, over the
     least bound.
     """
-    laws = {
-        plant: runs.law(plant, *runs.laws) for plant in runs.plants[: 1 if runs.quick else None]
-    }
     cells = {}
-    for plant, law in laws.items():
+    for plant in runs.plants[: 1 if runs.quick else None]:
+        law = runs.law(plant, *runs.laws)
         for start in runs.values["starts"]:
             cells[f"{plant}, from {start:g} m/s"] = (plant, law, start)
-    bound = least_bound(laws[runs.plant])
+    bound = least_bound(runs.law(runs.plant, *runs.laws))
     return {"time / least bound": {name: time / bound for name, time in times(runs, cells).items()}}
 
 
@@ -110,11 +108,8 @@ def predefined(runs):
     for tc in runs.values["times"][: 1 if runs.quick else None]:
         gains = {gain: least_bound(law) / tc * law.gains[gain] for gain in ("k1", "k2")}
         cells[tc] = runs.plant, runs.law(runs.plant, *runs.laws, **gains), runs.values["start"]
-    return {
-        "time from far / time asked for": {
-            f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()
-        }
-    }
+    shares = {f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()}
+    return {"time from far / time asked for": shares}
 
 
 def disturbed(runs):

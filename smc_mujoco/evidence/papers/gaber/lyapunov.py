@@ -3,14 +3,14 @@
 V = s^2 / 2, s = alpha - u / g, and its rate.
 
     x, v = plane(plant, k1)                                    # a grid of states
-    rate = vdot(plant, lam, k1, x, v)                          # V' at each; the paper says V' < 0 wherever s != 0
+    rate = vdot(plant, lam, k1, x, v)        # V' at each; the paper says V' < 0 wherever s != 0
 
 With alpha = v + k1 x and u = -lam tanh(alpha), on x'' = f(x, v) + g u,
 
     s       = alpha + (lam / g) tanh(alpha)
-    alpha'  = f - lam g tanh(alpha) + k1 v                                                                  (1)
-    s'      = (1 + (lam / g) / cosh(alpha)^2) alpha'            for a constant g, as all of the study's plants have
-    V'      = s s'                                                                                          (2)
+    alpha'  = f - lam g tanh(alpha) + k1 v                                                (1)
+    s'      = (1 + (lam / g) / cosh(alpha)^2) alpha'      for a constant g, as all plants have
+    V'      = s s'                                                                        (2)
 
 So V rises beside alpha = 0 wherever f(x, -k1 x) is not k1^2 x, see docs/mathematics.md.
 

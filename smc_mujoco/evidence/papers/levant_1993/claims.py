@@ -35,10 +35,9 @@ def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""
     starts = runs.values.get("starts", [0.5])
     values = runs.values
+    plants = runs.plants
     if runs.quick:
-        plants, starts = (runs.plants[:1], starts[:1])
-    else:
-        plants = runs.plants
+        plants, starts = plants[:1], starts[:1]
     scenarios = []
     for plant in plants:
         for h in values["periods"]:
@@ -54,11 +53,10 @@ def sweep(runs):
 
 def exponents(runs, measure):
     """Return plant -> exponent of a measure as a function of the control period."""
-    periods = runs.values["periods"]
-    return {
-        plant: exponent(periods, [measure(run) for run in traces])
-        for plant, traces in sweep(runs).items()
-    }
+    found = {}
+    for plant, traces in sweep(runs).items():
+        found[plant] = exponent(runs.values["periods"], map(measure, traces))
+    return found
 
 
 def accuracy_of_s(runs):

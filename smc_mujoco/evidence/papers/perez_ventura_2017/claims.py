@@ -60,16 +60,15 @@ def compared(runs, law, expected):
     """
     lags = runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
     cycles = runs.measured({lag: behind(runs, law, lag) for lag in lags}, cycle)
+    amplitudes = {}
+    frequencies = {}
+    for lag, measured in cycles.items():
+        name = f"{1e3 * lag:g} ms"
+        amplitudes[name], frequencies[name] = np.divide(measured, expected(lag)).tolist()
     return {
-        "amplitude / predicted": {
-            f"{1e3 * lag:g} ms": a / expected(lag)[0] for lag, (a, _) in cycles.items()
-        },
-        "frequency / predicted": {
-            f"{1e3 * lag:g} ms": f / expected(lag)[1] for lag, (_, f) in cycles.items()
-        },
-        "exponent of the amplitude in the ATC": exponent(
-            lags, [amplitude for amplitude, _ in cycles.values()]
-        ),
+        "amplitude / predicted": amplitudes,
+        "frequency / predicted": frequencies,
+        "exponent of the amplitude in the ATC": exponent(lags, np.array([*cycles.values()])[:, 0]),
     }
 
 
@@ -165,9 +164,10 @@ def crossover(runs):
     amplitudes = [cycle(trace)[0] for trace in runs.traces(scenarios)]
     names = ("at the crossover", "at half of it", "at twice of it")
     ratios = np.divide(amplitudes[::2], amplitudes[1::2])
-    return {
-        f"amplitude, STA / FOSMC, {name}": ratio for name, ratio in zip(names, ratios, strict=True)
-    } | {"ATC at the crossover, s": equal}
+    found = {"ATC at the crossover, s": equal}
+    for name, ratio in zip(names, ratios, strict=True):
+        found[f"amplitude, STA / FOSMC, {name}"] = ratio
+    return found
 
 
 def redesigned(runs):

@@ -26,10 +26,7 @@ def winds_up(runs):
     Without a disturbance. That bound holds where the integrator stays within -U .. U. Undefined
     where s does not reach 0 at all.
     """
-    if runs.quick:
-        starts = runs.values["starts"][1:2]
-    else:
-        starts = runs.values["starts"]
+    starts = runs.values["starts"][1:2] if runs.quick else runs.values["starts"]
     grid = {f"from {start:g} m/s": runs.only(v0=start) for start in starts}
     gains = runs.law(runs.plant, *runs.laws).gains
     bound = runs.only().u_max
@@ -73,12 +70,12 @@ def time(runs):
 
 
 def same(runs):
-    """Largest difference of s between the two laws with the same gains, under d, with |u| <= 50 N."""
+    """Largest difference of s between the two laws with equal gains, under d, |u| <= 50 N."""
     (condition,) = runs.conditions
     traces = runs.traced(runs.grid())
-    pairs = {plant: [traces[plant, law, condition].v for law in runs.laws] for plant in runs.plants}
-    return {
-        "largest difference of s, m/s": {
-            plant: float(np.abs(a - b).max()) for plant, (a, b) in pairs.items()
-        }
-    }
+
+    def difference(plant):
+        first, second = (traces[plant, law, condition].v for law in runs.laws)
+        return float(np.abs(first - second).max())
+
+    return {"largest difference of s, m/s": runs.by_plant(difference)}

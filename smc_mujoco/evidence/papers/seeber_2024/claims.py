@@ -83,7 +83,7 @@ def last(trace):
 
 
 def attained(runs):
-    """|x| over L T^2 a period after a triangle of mean 0 over every period goes on with its slope."""
+    """|x| over L T^2 a period after a triangle of mean 0 over a period goes on with its slope."""
     cells = itertools.product(runs.laws, runs.conditions)
     grid = {f"{law}, {condition}": flipped(runs, law, condition, 1.0) for law, condition in cells}
     return {"largest |x| after the slope flips / (L T^2)": runs.measured(grid, last)}
