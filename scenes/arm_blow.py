@@ -23,7 +23,8 @@ def back(trace):
 
 def answer(runs):
     return (
-        f"after the blow the tip is off its path least with {runs.least(thrown, unit='mm')}, most with "
+        "after the blow the tip is off its path least with "
+        f"{runs.least(thrown, unit='mm')}, most with "
         f"{runs.most(thrown, unit='mm')}; first within 2 mm for good: {runs.least(back, unit='s')}"
     )
 

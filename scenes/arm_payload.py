@@ -30,7 +30,8 @@ def left(trace):
 
 def answer(runs):
     return (
-        f"the tip leaves its path least under {runs.least(sag, unit='mm')}, most under {runs.most(sag, unit='mm')}; at "
+        f"the tip leaves its path least under {runs.least(sag, unit='mm')}, "
+        f"most under {runs.most(sag, unit='mm')}; at "
         f"the end it is closest under {runs.least(left, unit='mm')}"
     )
 

@@ -28,9 +28,18 @@ def stays(trace):
 
 
 def answer(runs):
-    force = f"mean force off 20 N: least with {runs.least(off, unit='%')}, most with {runs.most(off, unit='%')}"
-    varying = f"it varies least with {runs.least(varies, unit='N')}, most with {runs.most(varies, unit='N')}"
-    return f"{force}; {varying}; always on the wall and less than 1 mm in it: {runs.those(stays).named}"
+    force = (
+        f"mean force off 20 N: least with {runs.least(off, unit='%')}, "
+        f"most with {runs.most(off, unit='%')}"
+    )
+    varying = (
+        f"it varies least with {runs.least(varies, unit='N')}, "
+        f"most with {runs.most(varies, unit='N')}"
+    )
+    return (
+        f"{force}; {varying}; always on the wall and less "
+        f"than 1 mm in it: {runs.those(stays).named}"
+    )
 
 
 scene = smc.Scene(

@@ -17,7 +17,8 @@ def quiet(trace):
 
 def answer(runs):
     return (
-        "the widest gap of those tried up to which no blow in the last fifth of the run exceeds the law's own max |u|: "
+        "the widest gap of those tried up to which no blow in the last "
+        "fifth of the run exceeds the law's own max |u|: "
         f"{runs.up_to(quiet)}; the hardest blow of all: {runs.most('peak_reaction')}"
     )
 

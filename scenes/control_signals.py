@@ -15,8 +15,10 @@ def answer(runs):
     paper = runs.only("observer_free")
     settled = runs.those()
     return (
-        f"of those that settle, u varies least at the end under {settled.least('tv_rate')}, and most under "
-        f"{settled.most('tv_rate')}; TV rate from nominal to noise: {paper.changes('tv_rate', 'nominal', 'noise')}"
+        "of those that settle, u varies least at the end under "
+        f"{settled.least('tv_rate')}, and most under "
+        f"{settled.most('tv_rate')}; TV rate from nominal to noise: "
+        f"{paper.changes('tv_rate', 'nominal', 'noise')}"
     )
 
 

@@ -13,7 +13,8 @@ import smc_mujoco as smc
 def answer(runs):
     last = list(runs.traces)[-1]
     return (
-        f"the longest delay of those tried up to which each settles: {runs.up_to()}; with {last} the ultimate bound is "
+        "the longest delay of those tried up to which each settles: "
+        f"{runs.up_to()}; with {last} the ultimate bound is "
         f"least under {runs[last].least('ultimate_bound')}"
     )
 

@@ -17,7 +17,8 @@ def stands(trace):
 def answer(runs):
     last = list(runs.traces)[-1]
     return (
-        f"the strongest gust of those tried up to which the pendulum stays off the floor: {runs.up_to(stands)}; "
+        "the strongest gust of those tried up to which the pendulum "
+        f"stays off the floor: {runs.up_to(stands)}; "
         f"after {last} {runs[last].who('end upright')}"
     )
 

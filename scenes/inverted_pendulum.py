@@ -14,8 +14,10 @@ import smc_mujoco as smc
 def answer(runs):
     settled = runs.those()
     return (
-        f"{runs.who('settle')}; first: {runs.least('settling_time')}; last: {runs.most('settling_time')}; "
-        f"of those that settle, u varies least under {settled.least('tv_rate')}, most under {settled.most('tv_rate')}"
+        f"{runs.who('settle')}; first: {runs.least('settling_time')}; "
+        f"last: {runs.most('settling_time')}; "
+        f"of those that settle, u varies least under {settled.least('tv_rate')}, "
+        f"most under {settled.most('tv_rate')}"
     )
 
 

@@ -24,7 +24,8 @@ def answer(runs):
     least = runs.least(swing, unit="rad")
     most = runs.most(swing, unit="rad")
     return (
-        f"the load swings least with {least}, most with {most}; trolley and load are first at rest with "
+        f"the load swings least with {least}, most with {most}; "
+        "trolley and load are first at rest with "
         f"{runs.least('settling_time')}, last with {runs.most('settling_time')}"
     )
 

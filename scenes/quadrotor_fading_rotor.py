@@ -31,7 +31,8 @@ def sag(trace):
 
 def answer(runs):
     return (
-        f"the largest loss in % of those tried up to which the drone stays above the floor: {runs.up_to(flies)}; at 30 "
+        "the largest loss in % of those tried up to which the drone "
+        f"stays above the floor: {runs.up_to(flies)}; at 30 "
         f"% it sags by {runs['30'].least(sag)} to {runs['30'].most(sag)} mm"
     )
 

@@ -33,7 +33,10 @@ def answer(runs):
     low = runs.least(height, unit="m")
     high = runs.most(height, unit="m")
     first = runs.least(back, unit="s")
-    return f"before the drop it is at {low} to {high}, not 1 m; 3 s after it, {returned}; first {first}"
+    return (
+        f"before the drop it is at {low} to {high}, not 1 m; "
+        f"3 s after it, {returned}; first {first}"
+    )
 
 
 scene = smc.Scene(

@@ -17,7 +17,8 @@ def restarts(trace):
 
 def answer(runs):
     return (
-        f"farthest from the centre: {runs.most('steady_error')}; nearest: {runs.least('steady_error')}; "
+        f"farthest from the centre: {runs.most('steady_error')}; "
+        f"nearest: {runs.least('steady_error')}; "
         f"{runs.who('stick and slip', restarts)}"
     )
 

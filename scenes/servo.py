@@ -45,7 +45,8 @@ def share(trace):
 
 def answer(runs):
     return (
-        f"where the pendulum is level, the motor's torque to lift it over that to let it down is largest with "
+        "where the pendulum is level, the motor's torque to lift "
+        "it over that to let it down is largest with "
         f"{runs.most(share)} and smallest with {runs.least(share)}"
     )
 

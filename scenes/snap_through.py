@@ -19,7 +19,8 @@ def answer(runs):
     for name in ("settling_time", "ultimate_bound"):
         change[name] = runs.changes(name, "equation", "springs")
     return (
-        f"springs miss the equation by this share of the largest force: {MISS}; from the equation to the springs, "
+        "springs miss the equation by this share of the largest "
+        f"force: {MISS}; from the equation to the springs, "
         f"settling time: {change['settling_time']}; ultimate bound: {change['ultimate_bound']}"
     )
 

@@ -16,7 +16,10 @@ def answer(runs):
     metrics = ("settling_time", "itae", "tv_rate")
     time, error, effort = (settled.least(name) for name in metrics)
     leads = runs.only(*settled.leaders(*metrics)).named
-    return f"best in all three: {leads}; first to settle: {time}; least ITAE: {error}; least variation of u: {effort}"
+    return (
+        f"best in all three: {leads}; first to settle: {time}; least "
+        f"ITAE: {error}; least variation of u: {effort}"
+    )
 
 
 scene = smc.Scene(

@@ -16,7 +16,8 @@ def answer(runs):
     for name in ("settling_time", "ultimate_bound"):
         change[name] = paper.changes(name, "nominal", "sine")
     return (
-        f"from nominal to sine, settling time: {change['settling_time']}; ultimate bound: {change['ultimate_bound']}; "
+        f"from nominal to sine, settling time: {change['settling_time']}; "
+        f"ultimate bound: {change['ultimate_bound']}; "
         f"with the sine the least bound: {runs['sine'].least('ultimate_bound')}"
     )
 

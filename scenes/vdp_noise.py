@@ -15,8 +15,10 @@ def answer(runs):
     for name in ("settling_time", "ultimate_bound", "tv_rate"):
         change[name] = paper.changes(name, "nominal", "noise")
     return (
-        f"from nominal to noise, settling time: {change['settling_time']}; ultimate bound: {change['ultimate_bound']}; "
-        f"TV rate of u: {change['tv_rate']}, with noise the least: {runs['noise'].those().least('tv_rate')}"
+        f"from nominal to noise, settling time: {change['settling_time']}; "
+        f"ultimate bound: {change['ultimate_bound']}; "
+        f"TV rate of u: {change['tv_rate']}, with noise the least: "
+        f"{runs['noise'].those().least('tv_rate')}"
     )
 
 

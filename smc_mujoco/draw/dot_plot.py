@@ -191,7 +191,10 @@ def _panel(
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(colours)):
         if (condition, law) in intervals:
-            said = f"{style.law_name(law)}, {condition.replace('_', ' ')}: {intervals[condition, law].median:.3g}"
+            said = (
+                f"{style.law_name(law)}, {condition.replace('_', ' ')}: "
+                f"{intervals[condition, law].median:.3g}"
+            )
             look = {
                 "color": colours[law],
                 "marker": marks[law],

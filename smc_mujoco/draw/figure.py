@@ -257,7 +257,9 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
 
 
 def _by_joint(panels: Sequence[Panel]) -> list[Panel]:
-    """Return the panels, with one for each joint of a robot, because joints have nothing in common."""
+    """Return the panels, with one for each joint of a robot, because joints have nothing in
+    common.
+    """
     direct = any(panel.traces[0].scenario.plant.direct for panel in panels)
     return [part for panel in panels for part in (drawing.by_channel(panel) if direct else [panel])]
 

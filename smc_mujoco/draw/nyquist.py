@@ -56,7 +56,10 @@ def nyquist(
         for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True):
             words = "no limit cycle predicted, L and 1/N do not cross"
             if cycle:
-                words = f"amplitude {style.short(cycle.amplitude)} at {cycle.frequency:.3g} Hz predicted"
+                words = (
+                    f"amplitude {style.short(cycle.amplitude)} at "
+                    f"{cycle.frequency:.3g} Hz predicted"
+                )
             label = f"{style.law_name(scenario.law)}: {words}{source}"
             handles.append(Line2D([], [], color=colour, lw=style.points(3), label=label))
         whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)

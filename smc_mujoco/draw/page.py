@@ -106,7 +106,8 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
         width = height = 0.0
     if not all(SIDE_RANGE[0] <= side <= SIDE_RANGE[1] for side in (width, height)):
         raise ScenarioError(
-            f"size is {shown(size)}: give (width, height) in inches, each {SIDE_RANGE[0]:g} to {SIDE_RANGE[1]:g}"
+            f"size is {shown(size)}: give (width, height) in inches, "
+            f"each {SIDE_RANGE[0]:g} to {SIDE_RANGE[1]:g}"
         )
     return width, height
 

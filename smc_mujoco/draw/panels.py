@@ -284,7 +284,9 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
-    """Return the meaning of bands and lines that need an explanation: "band", "line", ... -> words."""
+    """Return the meaning of bands and lines that need an explanation: "band", "line", ... ->
+    words.
+    """
     n = max(
         (len(panel.group.channels) for panel in panels if panel.quantity not in SINGLE), default=1
     )
@@ -415,71 +417,69 @@ def over_time(
     """
     artists: list[Artist] = []
     name = panel.quantity
-    means = [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
+    traces = panel.traces
+    means = [QUANTITIES[name](trace).mean(axis=1) for trace in traces]
+    heights = limits(traces, name)
+    exact = means
     if name in PEAKS:
         ax.set_yscale("log")
         ax.yaxis.set_minor_formatter(NullFormatter())
-    ax.set_ylim(limits(among or panel.traces, name))
-    set_numbers(ax.yaxis, panel._replace(traces=among or panel.traces))
+        exact = [np.log10(mean) for mean in means]
+        heights = np.log10(heights)
+    ax.set_ylim(limits(among or traces, name))
+    set_numbers(ax.yaxis, panel._replace(traces=among or traces))
     if name == "reaction":
         clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
-    lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
-    heights = limits(panel.traces, name)
-    one_line = name in SINGLE or len(panel.group.channels) == 1
-    exact = [
-        (trace.t, np.log10(y) if name in PEAKS else y)
-        for trace, y in zip(panel.traces, means, strict=True)
-    ]
-    height = float(np.ptp(np.log10(heights) if name in PEAKS else heights))
-    shared = agreements(exact, height) if one_line else []
+    lines = [curve(trace, mean, name) for trace, mean in zip(traces, means, strict=True)]
+    shared: list[Agreement] = []
+    if name in SINGLE or len(panel.group.channels) == 1:
+        places = [(trace.t, y) for trace, y in zip(traces, exact, strict=True)]
+        shared = agreements(places, float(np.ptp(heights)))
     starts = partings(shared, len(lines))
     for trace, colour, mean, path, start in reversed(
-        list(zip(panel.traces, colours, means, lines, starts, strict=True))
+        list(zip(traces, colours, means, lines, starts, strict=True))
     ):
         y = QUANTITIES[name](trace)
-        if smoothed(trace) or name != "u":
-            steps = "default"
-        else:
-            steps = "steps-post"
+        look = {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:
             artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
-        look: dict[str, Any] = {"color": colour, "drawstyle": steps}
         if y.shape[1] > 1:
-            if name == "x":
-                slowest = {int(np.nansum(np.abs(y - trace.r), axis=0).argmax())}
-            else:
-                slowest = set()
-            for i in sorted({*drawn_channels(y).tolist(), *slowest}):
-                if i in slowest:
-                    width = SLOWEST_LINE
-                    alpha = 1.0
-                else:
-                    width = LIGHT_LINE
-                    alpha = 0.55
-                artists += ax.plot(
-                    *curve(trace, y[:, i], name), alpha=alpha, lw=style.points(width), **look
-                )
+            artists += channels(ax, trace, y, name, look)
         else:
             artists += ax.plot(*between(path, start, np.inf), lw=style.points(LINE), **look)
         # a trace that is cut to a close-up may end before its run failed
-        if (
-            trace.diverged_at is not None
-            and trace.t[-1] + trace.scenario.control_period > trace.diverged_at - 1e-9
-        ):
+        end = trace.t[-1] + trace.scenario.control_period
+        if trace.diverged_at is not None and end > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
-            artists += ax.plot(
-                trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross()
-            )
-    for who, start, stop in shared:
-        if name == "u" and not smoothed(panel.traces[who[0]]):
-            steps = "steps-post"
-        else:
-            steps = "default"
-        look = {"color": style.INK, "lw": style.points(LINE), "drawstyle": steps, "gid": AGREED}
-        artists += ax.plot(*between(lines[who[0]], start, stop), **look)
+            look = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
+            artists += ax.plot(trace.t[-1], last, "X", **look)
+    for (first, *_), start, stop in shared:
+        look = {"color": style.INK, "drawstyle": steps(traces[first], name), "gid": AGREED}
+        path = between(lines[first], start, stop)
+        artists += ax.plot(*path, lw=style.points(LINE), **look)
     tell_agreements(ax, shared if told else [], lines, names)
+    return artists
+
+
+def steps(trace: Trace, name: str) -> str:
+    """Return how a line of a quantity goes from sample to sample: u is held."""
+    return "steps-post" if name == "u" and not smoothed(trace) else "default"
+
+
+def channels(
+    ax: Axes, trace: Trace, y: np.ndarray, name: str, look: Mapping[str, Any]
+) -> list[Artist]:
+    """Draw the channels of y, (K+1, n), one by one, the slowest x thick."""
+    artists: list[Artist] = []
+    slowest = -1
+    if name == "x":
+        slowest = int(np.nansum(np.abs(y - trace.r), axis=0).argmax())
+    for i in sorted({*drawn_channels(y).tolist(), slowest} - {-1}):
+        width, alpha = (SLOWEST_LINE, 1.0) if i == slowest else (LIGHT_LINE, 0.55)
+        line = curve(trace, y[:, i], name)
+        artists += ax.plot(*line, alpha=alpha, lw=style.points(width), **look)
     return artists
 
 
@@ -845,7 +845,9 @@ def drawn_channels(y: np.ndarray) -> np.ndarray:
 
 
 def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:
-    """Return the values of successful runs; if there are none, of failed ones without their ends."""
+    """Return the values of successful runs; if there are none, of failed ones without their
+    ends.
+    """
     values = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
     if not values:
         shares = [UNDIVERGED_SHARE if trace.plant_diverged else 1.0 for trace in traces]

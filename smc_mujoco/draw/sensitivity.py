@@ -85,7 +85,9 @@ def _bars(ax: Axes, found: SobolResult, colour: str, pale: str) -> None:
 
 
 def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
-    """Draw independent runs over the axes of the first region, then those of the largest indices."""
+    """Draw independent runs over the axes of the first region, then those of the largest
+    indices.
+    """
     space = found.space
     if found.regions:
         wanted = [cut.axis for cut in found.regions[0].cuts]

@@ -135,7 +135,9 @@ class Session:
         self.message = ""
 
     def push(self, body: str, force: np.ndarray) -> None:
-        """Push a body from now on: a half sine of 0.1 s with this peak in the axes of the world, N."""
+        """Push a body from now on: a half sine of 0.1 s with this peak in the axes of the world,
+        N.
+        """
         x, y, z = force.tolist()
         push = Push(body=body, x=x, y=y, z=z, time=self.time, width=PUSH_WIDTH)
         self.change(
@@ -194,7 +196,9 @@ class Session:
         self.change(lambda s: at_keyframe(s, self.batches[0].base, key))
 
     def save(self, path: Path) -> Path:
-        """Write a new scene file whose runs are these to the bit; refuse what it could not repeat."""
+        """Write a new scene file whose runs are these to the bit; refuse what it could not
+        repeat.
+        """
         runs = {f"{s.law.name} {i + 1}": describe(s) for i, s in enumerate(self.scenarios)}
         runs = json.loads(json.dumps(runs))
         if [restore(run) for run in runs.values()] != list(self.scenarios):

@@ -88,7 +88,9 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> l
 
 
 def at_rest(trace: Trace) -> np.ndarray:
-    """Return where each channel is at rest, in proportion to the speeds of its group, (K + 1, n)."""
+    """Return where each channel is at rest, in proportion to the speeds of its group, (K + 1,
+    n).
+    """
     rest = np.empty(trace.x.shape, bool)
     for group, part in conventions.by_group(trace).items():
         rest[:, group.channels] = conventions.at_rest(part)

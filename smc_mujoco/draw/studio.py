@@ -37,7 +37,8 @@ MAX_FRAME_TIME = 0.1  # s, simulated in a frame at most, so that slow runs still
 FEWER_PIXELS = """<head><script>{
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  if (names && /swiftshader|llvmpipe|basic render/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)))
+  if (names && /swiftshader|llvmpipe|basic
+    render/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)))
     Object.defineProperty(window, "devicePixelRatio", { value: 0.6 });
 }</script>"""
 

@@ -70,9 +70,21 @@ LIGHTEST, DARKEST = (
 # linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
 SIGHTS = np.array([
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-    [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
-    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
-    [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
 ])  # fmt: skip
 XYZ = np.array(
     [
@@ -232,7 +244,9 @@ def _farthest(colours: Sequence[str], others: Sequence[str]) -> str:
 
 @functools.cache
 def _grid(count: int) -> tuple[str, ...]:
-    """Return a grid of colours that are neither pale nor dull, at least twice as many as `count`."""
+    """Return a grid of colours that are neither pale nor dull, at least twice as many as
+    `count`.
+    """
     hues = 36
     while hues < count / 2:
         hues *= 2  # a few grids serve all counts
@@ -320,19 +334,16 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
             )
         return [label if isinstance(label, str) else shown(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
-    words = []
+    told = []
     for trace, name in zip(traces, names, strict=True):
-        words.append(
-            differences(
-                trace,
-                [one for one, other in zip(traces, names, strict=True) if other == name],
-                traces,
-            )
-        )
-    names = [f"{name}: {what}" if what else name for name, what in zip(names, words, strict=True)]
-    return [
-        n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)
-    ]
+        alike = [run for run, other in zip(traces, names, strict=True) if other == name]
+        words = differences(trace, alike, traces)
+        told.append(f"{name}: {words}" if words else name)
+    numbered = []
+    for i, name in enumerate(told):
+        several = told.count(name) > 1
+        numbered.append(f"{name} {told[:i].count(name) + 1}" if several else name)
+    return numbered
 
 
 def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
@@ -343,24 +354,23 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
     """
     settings = _differing(_settings, trace, alike)
     condition = settings.pop("condition", "")
+    parts = []
     if condition:
+        named = trace.scenario.condition
         same = _differing(
-            _settings,
-            trace,
-            [run for run in alike if run.scenario.condition == trace.scenario.condition],
+            _settings, trace, [run for run in alike if run.scenario.condition == named]
         )
-        settings = {
-            name: words
-            for name, words in settings.items()
-            if name in same or name not in CONDITION_FIELDS
-        }
+        for name in CONDITION_FIELDS:
+            if name not in same:
+                settings.pop(name, None)
+        parts.append(condition)
+    parts += settings.values()
     true = _differing(
         lambda run: vars(run.scenario.plant.values(run.scenario.mismatch)), trace, others
     )
-    machine = []
     for name, words in true.items():
-        machine.append(f"plant's {words}" if name in trace.scenario.law.gains else words)
-    return ", ".join([*[condition] * bool(condition), *settings.values(), *machine])
+        parts.append(f"plant's {words}" if name in trace.scenario.law.gains else words)
+    return ", ".join(parts)
 
 
 def _differing(
@@ -373,17 +383,12 @@ def _differing(
     words = {}
     for name, value in mine.items():
         unequal = [table.get(name) for table in tables if table.get(name) != value]
-        if unequal:
-            told = (
-                (
-                    _setting(name, value, digits),
-                    {_setting(name, other, digits) for other in unequal},
-                )
-                for digits in range(3, MAX_DIGITS + 1)
-            )
-            words[name] = next(
-                (its for its, different in told if its not in different), _setting(name, value)
-            )
+        digits = 3
+        while unequal and name not in words:
+            text = _setting(name, value, digits)
+            digits += 1
+            if digits > MAX_DIGITS or text not in [_setting(name, x, digits - 1) for x in unequal]:
+                words[name] = text
     return words
 
 
@@ -439,48 +444,42 @@ def _setting(name: str, value: object, digits: int = 3) -> str:
         return str(value).replace("_", " ")
     if isinstance(value, Jump):
         return f"jump at {value.time:g} s"
-    if value is None or value is False or (isinstance(value, tuple) and not value):
-        return f"no {words}"
     if value is True:
         return words
-    numbers = isinstance(value, int | float) or (
-        isinstance(value, tuple) and isinstance(value[0], int | float)
-    )
-    its = _value(value, digits).removeprefix(f"{capital(words)}, ")  # a noise is a Noise
-    if its != capital(words):
-        return f"{words}{' =' * numbers} {its}"
-    return f"no {words}"
+    text = _value(value, digits).removeprefix(f"{capital(words)}, ")  # a noise is a Noise
+    if value is None or value is False or value == () or text == capital(words):
+        return f"no {words}"
+    first = value[0] if isinstance(value, tuple) else value
+    if isinstance(first, int | float):
+        return f"{words} = {text}"
+    return f"{words} {text}"
 
 
 def _value(value: object, digits: int) -> str:
-    """Return a value of a field in words, such as "0.5", "Coulomb 0.005", "Encoder, counts 2000"."""
+    """Return a value of a field in words, such as "0.5", "Coulomb 0.005" or "Encoder, counts
+    2000".
+    """
     if isinstance(value, int | float):
         return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"
     if isinstance(value, tuple):
-        same = len(set(value)) == 1
-        few = len(value) <= MAX_VALUES
-        parts = [_value(part, digits) for part in value[: 1 if same else len(value)]]
-        if same or few:
-            return ", ".join(parts)
-        return f"{len(value)} values"
-    if isinstance(value, Component):
-        return law_name(value)
+        parts = value[:1] if len(set(value)) == 1 else value
+        few = ", ".join(_value(part, digits) for part in parts)
+        return few if len(parts) <= MAX_VALUES else f"{len(value)} values"
     if not dataclasses.is_dataclass(value):
         return str(value).replace("_", " ")
+    if isinstance(value, Component):
+        return law_name(value)
     kind = re.sub(CAMEL, lambda start: f" {start[1].lower()}", type(value).__name__)
-    fields = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
-    told = {}
-    for field, its in fields.items():
-        if its != field.default:
-            told[field.name] = _value(its, digits)
+    fields = dataclasses.fields(value)
+    said = {}
+    for field in fields:
+        part = getattr(value, field.name)
+        if part != field.default:
+            said[field.name] = _value(part, digits)
     if len(fields) == 1:
-        return " ".join([kind, *told.values()])
-    return ", ".join(
-        [
-            told.pop("kind", kind),
-            *(f"{name.replace('_', ' ')} {words}" for name, words in told.items()),
-        ]
-    )
+        return " ".join([kind, *said.values()])
+    kind = said.pop("kind", kind)
+    return ", ".join([kind, *(f"{name.replace('_', ' ')} {said[name]}" for name in said)])
 
 
 def ending(trace: Trace) -> str:
@@ -572,20 +571,12 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
-    if hasattr(traces, "column"):
-        raise ScenarioError(
-            f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run"
-        )
-    if isinstance(traces, Scenario):
-        raise ScenarioError("traces is a Scenario: run it first, smc.run(scenario)")
-    if isinstance(traces, Trace):
-        traces = [traces]
-    else:
-        traces = items_of("traces", traces)
-    if others := [given for given in traces if not isinstance(given, Trace)]:
-        raise ScenarioError(
-            f"traces has {shown(others[0])}, which is no trace: give those of smc.run or smc.load"
-        )
+    traces = [traces] if isinstance(traces, Trace) else items_of("traces", traces)
+    for given in traces:
+        if not isinstance(given, Trace):
+            raise ScenarioError(
+                f"traces has {shown(given)}, no trace: give what smc.run or smc.load returns"
+            )
     if not traces:
         raise ScenarioError(
             "no traces to draw: give at least one, from smc.run(...) or smc.load(...)"
@@ -597,11 +588,13 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
         )
     if len({tuple((g.name, g.unit) for g in groups(trace.scenario)) for trace in traces}) > 1:
         raise ScenarioError(
-            f"traces of {plants[0]} differ in their kinds of channels: draw those with the same ones at a time"
+            f"traces of {plants[0]} differ in their kinds of channels: "
+            "draw those with the same ones at a time"
         )
     if len(units := sorted({trace.scenario.efforts[0] for trace in traces})) > 1:
         raise ScenarioError(
-            f"traces of {plants[0]} have u in {' and '.join(units)}: draw those of one unit at a time"
+            f"traces of {plants[0]} have u in {' and '.join(units)}: "
+            "draw those of one unit at a time"
         )
     return traces
 
@@ -653,13 +646,10 @@ def heading(
     plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False
 ) -> str:
     """Return plants, and the condition if there is only one, which is not the nominal one."""
-    names = dict.fromkeys(plant_name(plant, short) for plant in plants)
-    condition = {*conditions}
-    if len(condition) == 1:
-        alone = next(iter(condition))
-    else:
-        alone = "nominal"
-    return ", ".join([*names, *[alone.replace("_", " ")] * (alone != "nominal")])
+    names = list(dict.fromkeys(plant_name(plant, short) for plant in plants))
+    if len(set(conditions)) == 1 and conditions[0] != "nominal":
+        names.append(conditions[0].replace("_", " "))
+    return ", ".join(names)
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
@@ -706,7 +696,9 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
 
 @functools.cache
 def letters_on(colour: str) -> str:
-    """Return the colour of letters that have more contrast with a colour, white or ink (WCAG 2.2)."""
+    """Return the colour of letters that have more contrast with a colour, white or ink (WCAG
+    2.2).
+    """
     on, ink, paper = (_luminance(shade) + 0.05 for shade in (colour, INK, PAPER))
     return INK if on / ink > paper / on else PAPER
 

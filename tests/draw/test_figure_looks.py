@@ -58,7 +58,10 @@ def ten(trace: smc.Trace) -> list[smc.Trace]:
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory) -> list[smc.Trace]:
     """Seven joints under two laws."""
-    link = '<body pos="0 0 .2"><joint name="j{}" axis="0 1 0"/><geom size=".03" mass=".3" contype="0"/>'
+    link = (
+        '<body pos="0 0 .2"><joint name="j{}" axis="0 1 '
+        '0"/><geom size=".03" mass=".3" contype="0"/>'
+    )
     bodies = "".join(link.format(i) for i in range(7)) + "</body>" * 7
     motors = "".join(f'<motor joint="j{i}"/>' for i in range(7))
     path = tmp_path_factory.mktemp("arm") / "arm.xml"

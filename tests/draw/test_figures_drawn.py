@@ -283,7 +283,8 @@ def curve(ax: Axes, colour: str) -> np.ndarray:
 MOTOR = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0)
 ARM = """
 <mujoco><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/><geom size=".1" contype="0"/>
-  <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1" contype="0"/></body></body></worldbody>
+  <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1"
+    contype="0"/></body></body></worldbody>
 <actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>"""
 PANELS = {  # what is run -> labels that a figure of it has, and parts of labels that it has not
     "ideal": (
@@ -573,7 +574,7 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
 
 
 @pytest.mark.parametrize("order", [1.9, math.nan])
-def test_marks_of_errors_are_the_means_of_all_starts_filled_in_the_fit_with_the_slopes_of_fit_and_theory(
+def test_marks_of_errors_are_means_of_all_starts_with_the_slopes_of_fit_and_theory(
     order,
 ):
     page = orders([accuracy("super_twisting", order=order)])

@@ -1,4 +1,6 @@
-"""The figure of an arm: small panels of each joint and one of the tip, and marks of what happens."""
+"""The figure of an arm: small panels of each joint and one of the tip, and marks of what
+happens.
+"""
 
 import dataclasses
 

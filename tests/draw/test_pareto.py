@@ -51,9 +51,7 @@ def page(monkeypatch) -> list[Figure]:
 
 
 @pytest.mark.parametrize("size", [None, (6.0, 4.0)])
-def test_a_front_is_the_best_that_was_tried_each_axis_has_its_unit_and_the_better_law_is_named_first(
-    pair, size
-):
+def test_a_front_is_the_best_that_was_tried_and_the_better_law_is_named_first(pair, size):
     fronts = [((1.0, 90.0), (2.0, 40.0), (3.0, 60.0), (4.0, 10.0)), ((1.5, 300.0), (2.5, 0.0))]
     made = []
     for tuned, front in zip(pair, fronts, strict=True):

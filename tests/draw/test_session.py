@@ -31,8 +31,10 @@ ROOT = Path(__file__).parents[2]
 NETWORK = smc.Scenario(
     plant=smc.plant("pendulum_network", n=3), law=smc.law("classical"), duration=0.2
 )
-ARM = """<mujoco><worldbody><body name="arm"><joint name="shoulder" damping="0.1"/><geom size="0.05" pos="0 0 -0.5"/>
-  </body></worldbody><actuator><motor joint="shoulder" ctrllimited="true" ctrlrange="-9 9"/></actuator>
+ARM = """<mujoco><worldbody><body name="arm"><joint name="shoulder" damping="0.1"/><geom
+  size="0.05" pos="0 0 -0.5"/>
+  </body></worldbody><actuator><motor joint="shoulder" ctrllimited="true"
+    ctrlrange="-9 9"/></actuator>
   <keyframe><key name="up" qpos="3" qvel="0.5"/></keyframe></mujoco>"""
 
 

@@ -1,4 +1,6 @@
-"""Films and figures in a notebook's cell: they are there, play at their speed, and fit on a phone."""
+"""Films and figures in a notebook's cell: they are there, play at their speed, and fit on a
+phone.
+"""
 
 import base64
 import io

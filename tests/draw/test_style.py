@@ -33,7 +33,7 @@ def test_colours_are_measured_in_cielab_as_published(colour, lab):
     assert style.distance("#FF0000", "#6E5E00") < 20.0 < style.distance("#FF0000", "#0000FF")
 
 
-def test_laws_that_are_compared_by_default_are_apart_in_four_sights_and_apart_from_all_else_that_is_drawn():
+def test_laws_that_are_compared_by_default_are_apart_in_four_sights():
     colours = style.law_colours(LAWS)
     assert colours == [style.law_colour(law) for law in LAWS]
     assert least(colours) > 15.0

@@ -314,17 +314,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
         else:
             flights = None
         for frame, time in enumerate(times.tolist()):
-            drawn = []
-            for k, track in enumerate(tracks):
-                lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
-                failed = track.failed(time)
-                stage.set_shape(k, time)
-                stage.pose(k, track.x[frame], track.ahead[frame], time)
-                stage.aim(k, track.r[frame] if lost and not failed else None, time)
-                stage.set_colour(k, style.FAILED if failed else track.colour)
-                if not failed:
-                    drawn += [(k, *pair) for pair in track.drawn[frame].arrows]
-            picture = stage.render(drawn)
+            picture = stage.render(posed(stage, tracks, over, frame, time))
             if over:
                 picture = over.over(picture, frame)
             if flights:
@@ -338,3 +328,30 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
                 float(frames.clock.shown[frame]),
             )
             yield np.concatenate([picture, charts.at(time)])
+
+
+def posed(
+    stage: Stage,
+    tracks: Sequence[MachineTrack],
+    over: arm.Overlay | None,
+    frame: int,
+    time: float,
+) -> list[tuple[int, int, arrows.Arrow]]:
+    """Pose all machines for a frame, and return their arrows, each with machine and channel.
+
+    A machine that has failed is grey, without a ghost or arrows. An arm has a ghost where its tip
+    is far from its path.
+    """
+    drawn = []
+    for k, track in enumerate(tracks):
+        stage.set_shape(k, time)
+        stage.pose(k, track.x[frame], track.ahead[frame], time)
+        if track.failed(time):
+            stage.set_colour(k, style.FAILED)
+            stage.aim(k, None)
+            continue
+        stage.set_colour(k, track.colour)
+        lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
+        stage.aim(k, track.r[frame] if lost else None, time)
+        drawn += [(k, *pair) for pair in track.drawn[frame].arrows]
+    return drawn

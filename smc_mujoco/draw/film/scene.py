@@ -310,14 +310,10 @@ def cut(
         slender = sides[:, axis] > SLENDER * np.delete(sides, axis, axis=1).max(axis=1)
         long = slender & (turned.max(axis=1) > 0.999)
         upright = axis == 2
-        if upright:
-            wanted = own
-        else:
-            wanted = (np.abs(slides[:, axis]) > 0.9).any()
+        wanted = own if upright else (np.abs(slides[:, axis]) > 0.9).any()
         if not long.any() or not wanted:
             continue
-        first = lows[axis]
-        last = highs[axis]
+        first, last = lows[axis], highs[axis]
         if upright:  # only from below
             first = min(least[~long & (most > first)].min(initial=first) - margin, first)
             last = np.inf
@@ -352,9 +348,6 @@ def cut(
 
 def lengthen(model: mujoco.MjModel, geom: int, side: int, longer: float) -> None:
     """Make half the length of a geom along a side of its own so much longer, m."""
-    if int(model.geom_type[geom]) in ROUND_GEOMS:
-        place = 1
-    else:
-        place = side
+    place = 1 if int(model.geom_type[geom]) in ROUND_GEOMS else side
     model.geom_size[geom, place] += longer
     model.geom_aabb[geom, 3 + side] += longer

@@ -77,8 +77,7 @@ class Stage:
         radius = self.largest_radius(
             float((self.place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2])
         )
-        self.links = []
-        self.mounts = []
+        self.links, self.mounts = [], []
         for k, puppet in enumerate(self.puppets):
             puppet.place = self.where[k]
             names = [joint.name for joint in joints(models.spec(puppet.scenario))]

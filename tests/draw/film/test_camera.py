@@ -19,7 +19,8 @@ MODEL = """
     <camera name="first" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/>
     <camera name="side" pos="4 0 1" xyaxes="0 1 0 0 0 1"/>
     <body name="post" pos="0 0 1">
-      <joint name="j" axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 0 0 .5" rgba=".5 .5 .5 1"/>
+      <joint name="j" axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 0 0 .5"
+        rgba=".5 .5 .5 1"/>
     </body>
     <body name="ball" pos="1 0 2"><freejoint name="fall"/><geom size=".1" rgba=".2 .9 .2 1"/></body>
   </worldbody>
@@ -101,8 +102,10 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
 ):
     """The ball that moves is 1 m thick, and does not move away."""
     plant = smc.plant_from(
-        f"""<mujoco><worldbody><body pos="0 0 3"><joint name="j" axis="0 1 0"/><geom size=".5"/></body>
-        <geom type="box" size="{half} .1 .1" pos="{place + 0.5 - half if place else 0} 0 3"/></worldbody>
+        f"""<mujoco><worldbody><body pos="0 0 3"><joint name="j" axis="0 1 0"/><geom
+          size=".5"/></body>
+        <geom type="box" size="{half} .1 .1"
+          pos="{place + 0.5 - half if place else 0} 0 3"/></worldbody>
         <actuator><motor joint="j"/></actuator></mujoco>""",
         ["j"],
     )

@@ -113,7 +113,7 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
     monkeypatch.setattr(
         Stage,
         "aim",
-        lambda stage, k, r, time: goals.append((k, r is None or r[0] - traces[k].r[0, 0])),
+        lambda stage, k, r, time=0.0: goals.append((k, r is None or r[0] - traces[k].r[0, 0])),
     )
     traces = good, bad
     before, after, later = pictures([good, failed(bad, 150)], [0.1, 0.2, 0.3])

@@ -160,8 +160,8 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
     place = np.array([[0.1, 0.0, 0.2]])
-    find = lambda k, name: np.array([0.4, 0.0, 0.9])
-    stage = SimpleNamespace(where=place, project=project, size=SIZE, scale=0.8, find=find)
+    stage = SimpleNamespace(where=place, project=project, size=SIZE, scale=0.8)
+    stage.find = lambda k, name: np.array([0.4, 0.0, 0.9])
     over = arm.Overlay([trace], COLOURS[:1], stage, edges, low)
     within = [(trace.t >= a) & (trace.t < b) for a, b in itertools.pairwise(edges)]
     forces = [np.linalg.norm(20.0 * trace.x[frame].mean(axis=0)) for frame in within]
@@ -214,9 +214,12 @@ def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
 
 HINGES = """
 <mujoco model="arm"><worldbody>
-  <camera name="first" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/><geom name="wall" type="box" size=".1 .1 1" pos="-.5 0 1"/>
-  <body pos="0 0 1"><joint name="j" axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 0 0 .5"/>
-    <body pos="0 0 .5"><joint name="k" axis="0 0 1"/><geom size=".1" pos=".2 0 0" rgba=".2 .9 .2 1"/></body></body>
+  <camera name="first" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/><geom name="wall" type="box"
+    size=".1 .1 1" pos="-.5 0 1"/>
+  <body pos="0 0 1"><joint name="j" axis="0 1 0"/><geom type="capsule" size=".05"
+    fromto="0 0 0 0 0 .5"/>
+    <body pos="0 0 .5"><joint name="k" axis="0 0 1"/><geom size=".1" pos=".2 0 0"
+      rgba=".2 .9 .2 1"/></body></body>
 </worldbody><actuator><motor joint="j"/><motor joint="k"/></actuator></mujoco>"""
 KINDS = {
     "rails behind each other": {"plant": "van_der_pol"},

@@ -19,14 +19,16 @@ pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing(
 SIZE = (1280, 720)
 STAGE = 460  # px, its height in a film 1280 px wide
 CRATE = """<mujoco model="crate"><worldbody><geom type="plane" size="2 2 .1"/>
-  <body pos="0 0 .5"><joint name="arm" axis="0 1 0"/><geom type="capsule" size=".03" fromto="0 0 0 0 0 .4"/></body>
+  <body pos="0 0 .5"><joint name="arm" axis="0 1 0"/><geom type="capsule" size=".03"
+    fromto="0 0 0 0 0 .4"/></body>
   <body name="crate" pos=".5 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody>
   <actuator><motor joint="arm" ctrlrange="-1 1"/></actuator></mujoco>"""
 TWO_LINKS = """<mujoco model="two"><worldbody><body pos="0 0 1"><joint name="a" axis="0 1 0"/>
   <geom type="capsule" size=".03" fromto="0 0 0 0 0 .5" mass="1"/>
   <body pos="0 0 .5"><joint name="b" axis="0 1 0"/>
   <geom type="capsule" size=".02" fromto="0 0 0 0 0 .4" mass=".5"/></body></body></worldbody>
-  <actuator><motor joint="a" ctrlrange="-5 5"/><motor joint="b" ctrlrange="-5 5"/></actuator></mujoco>"""
+  <actuator><motor joint="a" ctrlrange="-5 5"/><motor joint="b"
+    ctrlrange="-5 5"/></actuator></mujoco>"""
 
 
 def two(plant, **fields):
@@ -37,7 +39,9 @@ def two(plant, **fields):
 
 @contextlib.contextmanager
 def filmed(traces, monkeypatch, times=(0.1, 0.2)):
-    """Give the stage of a film of the traces, whose first two pictures were drawn, and its caption."""
+    """Give the stage of a film of the traces, whose first two pictures were drawn, and its
+    caption.
+    """
     seen = {}
     made_by = stage.Stage
     with without_charts, monkeypatch.context() as patch:
