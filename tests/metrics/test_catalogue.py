@@ -258,20 +258,6 @@ def test_rise_time_is_that_of_the_slowest_channel_and_inf_if_one_never_rises():
     assert m.rise_time(run(t)) == 0.0
 
 
-def test_square_wave_has_tv_rate_four_amplitudes_times_its_frequency():
-    amplitude = 3.0
-    f = 5.0
-    h = 1e-3
-    t = clock(10, h)
-    u = amplitude * np.where((np.arange(t.size) // 100) % 2, -1, 1)
-    trace = run(t, u=u)
-    assert m.tv_rate(trace) == pytest.approx(2 * amplitude * 2 * f)
-    assert m.tv(trace) == pytest.approx(2 * amplitude * 2 * f * 10)
-    assert m.max_step(trace) == 2 * amplitude
-    assert m.max_u(trace) == amplitude
-    assert m.energy(trace) == pytest.approx(amplitude**2 * 10)
-
-
 def tone(t, hertz, size=1.0):
     return size * np.sin(2 * np.pi * hertz * (t - t[0]))
 
@@ -337,18 +323,6 @@ def test_network_settles_in_mean_and_spread_separately():
     assert m.spread_settling_time(trace) == pytest.approx(0.1 * math.log(50), abs=1e-3)
     assert m.spread_bound(trace) == pytest.approx(2 * math.exp(-80))
     assert m.spread_bound(run(t, np.column_stack([t, -t]))) == pytest.approx(20)
-
-
-# Friction and contact
-
-
-def test_a_sliding_block_sticks_from_the_time_at_which_coulomb_friction_has_stopped_it():
-    v0, deceleration, h = 2.0, 0.8, 1e-4  # stops at 2.5 s
-    t = clock(10, h)
-    v = np.maximum(v0 - deceleration * t, 0.0)
-    trace = run(t, v=v, reaction=np.where(v > 0, -deceleration, -0.1))
-    slow = 1e-3 * v0 / deceleration  # from 0.1 % of the largest speed on it is at rest
-    assert 7.5 <= m.stick_time(trace) <= 7.5 + slow + h
 
 
 def test_the_sample_at_which_a_part_begins_belongs_to_it():
