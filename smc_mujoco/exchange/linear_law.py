@@ -103,11 +103,11 @@ class LinearLaw:
         return f"u = gains.scale * ({_sum_of_products([(self.c, 'x'), (self.d, 'w')])})"
 
     def _step_lines(self) -> list[str]:
-        n = range(len(self.a))
-        lines = [*(f"x{i} = memory[{i}]" for i in n), self._output_line()]
-        return lines + [
-            f"memory[{i}] = {_sum_of_products([(self.a[i], 'x'), (self.b[i], 'w')])}" for i in n
-        ]
+        lines = [f"x{i} = memory[{i}]" for i in range(len(self.a))]
+        lines.append(self._output_line())
+        for i, (a, b) in enumerate(zip(self.a, self.b, strict=True)):
+            lines.append(f"memory[{i}] = {_sum_of_products([(a, 'x'), (b, 'w')])}")
+        return lines
 
     def _tustin_lines(self) -> list[str]:
         """Return the lines of x = (I - A h/2)^-1 (z + h/2 B w), u = C x + D w, z+ = 2 x - z, with z
@@ -126,11 +126,10 @@ class LinearLaw:
                 lines.append(f"f{k} = memory[{k}] + h * ({read})")
             lines += _block_lines(self.a, first, last)
             last = first - 1
-        return [
-            *lines,
-            self._output_line(),
-            *(f"memory[{i}] = 2.0 * x{i} - memory[{i}]" for i in range(n)),
-        ]
+        lines.append(self._output_line())
+        for i in range(n):
+            lines.append(f"memory[{i}] = 2.0 * x{i} - memory[{i}]")
+        return lines
 
 
 def _block_lines(a: Matrix, first: int, last: int) -> list[str]:
@@ -141,8 +140,10 @@ def _block_lines(a: Matrix, first: int, last: int) -> list[str]:
         return [f"x{first} = f{first} / (1.0 - h * {a[first][first]!r})"]
     i = first
     j = last
-    p, t = (f"(1.0 - h * {a[k][k]!r})" for k in (i, j))
-    q, r = (f"(-h * {a[k][m]!r})" for k, m in ((i, j), (j, i)))
+    p = f"(1.0 - h * {a[i][i]!r})"
+    t = f"(1.0 - h * {a[j][j]!r})"
+    q = f"(-h * {a[i][j]!r})"
+    r = f"(-h * {a[j][i]!r})"
     return [
         f"det = {p} * {t} - {q} * {r}",
         f"x{i} = (f{i} * {t} - {q} * f{j}) / det",
@@ -284,14 +285,12 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
             try:
                 forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
             except ValueError:
-                order = " over ".join(
-                    str(len(np.trim_zeros(polynomial, "f")) - 1) for polynomial in (above, below)
-                )
+                above, below = (len(np.trim_zeros(part, "f")) - 1 for part in (above, below))  # noqa: PLW2901
                 cure = "filter its derivative, as s / (tau s + 1)"
+                order = f"{above} over {below}"
                 raise ScenarioError(f"K is improper, of order {order}: {cure}") from None
-    a, b = (block_diag(*(form[k] for form in forms)) for k in (0, 1))
-    c, d = (np.hstack([form[k] for form in forms]) for k in (2, 3))
-    return _matrices(a, b, c, d, dt)
+    a, b, c, d = zip(*forms, strict=True)  # of each transfer function
+    return _matrices(block_diag(*a), block_diag(*b), np.hstack(c), np.hstack(d), dt)
 
 
 def _checked(K: System) -> System:

@@ -288,10 +288,7 @@ def _meanings(
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}
-    inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUT_FIELDS}
-    inputs |= _by_name(
-        [n for n in ins if n not in taken], [n for n in INPUT_FIELDS if n not in chosen]
-    )
+    inputs = _by_name(ins, INPUT_FIELDS, taken, chosen)
     if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
         first = strange[0]
         raise ScenarioError(
@@ -299,10 +296,7 @@ def _meanings(
             f"say which it is, variables={{'x': {first!r}}}, or hold each, "
             f"constants={{{first!r}: 0.0}}"
         )
-    outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
-    outputs |= _by_name(
-        [n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen]
-    )
+    outputs = _by_name(outs, OUTPUTS, taken, chosen)
     if not outs:
         raise ScenarioError(f"{file} has no output: export it with the command as an output")
     if "u" not in outputs and len(outs) != 1:
@@ -322,12 +316,23 @@ def _meanings(
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
 
 
-def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
-    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours; case
-    is ignored.
+def _by_name(
+    theirs: Iterable[str], ours: Iterable[str], taken: set[str], chosen: Mapping[str, str]
+) -> dict[str, str]:
+    """Return our name -> the FMU's: those chosen, and then those whose name, after the last dot, is
+    ours; case is ignored.
     """
-    words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
-    return {name: words[name] for name in ours if name in words}
+    words = {}
+    for name in theirs:
+        if name not in taken:
+            words[name.rsplit(".", 1)[-1].casefold()] = name
+    found = {}
+    for name in ours:
+        if name in chosen:
+            found[name] = chosen[name]
+        elif name in words:
+            found[name] = words[name]
+    return found
 
 
 def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
