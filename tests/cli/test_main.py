@@ -155,7 +155,7 @@ Look for: nothing.
 import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
 conditions = {"calm": {"only": run}}
-answer = lambda runs: runs.who("rests", "rest")
+answer = lambda runs: runs.who("rest")
 scene = smc.Scene(title="Asked [/s]", conditions=conditions, answer=answer)
 ''')
     code, out, _ = call("run", "asks.py", "--no-film", "--out", "out")
@@ -164,7 +164,7 @@ scene = smc.Scene(title="Asked [/s]", conditions=conditions, answer=answer)
         "Does it settle?",
         "Asked [/s]",
     ]
-    assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
+    assert re.search(r"^only .*\n\n0 of 1 rest \(not only\)\n\nwrote$", out, re.MULTILINE)
 
 
 def test_what_a_scene_s_answer_raises_is_shown_as_it_is_and_its_runs_are_kept(
@@ -386,7 +386,7 @@ SCENES = {  # a mistake in a scene -> the expression, and what the sentence name
     "a gain that is not there": ("smc.law('classical', kk=1.0)", ("kk", "line 4")),
     "labels alike": (
         "smc.Scene(title='T', conditions={'a': {'B c': ok(), 'b_c': ok()}})",
-        ("B c, b_c", "line 4"),
+        ("B c and b_c", "line 4"),
     ),
 }
 
