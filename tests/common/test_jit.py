@@ -87,7 +87,7 @@ def test_a_private_name_of_numba_exists(thing, attributes):
 
 def test_what_is_written_for_numba_s_private_names_are_its_own():
     assert RuntimeLinker.PREFIX == internals.UNRESOLVED
-    assert internals.DYNAMIC_MODULE == utils._dynamic_modname
+    assert utils._dynamic_modname == internals.DYNAMIC_MODULE
 
 
 def test_private_names_of_numba_stand_in_one_module():

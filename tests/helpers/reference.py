@@ -159,11 +159,9 @@ class Loop:
             if stage == 0 and within == 0:
                 x = data.qpos[self.channels["qpos"]]
                 v = data.qvel[self.channels["qvel"]]
-                held = self.drive_step or self.motors
-                if held:
+                delayed = data.ctrl[self.channels["ctrl"]] / self.controller.scale
+                if self.drive_step or self.motors:
                     delayed = self.delayed
-                else:
-                    delayed = data.ctrl[self.channels["ctrl"]] / self.controller.scale
                 applied = np.zeros(len(x))
                 limits = self.controller.limits
                 # the quotient may round to just beyond the limit
@@ -204,20 +202,17 @@ class Loop:
             at = self.channels
             if self.scenario.model == "true":
                 self.controller.told = self.d + self.forces[1] / self.scenario.steps
-            self.commands[k], s = self.controller(
-                k, t, *(data.sensordata[at[one]] for one in ("x_sensor", "v_sensor"))
-            )
-            for name, values in (("u", self.commands[k]), ("s", s), ("r", self.controller.r)):
-                self.log[name][k] = values
+            x = data.sensordata[at["x_sensor"]]
+            v = data.sensordata[at["v_sensor"]]
+            self.commands[k], self.log["s"][k] = self.controller(k, t, x, v)
+            self.log["u"][k] = self.commands[k]
+            self.log["r"][k] = self.controller.r
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
             self.delayed = self.commands[past // self.scenario.steps]
         if self.motors:
-            if past >= 0:
-                sampled = past // self.scenario.steps
-            else:
-                sampled = 0
-            arrives = past >= 0 and past % self.scenario.steps == self.late(sampled)
+            sample, rest = divmod(past, self.scenario.steps)
+            arrives = past >= 0 and rest == self.late(sample)
             for motor, u in zip(self.motors, self.delayed, strict=False):
                 motor.step(float(u) if arrives else None, step, self.scenario.physics_step)
             return
@@ -308,36 +303,17 @@ class Loop:
         ):
             if isinstance(signal, Push):
                 continue
-            if signal.random:
-                seed = self.scenario.seed
-                d = []
-                for i, state in enumerate(memory):
-                    d.append(
-                        evaluate(
-                            signal,
-                            t,
-                            state,
-                            seed,
-                            i,
-                            stream,
-                        )[0]
-                    )
-            elif signal.sees:
-                d = self.feedback_force(signal, data, t, memory[0])
-            else:
-                d = evaluate(signal, t)[0]  # the same in all channels
+            d = self.disturbance(signal, data, t, memory, stream)
             matched = at["sign"] * d * self.driven  # only on joints with an actuator
             joints += matched
             if signal.cartesian:
-                xfrc[at["horizontal" if signal.cartesian else "xfrc"]] += d
+                xfrc[at["horizontal"]] += d
             else:
-                xfrc[at["horizontal" if signal.cartesian else "xfrc"]] += matched
+                xfrc[at["xfrc"]] += matched
+        d = at["sign"] * xfrc[at["xfrc"]]
         if self.scenario.plant.direct:
-            xfrc[at["xfrc"]], data.qfrc_applied[at["qfrc"]] = 0.0, joints
-        if self.scenario.plant.direct:
-            d = joints
-        else:
-            d = at["sign"] * xfrc[at["xfrc"]]
+            xfrc[at["xfrc"]] = 0.0
+            data.qfrc_applied[at["qfrc"]] = d = joints
         if self.hinged.any():
             anchor = data.xanchor[at["anchor"] // 3]
             axis = data.xaxis[at["anchor"] // 3]
@@ -350,6 +326,17 @@ class Loop:
         if not np.isfinite(d).all():
             raise Failure(DISTURBANCE_NOT_FINITE)
         return d
+
+    def disturbance(self, signal, data, t, memory, stream):
+        """Return a disturbance at time t, s: of each channel, or the same in all."""
+        if signal.random:
+            seed = self.scenario.seed
+            return [
+                evaluate(signal, t, state, seed, i, stream)[0] for i, state in enumerate(memory)
+            ]
+        if signal.sees:
+            return self.feedback_force(signal, data, t, memory[0])
+        return evaluate(signal, t)[0]
 
     def feedback_force(
         self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray
