@@ -117,9 +117,11 @@ def _being_imported(module: str) -> bool:
 
     Its entries may not exist yet.
     """
-    around = itertools.accumulate(module.split("."), "{}.{}".format)
-    specs = (getattr(sys.modules.get(name), "__spec__", None) for name in around)
-    return any(getattr(spec, "_initializing", False) for spec in specs)  # importlib's own mark
+    for name in itertools.accumulate(module.split("."), "{}.{}".format):
+        spec = getattr(sys.modules.get(name), "__spec__", None)
+        if getattr(spec, "_initializing", False):  # importlib's own mark
+            return True
+    return False
 
 
 class Catalogue(Mapping[str, T_co]):
@@ -259,11 +261,12 @@ def _points() -> dict[str, list[EntryPoint]]:
     It reads their metadata, and imports nothing.
     """
     known = importlib.metadata.entry_points()
-    groups = [group for group in known.groups if group.startswith(PREFIX)]
-    return {
-        group: sorted(known.select(group=group), key=lambda point: (point.name, point.value))
-        for group in groups
-    }
+    found = {}
+    for group in known.groups:
+        if group.startswith(PREFIX):
+            in_group = known.select(group=group)
+            found[group] = sorted(in_group, key=lambda point: (point.name, point.value))
+    return found
 
 
 def points(group: str) -> list[EntryPoint]:

@@ -103,7 +103,7 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     close = difflib.get_close_matches(wanted, list(plain), n=1)
     if not close and wanted:
         close = [known for known in plain if wanted in known]
-    return [plain[near] for near in close[:1]]
+    return [plain[close[0]]] if close else []
 
 
 def _abbreviates(short: str, words: list[str]) -> bool:

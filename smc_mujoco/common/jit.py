@@ -464,12 +464,14 @@ def reason(error: Exception) -> str:
     """Return the line of a compiler's error that says what is wrong, printable even if it quotes a
     user's text.
     """
-    lines = []
-    for line in COLOURS.sub("", str(error)).splitlines():
+    first = ""
+    for line in map(str.strip, COLOURS.sub("", str(error)).splitlines()):
         if line.strip(" ^~."):
-            lines.append(line.strip())
-    telling = [line for line in lines if not WHEREABOUTS.match(line)]
-    return printable((telling or lines or [type(error).__name__])[0].removeprefix("TypingError: "))
+            first = first or line
+            if not WHEREABOUTS.match(line):
+                first = line
+                break
+    return printable((first or type(error).__name__).removeprefix("TypingError: "))
 
 
 # Raises out of bounds and at division by zero. Without wrappers for Python, which would take half

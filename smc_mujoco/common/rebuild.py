@@ -52,10 +52,8 @@ def rebuild(
         )
         copies[function] = finish(copy)
         # filled in only now, because a function may call itself
-        space |= {
-            name: _swapped(space[name], names, finish, copies)
-            for name in names.variables & space.keys()
-        }
+        for name in names.variables & space.keys():
+            space[name] = _swapped(space[name], names, finish, copies)
         for cell, old in zip(cells, function.__closure__ or (), strict=True):
             cell.cell_contents = _swapped(old.cell_contents, names, finish, copies)
     return copies[function]

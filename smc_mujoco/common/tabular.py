@@ -81,16 +81,16 @@ class Tabular:
         columns = self._columns(options.max_width)
         if self.title:
             yield Text(self.title, "bold")
-        for part in _parts([_widest(column) for column in columns], options.max_width, self.left):
+        for part in _parts(list(map(_widest, columns)), options.max_width, self.left):
             table = Table(
                 box=box.SIMPLE_HEAD,
                 padding=0,
                 pad_edge=False,
                 show_edge=False,
             )
-            heads = [columns[i][0] for i in part]
-            lines = max(head.plain.count("\n") for head in heads)
-            for i, head in zip(part, heads, strict=True):
+            lines = max(columns[i][0].plain.count("\n") for i in part)
+            for i in part:
+                head = columns[i][0]
                 above = Text("\n" * (lines - head.plain.count("\n")))
                 side = "left" if i < self.left else "right"
                 table.add_column(above.append_text(head), justify=side, overflow="fold")
@@ -141,13 +141,15 @@ class Tabular:
         cells = [_cell(row[i]) for row in self.rows]
         if narrow:
             cells = [cell._replace(below=cell.below.replace("–", "–\n")) for cell in cells]
-        star = any(cell.strong for cell in cells)
+        pad = " " if any(cell.strong for cell in cells) else ""  # below the stars
         texts = []
         for cell in cells:
-            mark = "*" if cell.strong else " " * star
-            text = Text(cell.text + mark, f"{'bold ' * cell.strong}{cell.colour}".strip())
+            text = Text(cell.text + pad, cell.colour)
+            if cell.strong:
+                text = Text(f"{cell.text}*", f"bold {cell.colour}".strip())
             for lines, style in ((cell.below, "dim not bold"), (cell.alarm, "red not bold")):
-                text.append("".join(f"\n{line}{' ' * star}" for line in lines.splitlines()), style)
+                for line in lines.splitlines():
+                    text.append(f"\n{line}{pad}", style)
             texts.append(text)
         width = max([HEADING_WIDTH, *map(_width, texts)])
         whole = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
@@ -157,7 +159,7 @@ class Tabular:
         return [Text(heading), *texts]
 
     def _repr_html_(self) -> html.Html:
-        lines = [[_html(_cell(cell)) for cell in row] for row in self.rows]
+        lines = [list(map(_html, row)) for row in self.rows]
         note = html.Html("<br>".join(map(html.text, self.notes)))
         numbers = range(self.left, len(self.headings))
         heads = [heading.replace("^2", "²") for heading in self.headings]
@@ -183,7 +185,7 @@ class Tabular:
             "\\toprule",
         ]
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
-        lines += [_tex_line(_tex_cell(_cell(cell)) for cell in row) for row in self.rows]
+        lines += [_tex_line(map(_tex_cell, row)) for row in self.rows]
         return "\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"])
 
 
@@ -275,8 +277,9 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
     return parts
 
 
-def _html(cell: Cell) -> html.Html:
+def _html(cell: Cell | str) -> html.Html:
     """Return a cell as HTML, with the lines below in smaller letters."""
+    cell = _cell(cell)
     text = html.strong(cell.text) if cell.strong else html.text(cell.text)
     lines = [*cell.below.splitlines(), *cell.alarm.splitlines()]
     if below := "<br>".join(map(html.text, lines)):
@@ -288,8 +291,9 @@ def _tex_line(cells: Iterable[str]) -> str:
     return f"{' & '.join(cells)} \\\\"
 
 
-def _tex_cell(cell: Cell) -> str:
+def _tex_cell(cell: Cell | str) -> str:
     """Return a cell as LaTeX, with the line below in brackets beside it."""
+    cell = _cell(cell)
     power = re.compile(r"([\d.]+)e(-?\d+)")
     text = tex(power.sub(r"\1·10^\2", cell.text))
     if cell.strong:
