@@ -205,7 +205,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
     "certify duffing --disturbance 2 --worst --out d.json --figure f": (
         0,
         [
-            "certify(Scenario(plant duffing, law observer_free, gains of kind shipped, u_max=6.0, condition='nominal')",
+            "certify(Scenario(plant duffing, law observer_free, gains of kind shipped, u_max=6.0",
             "Uncertainty(disturbance=2.0, slope=None",
             "'ultimate_bound', Uncertainty(disturbance=2.0",
             "progress=True)",
@@ -306,7 +306,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
     "rig --fit duffing a.csv b.csv --json found.json --figure fit": (
         0,
         [
-            "identify(plant duffing, [{t: a ndarray}, {t: a ndarray}], None, start={}, starts=4, seed=0, progress=True)",
+            "identify(plant duffing, [{t: a ndarray}, {t: a ndarray}], None, start={}, starts=4",
             "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))",
             *AXIS,
             "the fit is poor",

@@ -16,7 +16,7 @@ import hashlib
 import itertools
 import math
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from smc_mujoco.common.errors import find
@@ -130,6 +130,10 @@ class Runs:
         runs = copy.copy(self)
         runs.plants = (plant,)
         return runs
+
+    def few(self, values: Sequence[Value], part: slice = slice(1)) -> Sequence[Value]:
+        """Return a part of some values in a quick audit, by default the first, else all."""
+        return values[part] if self.quick else values
 
     @property
     def plant(self) -> str:

@@ -1,6 +1,4 @@
-"""What `smc.audits.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for
-every other one.
-"""
+"""What `accuracy` promises: the textbook's order of laws, theory's exponents, and remarks on others."""
 
 import dataclasses
 import math

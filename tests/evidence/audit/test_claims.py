@@ -1,4 +1,4 @@
-"""The audit: how checks make verdicts, that it can fail, and that what it computes is what happens."""
+"""The audit: how checks make verdicts, that it can fail, and what it computes is what happens."""
 
 import dataclasses
 import json

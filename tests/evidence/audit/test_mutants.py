@@ -114,7 +114,8 @@ def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
 
 def test_a_mutant_that_loses_one_sentence_and_gains_another_loses_the_claim(paper):
     file = paper("swaps", "ASKED") / "paper.toml"
-    two = 'size = { asked = "> 0", sentence = "it rests" }, other = { asked = "> 1", sentence = "it acts" }'
+    two = 'size = { asked = "> 0", sentence = "it rests" }'
+    two += ', other = { asked = "> 1", sentence = "it acts" }'
     file.write_text(file.read_text().replace('size = "ASKED"', two))
     assert survivors(file.parent) == {}
 
@@ -126,8 +127,10 @@ def test_what_holds_under_one_set_of_gains_or_in_one_sentence_is_lost_by_it_not_
     paper, asked, other, kept
 ):
     file = paper("weak", "ASKED") / "paper.toml"
-    two = f'size = {{ asked = "{asked}", sentence = "weak" }}, other = {{ asked = "{other}", sentence = "it acts" }}'
-    gains = "[gains.strong]\nclassical = { k = 3.0, c = 1.0 }\n[gains.weak]\nclassical = { k = 1.0, c = 1.0 }\n"
+    two = f'size = {{ asked = "{asked}", sentence = "weak" }}'
+    two += f', other = {{ asked = "{other}", sentence = "it acts" }}'
+    gains = "[gains.strong]\nclassical = { k = 3.0, c = 1.0 }\n"
+    gains += "[gains.weak]\nclassical = { k = 1.0, c = 1.0 }\n"
     file.write_text(file.read_text().replace('size = "ASKED"', two) + gains)
     assert survivors(file.parent, quick=False) == ({"1": kept} if kept else {})
 

@@ -320,7 +320,8 @@ def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(fold
         '{ size = "< 2" }',
         '{ size = { asked = "< 2", sentence = "small" } }\nwords = "small, or so"',
     )
-    code = "def small(runs):\n    return [runs.check('size', 'it', 5, times=3.0), runs.check('size', 'other', 3)]\n"
+    code = "def small(runs):\n    it = runs.check('size', 'it', 5, times=3.0)\n"
+    code += "    return [it, runs.check('size', 'other', 3)]\n"
     (one,) = claims(paper=folder(data, code))
     assert one.holds_if == "small, or so"
     assert (one.numbers["default"]["it"]["limit"], one.numbers["default"]["other"]["limit"]) == (

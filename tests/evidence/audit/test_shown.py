@@ -153,7 +153,7 @@ def test_a_notebook_shows_claims_in_a_line_each(claims):
 
 
 def test_the_figure_has_a_row_for_each_claim_and_a_dot_for_each_check(claims):
-    """At log10 of measured over asked, within a thousandth and a thousand; filled where it holds."""
+    """At log10 of measured over asked, from a thousandth to a thousand; filled where it holds."""
     page = figure(claims, "Claims of nobody")
     (axes,) = page.axes
     labels = axes.get_yticklabels()

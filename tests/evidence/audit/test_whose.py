@@ -157,7 +157,7 @@ def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_
     [
         (
             "5.0 - gains['k'] - 9.0",
-            r"function gain of claim 1: no gains in \[allowed\] meet the conditions: widen its bounds",
+            r"claim 1: no gains in \[allowed\] meet the conditions: widen its bounds",
         ),
         ("1 / 0", "claims.py, line 5: function gain of claim 1 raised ZeroDivisionError"),
     ],

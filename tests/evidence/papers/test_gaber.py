@@ -298,7 +298,7 @@ def swinging(plain: float, conditioned: float) -> Told:
 
 
 def among(ours: tuple[float, float]) -> Told:
-    """The paper's law among rivals of which one is the best in settling, and another in overshoot."""
+    """The paper's law among rivals of which one settles best, and another overshoots least."""
     return by_law(
         observer_free=ours, classical=(1.0, 4.0), adaptive=(3.0, 2.0), super_twisting=(never, 9.0)
     )

@@ -248,7 +248,7 @@ def converges(runs):
         return last / (trace.scenario.control_period**2 * amplitude(trace))
 
     shares = {}
-    for start, speed in runs.values["starts"][: 2 if runs.quick else None]:
+    for start, speed in runs.few(runs.values["starts"], slice(2)):
         measured = runs.measured(runs.grid(x0=start, v0=speed, physics_step=0.1), share)
         for (*_, condition), value in measured.items():
             shares[f"{condition}, from {start:g} m at {speed:g} m/s"] = value

@@ -91,7 +91,7 @@ def from_anywhere(runs):
     least bound.
     """
     cells = {}
-    for plant in runs.plants[: 1 if runs.quick else None]:
+    for plant in runs.few(runs.plants):
         law = runs.law(plant, *runs.laws)
         for start in runs.values["starts"]:
             cells[f"{plant}, from {start:g} m/s"] = (plant, law, start)
@@ -105,7 +105,7 @@ def predefined(runs):
     """
     law = runs.law(runs.plant, *runs.laws)
     cells = {}
-    for tc in runs.values["times"][: 1 if runs.quick else None]:
+    for tc in runs.few(runs.values["times"]):
         gains = {gain: least_bound(law) / tc * law.gains[gain] for gain in ("k1", "k2")}
         cells[tc] = runs.plant, runs.law(runs.plant, *runs.laws, **gains), runs.values["start"]
     shares = {f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()}

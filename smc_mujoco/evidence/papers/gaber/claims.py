@@ -284,7 +284,7 @@ def reduces_chattering(runs):
 
 def bounded(runs):
     """Claim 4: bounded control."""
-    names = runs.conditions[: QUICK_IDEAL_COUNT if runs.quick else None]
+    names = runs.few(runs.conditions, slice(QUICK_IDEAL_COUNT))
     grid = []
     for plant in runs.plants:
         for name in names:
@@ -469,7 +469,7 @@ def with_estimators(runs):
     """Claim 25: works with low-pass filtered differentiation, Savitzky-Golay, sliding
     differentiators.
     """
-    sigmas = runs.values["sigmas"][-1 if runs.quick else 0 :]
+    sigmas = runs.few(runs.values["sigmas"], slice(-1, None))
     grid = {}
     for plant in runs.plants:
         for name in runs.values["estimators"]:

@@ -35,13 +35,11 @@ def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""
     starts = runs.values.get("starts", [0.5])
     values = runs.values
-    plants = runs.plants
-    if runs.quick:
-        plants, starts = plants[:1], starts[:1]
+    plants = runs.few(runs.plants)
     scenarios = []
     for plant in plants:
         for h in values["periods"]:
-            for x0 in starts:
+            for x0 in runs.few(starts):
                 scenarios.append(
                     runs.on(plant).only(
                         x0=x0, control_period=h, duration=values["settled"] + END_SAMPLES * h

@@ -17,7 +17,7 @@ def precision(runs):
     for h in values["periods"]:
         duration = values["settled"] + END_SAMPLES * h
         fields = {"control_period": h, "physics_step": h, "duration": duration}
-        for x0 in values["starts"][: 1 if runs.quick else None]:
+        for x0 in runs.few(values["starts"]):
             scenarios.append(runs.only(x0=x0, **fields))
     errors = [late(trace.x) for trace in runs.traces(scenarios)]
     return {"exponent of the largest |e| in the period": exponent(values["periods"], errors)}
@@ -40,7 +40,7 @@ def noise(runs):
             "physics_step": h,
             "duration": values["settled"] + END_SAMPLES * h,
         }
-        for seed in values["seeds"][: 1 if runs.quick else None]:
+        for seed in runs.few(values["seeds"]):
             scenarios.append(
                 runs.only(x0=0.02, noise=smc.Noise(position=size), seed=seed, **sampled)
             )

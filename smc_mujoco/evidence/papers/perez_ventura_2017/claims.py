@@ -15,7 +15,7 @@ FIRST_HARMONIC = (
 )  # c, of [sin]^(1/2)
 RELAY_GAIN_RATIO = 1.1  # M over the bound of the disturbance
 SAMPLES_PER_ATC = 50  # samples in one ATC
-QUICK_LAG = 1  # index of the first ATC of a quick audit
+QUICK_LAGS = slice(1, None)  # the ATCs of a quick audit
 
 
 def super_twisting_margins(gains):
@@ -58,7 +58,7 @@ def compared(runs, law, expected):
     """Return measured amplitude and frequency over those expected of a lag, and the exponent of the
     amplitude.
     """
-    lags = runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
+    lags = runs.few(runs.values["lags"], QUICK_LAGS)
     cycles = runs.measured({lag: behind(runs, law, lag) for lag in lags}, cycle)
     amplitudes = {}
     frequencies = {}
@@ -122,7 +122,7 @@ def some_disturbance(runs):
     """
     cases = {}
     for bound in runs.values["bounds"]:
-        for lag in runs.values["lags"][QUICK_LAG if runs.quick else 0 :]:
+        for lag in runs.few(runs.values["lags"], QUICK_LAGS):
             omega = runs.values["pace"] / lag
             laws = (relay(runs, bound), super_twisting(runs, bound * omega))
             d = smc.Sine(bound, omega)
@@ -135,7 +135,7 @@ def small_lags(runs):
     ms.
     """
     bound = runs.values["bound"]
-    lags = runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
+    lags = runs.few(runs.values["lags"], QUICK_LAGS)
     laws = (super_twisting(runs, bound), relay(runs, bound))
     changes = {"disturbance": smc.Sine(bound, 1.0)}
     return ratios(

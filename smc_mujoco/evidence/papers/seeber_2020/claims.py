@@ -26,7 +26,7 @@ def winds_up(runs):
     Without a disturbance. That bound holds where the integrator stays within -U .. U. Undefined
     where s does not reach 0 at all.
     """
-    starts = runs.values["starts"][1:2] if runs.quick else runs.values["starts"]
+    starts = runs.few(runs.values["starts"], slice(1, 2))
     grid = {f"from {start:g} m/s": runs.only(v0=start) for start in starts}
     gains = runs.law(runs.plant, *runs.laws).gains
     bound = runs.only().u_max
@@ -41,7 +41,7 @@ def reaches(runs):
     """Largest |s| of the last quarter of 40 s under d = 1.5 sin 0.6 t, |u| <= 2 N, from three
     starts.
     """
-    cells = list(itertools.product(runs.plants, runs.values["starts"]))[: 1 if runs.quick else None]
+    cells = runs.few(list(itertools.product(runs.plants, runs.values["starts"])))
     grid = {f"{plant}, from {start:g} m/s": runs.on(plant).only(v0=start) for plant, start in cells}
     ends = runs.measured(grid, lambda trace: float(np.abs(trace.v[-(len(trace.t) // 4) :]).max()))
     return {"largest |s| of the last quarter, m/s": ends}
@@ -51,7 +51,7 @@ def time(runs):
     """Time from which |s| stays within 1 mm/s, from 10 and 50 m/s with |u| <= 2 N and without d,
     over |s0| / U.
     """
-    (plant,), starts = runs.plants, runs.values["starts"][: 1 if runs.quick else None]
+    (plant,), starts = runs.plants, runs.few(runs.values["starts"])
     scenarios = []
     for law in runs.laws:
         for start in starts:

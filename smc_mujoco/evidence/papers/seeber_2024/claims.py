@@ -51,9 +51,7 @@ def late(trace):
 
 def random_runs(runs, law):
     """Return name -> largest |x| under random slopes, for each period and seed."""
-    seeds, periods = (
-        runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods")
-    )
+    seeds, periods = (runs.few(runs.values[name]) for name in ("seeds", "periods"))
     grid = {}
     fields = {"duration": 5.0, "v0": 0.1}
     for period, seed in itertools.product(periods, seeds):
