@@ -1,4 +1,4 @@
-"""What `accuracy` promises: the textbook's order of laws, theory's exponents, and remarks on others."""
+"""What `accuracy` promises: theory's exponents, the order of laws, and remarks on all others."""
 
 import dataclasses
 import math
