@@ -115,7 +115,5 @@ def test_without_sigkill_a_model_s_error_is_not_one_of_memory(monkeypatch):
 
 def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(
-        smc.ScenarioError, match=r"law\.c' on Windows: run smc_mujoco on Linux, or in WSL"
-    ):
+    with pytest.raises(smc.ScenarioError, match=r"law\.c' on Windows: run it on Linux, or in WSL"):
         smc.exchange.law_from_c("law.c")

@@ -15,6 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.joint_law import coriolis
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.simulation.run import poses
 
 NOISE = smc.Noise(position=0.01, velocity=0.05)
 
@@ -238,6 +239,13 @@ def test_what_only_python_tells_of_a_compiled_law_that_raised_is_told():
 
     scenario = network(law=counts())
     assert_same(smc.run(scenario), reference.run(scenario))
+
+
+@pytest.mark.parametrize("name", ["a policy with state", "a law with memory"])
+def test_a_film_has_the_poses_of_a_run_in_python(name):
+    """It is simulated again, with a fresh copy of what the law keeps."""
+    trace = plainly(RUNS[name])
+    np.testing.assert_array_equal(poses(trace, trace.t), trace.x)
 
 
 def test_a_run_under_python_does_not_depend_on_those_beside_it():
