@@ -236,7 +236,7 @@ def _rows(matrix: np.ndarray) -> Matrix:
 def _system(K: Any) -> System:
     """Return what the user gave as matrices."""
     if isinstance(K, tuple | list) and len(K) in (4, 5):
-        return _matrices(*K[:4], K[4] if len(K) == 5 else None)
+        return _matrices(*[*K, None][:5])  # pyright: ignore[reportCallIssue] five of them
     if all(hasattr(K, name) for name in "ABCD"):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     if isinstance(K, np.ndarray) and K.ndim in (1, 2):

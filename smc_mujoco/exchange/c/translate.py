@@ -502,8 +502,8 @@ class Function:
             line = line.replace(token, i)
         self.lines.append(loops + line)
 
-    def captured(self, translate: Callable[[Any], Any], node: ast.expr) -> tuple[Any, list[str]]:
-        """Return what a method makes of an expression, and the lines that it needs before it."""
+    def captured(self, translate: Callable[[Any], Any], node: Any) -> tuple[Any, list[str]]:
+        """Return what a method makes of some code, and the lines that it writes."""
         lines, self.lines = self.lines, []
         made = translate(node)
         own, self.lines = self.lines, lines
@@ -522,8 +522,11 @@ class Function:
                 pass
             case ast.Expr(value=ast.Call() as call):
                 self.results_of(call)
-            case ast.Assign(targets=[target]) | ast.AnnAssign(target=target, value=ast.expr()):
-                self.assign(target, node.value)
+            case (
+                ast.Assign(targets=[target], value=value)
+                | ast.AnnAssign(target=target, value=ast.expr() as value)
+            ):
+                self.assign(target, value)
             case ast.AugAssign(target=target):
                 whole = self.value(ast.BinOp(target, node.op, node.value))
                 if whole.kind.shape and isinstance(target, ast.Name):  # changes the array itself
@@ -542,8 +545,8 @@ class Function:
                 self.lines.append("}")
             case ast.Break() | ast.Continue():
                 self.lines.append(f"{ast.unparse(node)};")
-            case ast.Return(value=ast.expr()):
-                self.give(node.value)
+            case ast.Return(value=ast.expr() as value):
+                self.give(value)
             case _:
                 raise refuse(node, f"{type(node).__name__.lower()}")
 
@@ -553,7 +556,10 @@ class Function:
         self.block(node.body)
         if node.orelse:
             _, lines = self.captured(self.block, node.orelse)
-            if len(node.orelse) == 1 and lines[0].startswith("if "):
+            before = [""]  # an elif may need lines of its own before its condition
+            if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
+                _, before = self.captured(self.truth, node.orelse[0].test)
+            if not before:
                 self.lines += [f"}} else {lines[0]}", *lines[1:]]
                 return
             self.lines += ["} else {", *lines]
@@ -652,13 +658,13 @@ class Function:
     def assign(self, target: ast.expr, node: ast.expr) -> None:
         """Assign a value to one target, or to a tuple of them."""
         if not isinstance(target, ast.Tuple | ast.List):
-            if self.calls_python(node):
+            if isinstance(node, ast.Call) and self.calls_python(node):
                 self.store(target, self.results_of(node, [target]))
             else:
                 self.store(target, self.number(node))
             return
         targets = target.elts
-        if self.calls_python(node):
+        if isinstance(node, ast.Call) and self.calls_python(node):
             values = self.results_of(node, targets).items
         else:
             value = self.value(node)
@@ -794,7 +800,7 @@ class Function:
         self.kinds[target.id] = kind
         return self.named(target.id)
 
-    def check_changes(self, call: ast.Call, values: Sequence[Value], made: "Function") -> None:
+    def check_changes(self, call: ast.Call, values: list[Value], made: "Function") -> None:
         """Refuse a call that changes an array in a way that C would not."""
         for name in made.changed & made.parameters.keys():
             i = made.position[name]
@@ -922,10 +928,8 @@ class Function:
                 return getattr(module, node.attr, None)
         return None
 
-    def calls_python(self, node: ast.expr) -> bool:
-        """Return whether an expression is the call of a function that is translated itself."""
-        if not isinstance(node, ast.Call):
-            return False
+    def calls_python(self, node: ast.Call) -> bool:
+        """Return whether a call is of a function that is translated itself."""
         function = self.resolve(node.func)
         return in_python(function) is not None and function not in REQUESTS
 
@@ -1216,7 +1220,7 @@ class Function:
         name = getattr(function, "__name__", str(function))
         numbers = [value.kind.of for value in values]
         if function is np.where and len(values) == 3:
-            made = chosen(*values, shape)
+            made = chosen(values[0], values[1], values[2], shape)
         elif function in (min, max) and len(values) > 1:
             made = values[0]
             for value in values[1:]:
@@ -1290,9 +1294,7 @@ def inside(nodes: Iterable[ast.AST]) -> list[ast.AST]:
 
 def assigned(node: ast.AST) -> set[str]:
     """Return the names that an assignment or a loop binds; none of other code."""
-    targets = getattr(node, "targets", [])
-    if hasattr(node, "target"):
-        targets = [node.target]
+    targets = getattr(node, "targets", None) or [getattr(node, "target", ast.Pass())]
     names = [part for part in inside(targets) if isinstance(part, ast.Name)]
     return {name.id for name in names if isinstance(name.ctx, ast.Store)}
 
@@ -1380,7 +1382,7 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
     if not isinstance(value, float | np.floating):
         raise refuse(node, f"the value {shown(value)}")
     kind = REAL
-    if isinstance(value, np.float32):
+    if type(value) is np.float32:
         kind = Kind("single")
     text = repr(float(value))
     if math.isnan(value):

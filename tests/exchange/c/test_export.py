@@ -309,6 +309,35 @@ def test_a_law_with_every_turn_of_python_gives_what_it_gives(folder):
         np.testing.assert_allclose(mine, its, rtol=1e-14, atol=1e-14)
 
 
+def both(a):
+    return a, 2.0 * a
+
+
+@smc.law_function
+def conditions(y, gains, memory):
+    if y.e > 1.0:
+        u = 1.0
+    elif (both(y.e)[1] if y.de > 0.0 else 0.0) > 0.5:
+        u = 2.0
+    else:
+        u = both(y.e)[0] if y.de > 0.0 else 0.25
+    if y.e > 2.0:
+        u = 7.0
+    else:
+        pass
+    return u, y.de
+
+
+def test_a_condition_that_needs_lines_of_its_own_has_them_within_its_else(folder):
+    """An `else if` before those lines would give 0.25 below e = 1."""
+    ours = back(folder, conditions())
+    theirs = rebuild(conditions().function, lambda g: g)
+    for e in (-0.5, 0.2, 0.3, 1.5, 3.0):
+        for de in (-1.0, 1.0):
+            y = Measurement(*[0.0] * 11)._replace(e=e, de=de)
+            assert ours(y, (), np.zeros(8)) == theirs(y, (), np.zeros(8))
+
+
 y0 = (0.25, 0.5)
 
 
