@@ -32,7 +32,7 @@ def made(function, gains=None, memory=8):
 
 
 def plainly(*args, **kwargs):
-    """`smc.run` of something that takes the reference loop, without the warning about it."""
+    """`smc.run` of something that is called in Python, without the warning about it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
         return smc.run(*args, **kwargs)
@@ -55,7 +55,7 @@ def assert_same(a, b):
 
 
 def assert_loops_agree(scenarios, rounding=0.0):
-    """Fail unless runs of the callback are those of the reference loop, to the bit or to a
+    """Fail unless runs of the callback are those of the oracle, to the bit or to a
     rounding, and go well.
     """
     for one, trace in zip(scenarios, smc.run(scenarios), strict=True):

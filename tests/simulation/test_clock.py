@@ -1,4 +1,4 @@
-"""The controller's clock: late and missed samples, against plain sums and the reference loop."""
+"""The controller's clock: late and missed samples, against plain sums and the oracle."""
 
 import dataclasses
 import math

@@ -1,7 +1,7 @@
-"""The compiled callback and the reference loop give the same numbers, to the last bit, whatever
+"""The compiled callback and the oracle give the same numbers, to the last bit, whatever
 else runs.
 
-The reference loop uses numpy's own generator and calls the laws as the Python functions they are:
+The oracle uses numpy's own generator and calls the laws as the Python functions they are:
 agreement holds the callback's clock, noise, delay, estimators, signals, saturation and logging
 against a second telling of them.
 """
@@ -484,7 +484,7 @@ def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
 
 
 class Policy:
-    """A law that no compiler takes, for the reference loop; it may run its own simulation."""
+    """A law that no compiler takes; it may run its own simulation."""
 
     def __init__(self, think=lambda: None):
         self.think = think
