@@ -17,12 +17,14 @@ def once_per_trace(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
     """Decorate a function of a trace: a result is computed once, and kept as long as its trace
     exists.
     """
-    results: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
 
-    @functools.wraps(function)  # hashes of code follow __wrapped__ and do not see the results
+    @functools.wraps(function)
     def kept(trace: Trace) -> V:
+        results = vars(kept)["results"]
         if trace not in results:
             results[trace] = function(trace)
         return results[trace]
 
+    # of the function, not of its closure, because a hash of its code has to leave the results out
+    vars(kept)["results"] = weakref.WeakKeyDictionary()
     return kept
