@@ -373,6 +373,7 @@ class Rows:
             raise smc.ScenarioError(f"it has no column {name}")
         n = len(self.rows)
         empty = {"failure": np.full(n, None, object), "diverged_at": np.full(n, np.nan)}
+        empty |= dict.fromkeys(("half_step", "trends"), np.full(n, None, object))
         if name in empty:
             return empty[name]
         if name in ("plant", "condition", "law", "seed"):
