@@ -227,15 +227,15 @@ class Board(Tables):
             return self.too_few
         if not self.best:
             return "none is unbeaten in every condition"
-        apart = [self.cannot_tell]
+        apart = self.cannot_tell
         if all(block.level for block in self.blocks):
-            apart = [LEVEL_WORDS]
-        if len(self.best) == len(self.entries):
-            return apart[0]
+            apart = LEVEL_WORDS
         unbeaten = "none beaten"
         if any(self.losses(entry.law) for entry in self.entries):
             unbeaten = f"undefeated: {joined(self.best)}"
-        return "; ".join([unbeaten, *apart[: len(self.best) - 1]])
+        if len(self.best) > 1:
+            unbeaten += f"; {apart}"
+        return unbeaten
 
     @property
     def cannot_tell(self) -> str:
@@ -396,8 +396,8 @@ def key(boards: Sequence[Board]) -> str:
     family = max(board.family for board in boards)
     winner = (
         "A winner is better than every other law in a paired test, corrected for "
-        f"{counted(family, 'comparison')} a metric. Pairs of runs tell by how much, not the medians."
-        f" Ahead means by more than {relevance(boards[0].relevant)}."
+        f"{counted(family, 'comparison')} a metric. Pairs of runs tell by how much, not the "
+        f"medians. Ahead means by more than {relevance(boards[0].relevant)}."
     )
     parts = [MEDIANS, MARKS, winner]
     if any(board.by_step for board in boards):
@@ -417,7 +417,7 @@ def relevance(share: float) -> str:
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:
-    """Return law -> the sources of its gains, for every law of some boards, in alphabetical order."""
+    """Return law -> the sources of its gains, for every law of some boards, by name."""
     by_law: dict[str, list[Source]] = {}
     for board in boards:
         for entry in board.entries:

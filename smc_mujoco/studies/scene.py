@@ -256,7 +256,7 @@ def _from_to(pair: tuple[float, float], unit: str) -> str:
 
 
 def summary(runs: Outcome) -> str:
-    """Return who settles, who is first, and who failed: the answer of a scene that declares none."""
+    """Return who settles, is first, and failed: the answer of a scene that declares none."""
     parts = [runs.who("settle"), f"first: {runs.those().least('settling_time')}"]
     failed = runs._kept(lambda label, run: run.failure is not None)
     if failed.labels:

@@ -65,8 +65,8 @@ MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the defau
 DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
 KEY = (
-    "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 % "
-    "intervals. A run fails, too, if it ends beyond 5 % of its scale."
+    "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 "
+    "% intervals. A run fails, too, if it ends beyond 5 % of its scale."
 )
 HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 

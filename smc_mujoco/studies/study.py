@@ -78,7 +78,8 @@ class Store:
                 path.unlink(missing_ok=True)
         except (OSError, ValueError) as error:  # ValueError: a name with a null character
             raise ScenarioError(
-                f"cannot use {self.parts}: {getattr(error, 'strerror', None) or error}; choose another folder"
+                f"cannot use {self.parts}: {getattr(error, 'strerror', None) or error}; choose "
+                "another folder"
             ) from error
         for path in parts if resume else ():
             if (part := self._read(path)) is not None:

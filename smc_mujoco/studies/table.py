@@ -2,7 +2,7 @@
 
     table = smc.Table.read("study/results.parquet")
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
-    table.scenario(0), table.trace(0)          # the scenario of a row, and its trace, by repeating the run
+    table.scenario(0), table.trace(0)    # the scenario of a row, and its trace, by a run
 
 Columns:
 
@@ -200,7 +200,7 @@ class Table:
         return html_table(names, cells, repr(self), note, range(4, 9))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Return the rows as a stream of Arrow's C interface, which polars, duckdb and pandas read."""
+        """Return the rows as a stream of Arrow's C interface, as polars and pandas read it."""
         return self.data.__arrow_c_stream__(requested_schema)
 
     def to_pandas(self) -> "pandas.DataFrame":

@@ -90,7 +90,9 @@ class Advice(Tables):
         wins = sum(len(board.wins(name)) for board in boards)
         losses = sum(len(board.losses(name)) for board in boards)
         text = f"it wins {wins} of {blocks} comparisons, and another law is better in {losses}"
-        return text if wins else f"first so far: {text}"
+        if wins:
+            return text
+        return f"first so far: {text}"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -181,8 +183,8 @@ def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
                 chosen.append(law)
     if not chosen:
         raise ScenarioError(
-            f"no law for {plant.name} has {', '.join(properties) or 'gains'}: ask for less, or give "
-            "your own, as laws=[my_law]"
+            f"no law for {plant.name} has {', '.join(properties) or 'gains'}: ask for less, or "
+            "give your own, as laws=[my_law]"
         )
     return chosen
 

@@ -148,7 +148,8 @@ class WorstCases(Tables, list[WorstCase]):
         """Plant, metric, number of runs and class."""
         first = self[0]
         metric = CATALOGUE[first.metric].label + f" in {first.unit}" * bool(first.unit)
-        return f"{first.nominal.plant.name}: {metric}, worst of {first.tried} runs within {first.class_words}"
+        within = f"worst of {first.tried} runs within {first.class_words}"
+        return f"{first.nominal.plant.name}: {metric}, {within}"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -245,7 +246,8 @@ def worst_case(
         )
     if within.period != (1.0, 1.0):
         raise ScenarioError(
-            "the adversary's forces have a value a sample, so period cannot differ: leave it out of within"
+            "the adversary's forces have a value a sample, so period cannot differ: leave it out "
+            "of within"
         )
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):

@@ -1,4 +1,4 @@
-"""What tells runs apart: equal ones have one key, and whatever decides what a run does changes it."""
+"""What tells runs apart: equal ones have one key, and what decides what a run does changes it."""
 
 import dataclasses
 import functools

@@ -8,13 +8,11 @@ import threading
 from pathlib import Path
 
 import arms
-import numpy as np
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import cache
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
-from smc_mujoco.evidence.accuracy.accuracy import Run, Setup
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import executors, run_key, study, worst_case
 from smc_mujoco.studies.scene import slug
@@ -90,89 +88,6 @@ def test_theory_promises_an_order_only_to_ideal_channels_of_the_law_s_relative_d
     assert not accuracies._why_no_promise(RUN)
 
 
-def test_bounds_that_are_reached_and_steps_that_matter_are_reasons_from_their_thresholds_on():
-    scenario = dataclasses.replace(RUN, law=smc.law("super_twisting", k1=0.01, k2=9.0))
-    setup = Setup([scenario] * 4, (2e-3, 1e-3), 2)
-    told = {}
-    for share in (0.0499, 0.05, 0.5):
-        told[share] = [
-            kind
-            for kind, words in accuracies._reasons(setup, [Run({}, 0.01), Run({}, share)])
-            if "bound" in words
-        ]
-    assert told == {0.0499: [], 0.05: ["saturated"], 0.5: ["saturated"]}
-    changes = [
-        (1.0, 1.04),
-        (1.0, 1.06),
-        (1.0, 0.94),
-        (1e-9, 2e-9),
-        (math.inf, 1.0),
-        (1.0, math.inf),
-    ]
-    found = [accuracies._step_change(error, halved, 2e-9) for error, halved in changes]
-    assert [bool(words) for words in found] == [False, True, True, False, False, False]
-    assert "+6 %" in found[1]
-    assert "-6 %" in found[2]
-
-
-def test_an_order_is_of_periods_at_which_no_run_failed_and_a_failure_is_its_reason():
-    scenario = dataclasses.replace(RUN, law=smc.law("super_twisting", k1=0.01, k2=9.0))
-    setup = Setup([scenario] * 5, (2e-3, 1e-3), 2)
-    parts = {"e": (1.0, 0.9, 0.8), "s": (0.3, 0.2, 0.1)}
-    halved = Run({"e": (0.4, 0.4, 0.4), "s": (0.1, 0.1, 0.1)})
-    runs = [Run(parts), Run({name: np.divide(values, 4.0) for name, values in parts.items()})] * 2
-    row = accuracies._row(setup, [*runs, halved])
-    assert row.e.errors == ((0.8, 0.2), (0.8, 0.2))  # at the end of each run
-    assert row.s.errors == ((pytest.approx(0.1), pytest.approx(0.025)),) * 2
-    assert (row.e.used, row.s.used) == ((2e-3, 1e-3),) * 2
-    assert (row.e.order, row.s.order) == (pytest.approx(2.0), pytest.approx(2.0))
-    assert (row.runs, row.failed, row.unit, row.gains) == (4, 0, "m", "yours")
-    lost = Run(dict.fromkeys(parts, (math.inf,) * 3), failure="it blew up")
-    row = accuracies._row(setup, [*runs[:3], lost, halved])
-    assert (row.e.used, row.failed) == ((2e-3,), 1)
-    assert math.isnan(row.e.order)
-    assert "1 of 4 runs failed, the first: it blew up" in row.e.why
-    assert "+100 %" in row.e.why
-    assert "+300 %" in row.s.why
-
-
-@pytest.mark.parametrize(("condition", "steps"), [("constant", 1), ("coulomb", 1), ("lugre", 16)])
-def test_a_mechanism_with_parts_takes_sixteen_steps_a_period_and_half_of_them_once(
-    condition, steps
-):
-    given = (
-        smc.plant("duffing"),
-        find_condition(condition),
-        "classical",
-        (4e-3, 1e-3),
-        [0, 3],
-        "tuned",
-        2.0,
-        None,
-    )
-    setup = accuracies._setup(*given)
-    assert (setup.periods, setup.starts) == ((4e-3, 1e-3), 2)
-    *whole, half = setup.scenarios
-    assert [(one.seed, one.control_period) for one in whole] == [
-        (0, 4e-3),
-        (0, 1e-3),
-        (3, 4e-3),
-        (3, 1e-3),
-    ]
-    expected = []
-    for one in whole:
-        expected.append(min(one.control_period, 1e-3) if steps == 1 else one.control_period / 16)
-    assert [one.physics_step for one in whole] == pytest.approx(expected)
-    assert (half.control_period, half.physics_step) == pytest.approx((1e-3, 1e-3 / steps / 2))
-    assert [one.x0 is None for one in whole] == [
-        True,
-        True,
-        False,
-        False,
-    ]  # the first start is the plant's own
-    assert whole[2].x0 == whole[3].x0
-
-
 def test_names_of_files(tmp_path):
     row = {
         "plant": "my plant",
@@ -229,28 +144,6 @@ SETUP = (
     2.0,
     None,
 )
-
-
-def test_an_accuracy_has_three_starts_at_five_periods_and_one_run_at_half_the_step_by_default(
-    monkeypatch,
-):
-    asked = []
-    monkeypatch.setattr(
-        accuracies,
-        "stream",
-        lambda scenarios, threads, report: asked.append((scenarios, threads)) or {},
-    )
-    with pytest.raises(KeyError):  # no run was measured
-        smc.audits.accuracy("classical", "duffing")
-    (scenarios, threads), *_ = asked
-    periods = [4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]
-    runs = [(seed, period, min(period, 1e-3)) for seed in range(3) for period in periods] + [
-        (0, 2.5e-4, 1.25e-4)
-    ]
-    assert [(one.seed, one.control_period, one.physics_step) for one in scenarios] == runs
-    assert {(one.duration, one.condition) for one in scenarios} == {(10.0, "constant")}
-    assert threads is None
-    assert scenarios[0].law.gains == accuracies._setup(*SETUP).scenarios[0].law.gains
 
 
 def test_what_cannot_be_sent_is_refused_with_the_cure_for_each_side(monkeypatch, refused):

@@ -358,16 +358,3 @@ def test_what_cannot_be_answered_is_refused():
     ]:
         with pytest.raises(smc.ScenarioError, match=sentence):
             smc.sensitivity(given, **{"over": over} | fields)
-
-
-def test_a_picture_has_a_bar_for_each_axis_and_a_dot_for_each_run():
-    over = smc.Uncertainty(mass=(0.5, 2.0), delay=(0.0, 0.02))
-    found = smc.sensitivity(scenario(), over, points=16)
-    bars, runs = found.figure().axes
-    assert [label.get_text() for label in bars.get_yticklabels()] == [
-        axis.name for axis in found.axes
-    ]
-    assert sum(len(dots.get_offsets()) for dots in runs.collections) == 32
-    assert {runs.get_xlabel(), runs.get_ylabel()} == {"mass (of nominal)", "delay (ms)"}
-    one = smc.sensitivity(scenario(), smc.Uncertainty(mass=(0.5, 2.0)), points=16).figure().axes[1]
-    assert one.get_ylabel() == "rms error (m)"
