@@ -27,9 +27,7 @@ minimised.
 
 import contextlib
 import dataclasses
-import math
 import os
-import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -66,7 +64,6 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
-from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.codes import code_hashes
@@ -86,10 +83,6 @@ PATIENCE = 1e-3  # a descent ends when 2 n + 2 evaluations lower J by a smaller 
 GAIN_DIGITS = 4
 
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
-# Shares of a search's budget that are used, as a rule: by a descent, which ends early, and by all
-# stages of a search by the equation with MuJoCo's evaluation in the end.
-LAST_SHARE = 0.1
-USUAL_SHARE = 1.0
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
     "CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, "
@@ -439,53 +432,6 @@ def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
     except ScenarioError as error:
         return str(error)
     return ""
-
-
-def expected_seconds(
-    plant: Plant,
-    laws: Sequence[Component | Template],
-    goal: Objective,
-    budget: int,
-    threads: int | None,
-) -> float:
-    """Return about how long a search for each of several laws takes, s, from evaluations in the
-    middle of a box.
-
-    Most of an evaluation's time is the mechanism's. So the first of the library's laws stands for
-    all of them; a law of the user's, which may not compile, is evaluated itself.
-    """
-    tasks = [_task(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
-    seconds = 0.0
-    of_library = None
-    for task in tasks:
-        if catalogue().get(task.law.name) is not task.law.template:
-            seconds += task.size * _seconds(task)
-        else:
-            of_library = of_library or _seconds(task)
-            seconds += task.size * of_library
-    return seconds
-
-
-def _seconds(task: Task) -> float:
-    """Return about how long an evaluation takes, s."""
-    middle = tuple(math.sqrt(low * high) for low, high in task.box.values())
-    accurate = Evaluator(task.goal, task.cases(0), tuple(task.box), task.threads, by_equation=True)
-    if accurate.engine == EQUATION:
-        engines = [accurate]
-    else:
-        engines = [_cheap(accurate), accurate]
-
-    def seconds(evaluate: Evaluator) -> float:
-        evaluate([middle])  # compiles
-        start = time.perf_counter()
-        evaluate([middle])
-        return time.perf_counter() - start
-
-    if len(engines) == 1:
-        shares = (USUAL_SHARE,)
-    else:
-        shares = (SCREENED_SHARE + EVOLVED_SHARE, LAST_SHARE)
-    return sum(share * seconds(one) for share, one in zip(shares, engines, strict=True))
 
 
 def _cheap(accurate: Evaluator) -> Evaluator:

@@ -465,11 +465,9 @@ def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(
 ):
     law = smc.law_function(gains={"k": 3.0})(function)
     monkeypatch.setattr(search.Task, "search", None)
-    refused(
-        lambda: Trial([], [], 1.0, None, tmp_path, None, False).gains_on(
-            smc.plant("duffing"), [law]
-        )
-    )
+    duffing = smc.plant("duffing")
+    trial = Trial([duffing], [], 1.0, None, tmp_path, None, False)
+    refused(lambda: trial.gains({"duffing": [law]}, True))
 
 
 @pytest.mark.filterwarnings("ignore:.* no unit")
