@@ -21,9 +21,8 @@ def relative_range(values: Sequence[float], least: float = 0.0, first_order: boo
     number. With `first_order` the first two values are of a run under an integrator of first order,
     and of the same run at half the step.
     """
-    if first_order and all(map(math.isfinite, values[:2])):
-        if len(values) > 1:
-            values = [*values, 2.0 * values[1] - values[0]]
+    if first_order and len(values) > 1 and all(map(math.isfinite, values[:2])):
+        values = [*values, 2.0 * values[1] - values[0]]
     missing = [math.isnan(value) for value in values]
     if any(missing):
         return 0.0 if all(missing) else math.inf

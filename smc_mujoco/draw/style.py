@@ -2,7 +2,7 @@
 
 Laws and plants state their labels in their own files. A law has one colour in nearly all pictures:
 the one that its file states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind
-readers can tell apart; or else one of `_palette`. Matplotlib's petroff10 has only ten colours,
+readers can tell apart; or else one of `palette`. Matplotlib's petroff10 has only ten colours,
 fewer than there are laws; two of them are the grey of failed runs, and one is the violet of
 friction.
 """
@@ -11,6 +11,7 @@ import colorsys
 import dataclasses
 import functools
 import itertools
+import json
 import math
 import re
 import zlib
@@ -24,7 +25,6 @@ from smc_mujoco.common.text import capital
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import Group, group_trace, groups
@@ -166,8 +166,8 @@ def law_colour(law: Component | str) -> str:
     template, name = _template(law)
     if template and template.colour:
         return template.colour
-    palette = _palette()
-    return palette.get(name) or [*palette.values()][zlib.crc32(name.encode()) % len(palette)]
+    chosen = palette()["chosen"]
+    return chosen.get(name) or list(chosen.values())[zlib.crc32(name.encode()) % len(chosen)]
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
@@ -181,14 +181,12 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """
     names = [_template(law)[1] for law in laws]
     colours: dict[int, str] = {}
-    own, places = (
-        known_laws().own,
-        {name: place for place, name in enumerate(_palette(), 1)},
-    )  # stated colours have 0
-    library, others = (
-        [i for i, name in enumerate(names) if (name in own) == ours] for ours in (True, False)
-    )
-    library.sort(key=lambda i: (places.get(names[i], 0), names[i]))
+    places = dict.fromkeys(palette()["stated"], 0)
+    for place, name in enumerate(palette()["chosen"], 1):
+        places[name] = place
+    library = [i for i, name in enumerate(names) if name in places]
+    library.sort(key=lambda i: (places[names[i]], names[i]))
+    others = [i for i, name in enumerate(names) if name not in places]
     changed = []
     for i in library + others:
         again = [k for k, name in enumerate(names) if name == names[i]]
@@ -209,30 +207,13 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 
 
 @functools.cache
-def _palette() -> dict[str, str]:
-    """Return the colours of the library's laws that state none, each the farthest from all before
-    it.
+def palette() -> dict[str, dict[str, str]]:
+    """Return the colours of the library's laws: those that they state, and those chosen for the
+    others, each the farthest from all before it.
 
-    Those of LAWS are first, then baselines. The former are at least MIN_DISTANCE apart in all
-    SIGHTS; all cannot be.
+    The report's laws are first, then baselines. A law without a colour here gets one by its name.
     """
-    laws = known_laws().own.values()
-    free = sorted(
-        (law for law in laws if not law.colour),
-        key=lambda law: (law.name not in LAWS, law.family != "baseline"),
-    )
-    colours = spread(len(free), [law.colour for law in laws if law.colour])
-    return {law.name: colour for law, colour in zip(free, colours, strict=True)}
-
-
-def spread(count: int, others: Sequence[str] = ()) -> list[str]:
-    """Return colours, each the farthest from the neutral ones, from the others and from all before
-    it.
-    """
-    used = [PAPER, INK, DISTURBANCE, REACTION, FAILED, *others]
-    for _ in range(count):
-        used.append(_farthest([colour for colour in _grid(0) if colour not in used], used))
-    return used[len(used) - count :]
+    return json.loads(Path(__file__).with_name("law_colours.json").read_text(encoding="utf-8"))
 
 
 def _farthest(colours: Sequence[str], others: Sequence[str]) -> str:

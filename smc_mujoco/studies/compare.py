@@ -35,7 +35,6 @@ from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
 from smc_mujoco.studies.study import FULL, QUICK, Traces
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import DURATION, WorstCases
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
@@ -133,6 +132,8 @@ class Compared(Tables):
         """The tables that are the same in every call: of the `leaderboard`, and of worst cases."""
         tables = self.leaderboard.tables
         if self.worst:
+            from smc_mujoco.studies.worst_case import WorstCases
+
             for cases in self.worst.values():
                 tables += WorstCases(cases.values()).tables
         return tables
@@ -290,7 +291,7 @@ def compare(
     table = trial.run(candidates, seeds, executor=workers, traces=traces)
     found = {}
     if worst:
-        found = _worst_cases(trial, candidates, within, duration or DURATION)
+        found = _worst_cases(trial, candidates, within, duration)
     by = paired_runs.GROUPS
     if len(machines) * len(tested) > MAX_BLOCKS:
         by = ("plant",)
@@ -309,29 +310,31 @@ def compare(
 
 def _class(worst: object) -> "Uncertainty | None":
     """Return the class in which worst cases are searched, None for the default one."""
+    if isinstance(worst, bool):
+        return None
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 
-    if isinstance(worst, Uncertainty):
-        return worst
-    if not isinstance(worst, bool):
+    if not isinstance(worst, Uncertainty):
         raise ScenarioError(
             f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1)"
         )
-    return None
+    return worst
 
 
 def _worst_cases(
     trial: Trial,
     candidates: Mapping[str, Sequence[Candidate]],
     within: "Uncertainty | None",
-    duration: float,
+    duration: float | None,
 ) -> "dict[str, dict[str, WorstCase]]":
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
+    from smc_mujoco.studies.worst_case import DURATION
+
     found: dict[str, dict[str, WorstCase]] = {}
     for plant in trial.plants:
         found[plant.name] = {}
         for law in (candidate.law for candidate in candidates[plant.name]):
-            run = case(plant, law, "nominal", duration, starts=trial.starts)
+            run = case(plant, law, "nominal", duration or DURATION, starts=trial.starts)
             found[plant.name][law.name] = trial.attack(f"{plant.name}-{law.name}", run, within)
     return found
 

@@ -222,13 +222,10 @@ class Trial(NamedTuple):
         """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a
         plant.
         """
-        from smc_mujoco.analysis.tuning import search
-
         reasons = []
-        goal = self._goal(plant, starts)
         for law, candidate in zip(laws, known, strict=True):
             if candidate is None:
-                reason = search.why_not(plant, law, goal)
+                reason = self._why_not(plant, law, starts)
             else:
                 reason = candidate.remark
             if not reason:
@@ -239,6 +236,12 @@ class Trial(NamedTuple):
                 f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default "
                 "gains"
             )
+
+    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
+        """Return why a law cannot be tuned on a plant, or ""."""
+        from smc_mujoco.analysis.tuning import search
+
+        return search.why_not(plant, law, self._goal(plant, starts))
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
