@@ -26,7 +26,9 @@ def relative_range(values: Sequence[float], least: float = 0.0, first_order: boo
     missing = [math.isnan(value) for value in values]
     if any(missing):
         return 0.0 if all(missing) else math.inf
-    beyond = [math.copysign(max(abs(value) - least, 0.0), value) for value in values]
+    beyond = []
+    for value in values:
+        beyond.append(math.copysign(max(abs(value) - least, 0.0), value))
     smallest = max(min(map(abs, values)), least)
     width = max(beyond) - min(beyond)
     # inf - inf is no change

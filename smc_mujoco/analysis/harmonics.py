@@ -268,7 +268,10 @@ class Loop:
         force = np.eye(model.nv)[dof]
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, mobility[None], force[None])
-        motors = [part for part in self.scenario.resolved.actuator if isinstance(part, DCMotor)]
+        motors = []
+        for part in self.scenario.resolved.actuator:
+            if isinstance(part, DCMotor):
+                motors.append(part)
         rotor = gear.rotor_inertia + sum(motor.gear**2 * motor.rotor_inertia for motor in motors)
         return gear.gap * rotor * float(mobility[dof])
 
@@ -413,7 +416,10 @@ class Controller:
         else:
             x, v, q, dq = (*motion, np.empty(0), np.empty(0))
         start = np.zeros(len(FIELDS))
-        of_joint = models[1] if len(motion) == 4 else (0.0,) * 4
+        if len(motion) == 4:
+            of_joint = models[1]
+        else:
+            of_joint = (0.0,) * 4
         for field, value in fixed.items():
             start[field] = value
         out = np.empty((len(x), 2))

@@ -229,7 +229,9 @@ def restoring_force(
     linear(plant)  # raises for a plant without linear theory
     p = SimpleNamespace(**plant.parameters)
     v = np.zeros(plant.n)
-    ratios = [plant.nominal(np.full(plant.n, 1.0), v, i, p) for i in range(plant.n)]
+    ratios = []
+    for i in range(plant.n):
+        ratios.append(plant.nominal(np.full(plant.n, 1.0), v, i, p))
     if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (
         1.0 + abs(ratios[0][0] / ratios[0][1])
     ):

@@ -62,7 +62,10 @@ def values(table: Columns, metric: str) -> np.ndarray:
     successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
     `Metric.absent`.
     """
-    name = "settling_time" if metric == SETTLES else metric
+    if metric == SETTLES:
+        name = "settling_time"
+    else:
+        name = metric
     scores = np.array(table.column(name), float)
     scores[np.isnan(scores)] = CATALOGUE[name].absent
     plants = np.asarray(table.column("plant"), str)
@@ -78,7 +81,10 @@ def values(table: Columns, metric: str) -> np.ndarray:
 
 def by_row(table: Columns, metric: str) -> ByRow:
     """Return a metric of the rows of a table, with what is charged to it."""
-    name = "settling_time" if metric == SETTLES else metric
+    if metric == SETTLES:
+        name = "settling_time"
+    else:
+        name = metric
     whole = values(table, metric)
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
     halves[np.isnan(whole)] = np.nan
@@ -201,7 +207,9 @@ def groups(table: Columns, by: Sequence[str]) -> list[Group]:
     """
     if tuple(items_of("by", by)) not in (GROUPS[:1], GROUPS):
         raise ScenarioError(f"by is {shown(by)}: give ('plant',) or ('plant', 'condition')")
-    columns = {name: np.asarray(table.column(name), str) for name in (*GROUPS, "law")}
+    columns = {}
+    for name in (*GROUPS, "law"):
+        columns[name] = np.asarray(table.column(name), str)
     columns["seed"] = np.asarray(table.column("seed"), int)
     if not columns["seed"].size:
         raise ScenarioError("the table has no runs: run a study first")
@@ -245,7 +253,9 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
 
 def _outcomes(table: Columns) -> np.ndarray:
     """Return a number for each row: equal for runs whose metrics are all equal up to rounding."""
-    columns = [np.array(table.column(name), float) for name in (*CATALOGUE, "diverged_at")]
+    columns = []
+    for name in (*CATALOGUE, "diverged_at"):
+        columns.append(np.array(table.column(name), float))
     # to 20 binary digits, and below 1e-9 to 0
     share, exponent = np.frexp(np.stack(columns, axis=1))
     with np.errstate(over="ignore", invalid="ignore"):
@@ -277,7 +287,9 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
 
 def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
     """Return law -> sources of its gains in some rows, by default in all."""
-    columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
+    columns = []
+    for name in ("law", "source", "search"):
+        columns.append(np.asarray(table.column(name)))
     if rows is not None:
         columns = [column[rows] for column in columns]
     by_law: dict[str, tuple[Source, ...]] = {}
@@ -308,7 +320,10 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     driven = [group for group in channel_groups(scenario) if group.driven]
     T = scenario.duration
     # a free body may rest anywhere
-    rest = scenario.plant.rest if scenario.plant.pose else np.zeros(scenario.plant.n)
+    if scenario.plant.pose:
+        rest = scenario.plant.rest
+    else:
+        rest = np.zeros(scenario.plant.n)
     off = np.abs(np.subtract(scenario.resolved.x0, rest))
     start = max((float(off[i]) for group in driven for i in group.channels), default=0.0)  # X0
     least = eps * start

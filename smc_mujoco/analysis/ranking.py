@@ -259,7 +259,10 @@ class Comparison:
         """Whether two laws are level: the interval of their ratio lies within 10 %, (blocks, laws,
         laws).
         """
-        margin = LEVEL_SHARE if self.shares else -math.log1p(-LEVEL_SHARE)
+        if self.shares:
+            margin = LEVEL_SHARE
+        else:
+            margin = -math.log1p(-LEVEL_SHARE)
         within = p_values(self.leads + margin) <= self.limits.pair
         level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS)
         return level | np.eye(len(self.laws), dtype=bool)
@@ -381,7 +384,10 @@ def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np
         low = ordered[(ordered.size - 1) // 2]
         high = ordered[ordered.size // 2]
         # the sum of two opposite infinite values is no number
-        centres[unit] = 0.0 if low == -high else (low + high) / 2
+        if low == -high:
+            centres[unit] = 0.0
+        else:
+            centres[unit] = (low + high) / 2
     return centres
 
 
@@ -439,7 +445,9 @@ def _linked(*sets: tuple[int, ...]) -> tuple[int, ...] | None:
         for runs in of_one_set:
             labels[runs] = labels[runs].min()
     units, numbers = np.unique(labels, return_inverse=True)
-    return None if units.size == labels.size else tuple(numbers.tolist())
+    if units.size == labels.size:
+        return None
+    return tuple(numbers.tolist())
 
 
 def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
@@ -491,7 +499,9 @@ def ranks(comparison: Comparison) -> list[Rank]:
     by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
     means = by_block.mean(axis=1).tolist()
     doubted = (comparison.beaten | comparison.undecided).any(axis=1).tolist()
-    order = [(int(n), round(mean, 9)) for n, mean in zip(lacking.sum(axis=1), means, strict=True)]
+    order = []
+    for n, mean in zip(lacking.sum(axis=1), means, strict=True):
+        order.append((int(n), round(mean, 9)))
     found = []
     for i, law in enumerate(comparison.laws):
         place = sum(other < order[i] for other in order) + (1 + order.count(order[i])) / 2

@@ -92,7 +92,9 @@ class Basin:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
-        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        fields = {}
+        for field in dataclasses.fields(self):
+            fields[field.name] = getattr(self, field.name)
         data = {}
         for name, value in fields.items():
             if isinstance(value, np.ndarray):
@@ -288,7 +290,9 @@ def load(path: str | os.PathLike[str]) -> Basin:
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    axis = [number(f"a value of {name}", value) for value in items_of(name, values)]
+    axis = []
+    for value in items_of(name, values):
+        axis.append(number(f"a value of {name}", value))
     if not axis:
         raise ScenarioError(f"{name} is {shown(values)}: give one or more finite numbers")
     return np.array(axis)

@@ -67,7 +67,9 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     if plant.pose:
         labels = names
     else:
-        labels = [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
+        labels = []
+        for i in order[: model.nv]:
+            labels.append(model.joint(int(model.dof_jntid[i])).name)
     states = []
     for kind in ("x", "v"):
         for name in labels:

@@ -61,7 +61,10 @@ def spreading(laws: int, conditions: int, spread: float, rng, tails: bool = Fals
     laws the starts.
     """
     size = laws, 1, 24
-    own = rng.standard_t(1.5, size=size) if tails else rng.normal(size=size)
+    if tails:
+        own = rng.standard_t(1.5, size=size)
+    else:
+        own = rng.normal(size=size)
     start = rng.normal(scale=0.1, size=(1, conditions, 24))
     return np.exp(spread * own + start + rng.normal(scale=0.01, size=(laws, conditions, 24)))
 
@@ -91,7 +94,9 @@ def test_the_ends_are_the_order_statistics_that_the_binomial_distribution_gives(
     percentile.
     """
     tail = stats.norm.cdf(-math.sqrt(n / (n - 1)) * stats.t.ppf(0.975, n - 1))
-    below = [stats.binom.sf(math.ceil(n / 2) - 1, n, j / n) for j in range(1, n + 1)]
+    below = []
+    for j in range(1, n + 1):
+        below.append(stats.binom.sf(math.ceil(n / 2) - 1, n, j / n))
     assert 1 + np.argmax(np.array(below) >= tail) == low
     assert interval(np.arange(1.0, n + 1))[1:3] == (low, high)
 
@@ -162,7 +167,9 @@ def test_ranks_are_those_of_the_medians_of_each_block():
 
 def test_a_law_that_fails_less_often_comes_first_whatever_its_median():
     scores = {"never_fails": [5.0] * 4, "fails": [1.0, 1.0, 1.0, INF], "also": [1.0, 2.0, 3.0, INF]}
-    found = [(rank.law, rank.place, rank.best) for rank in ranks(Comparison(scores))]
+    found = []
+    for rank in ranks(Comparison(scores)):
+        found.append((rank.law, rank.place, rank.best))
     assert found == [("never_fails", 1, True), ("fails", 2, False), ("also", 3, False)]
 
 
@@ -280,7 +287,10 @@ def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relev
         found = Comparison({f"law{i}": cell for i, cell in enumerate(cells)})
         for block, winner in enumerate(found.winners):
             for law in found.laws:
-                rivals = [found.effect(block, law, rival) for rival in found.laws if rival != law]
+                rivals = []
+                for rival in found.laws:
+                    if rival != law:
+                        rivals.append(found.effect(block, law, rival))
                 beyond = all(effect.high < 1 - RELEVANT for effect in rivals)
                 assert (law == winner) == beyond
                 assert all(effect.low <= effect.value <= effect.high for effect in rivals)
@@ -310,11 +320,17 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
         if winner is None:
             continue
         less = np.where(rng.random(12) < 0.4, np.exp(-rng.exponential(1.0)), 1.0)
-        fallen = [{k} for k in range(3)] if repeated == 1 else [{0, 1}]
+        if repeated == 1:
+            fallen = [{k} for k in range(3)]
+        else:
+            fallen = [{0, 1}]
         for parts in fallen:
             better = []
             for k, values in enumerate((cells, halves, trends)):
-                changed = {winner: values[winner] * less} if k in parts else {}
+                if k in parts:
+                    changed = {winner: values[winner] * less}
+                else:
+                    changed = {}
                 better.append(values | changed)
             after = Comparison(better[0], 0.5, halves=better[1], trends=better[2])
             assert after.winners == [winner]
@@ -479,7 +495,10 @@ def test_a_median_that_half_the_step_moves_is_marked(factor, floor, first_order,
     halves = {"a": factor * cells["a"], "b": cells["b"]}
     found = Comparison(cells, floor, halves=halves, first_order=first_order)
     middle = float(np.median(cells["a"]))
-    wanted = pytest.approx((middle, factor * middle)) if marked else None
+    if marked:
+        wanted = pytest.approx((middle, factor * middle))
+    else:
+        wanted = None
     assert found.step_change(0, "a") == wanted
     assert found.step_change(0, "b") is None
 

@@ -24,7 +24,9 @@ def share_of_signs(differences) -> float:
     """The share of all choices of signs with a rank sum as large as that of these differences."""
     known = np.array([d for d in differences if not np.isnan(d)])
     ranks = rankdata(np.minimum(np.abs(known), 1e300))
-    sums = [np.dot(ranks, signs) for signs in itertools.product((0.0, 1.0), repeat=len(ranks))]
+    sums = []
+    for signs in itertools.product((0.0, 1.0), repeat=len(ranks)):
+        sums.append(np.dot(ranks, signs))
     return float(np.mean(np.array(sums) >= ranks[known > 0].sum() - 1e-9))
 
 
@@ -40,7 +42,9 @@ def test_ties_and_zeros_only_raise_a_p_value(differences):
     pairs = list(itertools.combinations_with_replacement(differences, 2))
     untied = np.arange(1.0, len(differences) + 1)
     as_many = sum(a + b > 0 for a, b in pairs)
-    sums = [np.dot(untied, signs) for signs in itertools.product((0.0, 1.0), repeat=len(untied))]
+    sums = []
+    for signs in itertools.product((0.0, 1.0), repeat=len(untied)):
+        sums.append(np.dot(untied, signs))
     assert p_values(differences) == pytest.approx(np.mean(np.array(sums) >= as_many), abs=1e-12)
     assert p_values(differences) >= share_of_signs(differences)
 

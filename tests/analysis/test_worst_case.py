@@ -124,7 +124,9 @@ def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
 @pytest.mark.slow
 def test_a_larger_budget_continues_the_search():
     base = scenario(duration=1.0)
-    values = [smc.worst_case(base, within=CLASSES["all"], budget=n).value for n in (1, 5, 12)]
+    values = []
+    for n in (1, 5, 12):
+        values.append(smc.worst_case(base, within=CLASSES["all"], budget=n).value)
     assert all(a <= b for a, b in itertools.pairwise(values))
     assert values[0] < values[-1]
 
@@ -206,7 +208,9 @@ def test_it_finds_the_worst_of_a_linear_loop():
 
 def test_the_adversary_chooses_the_set_of_parameters_and_the_scale_of_friction():
     friction = smc.Coulomb(0.2), smc.Viscous(0.5)
-    sets = [scenario(mismatch={"M": factor}, friction=friction) for factor in (1.0, 3.0, 0.4)]
+    sets = []
+    for factor in (1.0, 3.0, 0.4):
+        sets.append(scenario(mismatch={"M": factor}, friction=friction))
     worst = smc.worst_case(sets, within=smc.Uncertainty(friction_scale=(0.0, 2.0)), budget=6)
     made = []
     for one, scale in itertools.product(sets, (0.0, 2.0)):

@@ -80,7 +80,8 @@ class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 
     `chattering` bounds the predicted amplitude of the limit cycle of s of the first channel, in its
-    unit, in the first condition, see `smc.design.chattering`. None: chattering costs its variation only.
+    unit, in the first condition, see `smc.design.chattering`. None: chattering costs its variation
+    only.
     """
 
     # names, or your own; each is one run of a candidate
@@ -137,7 +138,9 @@ class Objective:
         return self._instance(plant, law, MAX_SEARCHES * seed + search)
 
     def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
-        common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
+        common = {}
+        for name in ("duration", "control_period", "u_max"):
+            common[name] = getattr(self, name)
         first = Scenario(plant=plant, law=law, **common)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]
         cases = []

@@ -127,7 +127,9 @@ class Search:
         replays = []
         self.runs += len(cases)
         tried: list[Tried | None] = [None] * len(cases)
-        scenarios = [self.members.scenario_of(case.member, case.relay) for case in cases]
+        scenarios = []
+        for case in cases:
+            scenarios.append(self.members.scenario_of(case.member, case.relay))
         for i, trace in stream(scenarios, self.threads, self.report):
             member, relay, origin = cases[i]
             if self.swing is None and (relay.rate > 0.0 if relay else not self.members.forced):
@@ -270,7 +272,9 @@ class Search:
             if not self.members.forced:
                 yield [Case(corner)]
                 continue
-            steady = [dataclasses.replace(corner, force=force) for force in self._constants()]
+            steady = []
+            for force in self._constants():
+                steady.append(dataclasses.replace(corner, force=force))
             relay = Relay(self.members.within.disturbance, rate=1.0, slope=self.members.slope)
             yield [*map(Case, steady), Case(corner, relay)]
 

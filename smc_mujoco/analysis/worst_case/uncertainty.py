@@ -470,7 +470,10 @@ def _check_class(scenario: Scenario, within: Uncertainty) -> None:
     """
     plant = scenario.plant
     if foreign := [name for name in within.parameters if name not in (*plant.parameters, "mass")]:
-        fields = [field.name for field in dataclasses.fields(within) if field.name != "parameters"]
+        fields = []
+        for field in dataclasses.fields(within):
+            if field.name != "parameters":
+                fields.append(field.name)
         known = ", ".join(sorted({*fields, *plant.parameters}))
         raise ScenarioError(
             f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from "

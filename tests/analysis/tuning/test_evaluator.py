@@ -127,7 +127,9 @@ CHATTERING = [
 def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_equation):
     cases = cases_of(plant, law)
     names = tuple(search._task(plant, cases[0].law, SECOND, 64, 0, 1).box)
-    candidates = [tuple(factor * cases[0].law.gains[name] for name in names) for factor in FACTORS]
+    candidates = []
+    for factor in FACTORS:
+        candidates.append(tuple(factor * cases[0].law.gains[name] for name in names))
     evaluate = Evaluator(SECOND, cases, names, threads=2, by_equation=by_equation, slots=2)
     assert evaluate.engine == (EQUATION if by_equation else MUJOCO)
     found = [one.objective for one in evaluate(candidates)]

@@ -114,7 +114,9 @@ def given(name, rng):
 
 def converted(law, system):
     """The law with its gains in another system of units."""
-    known = {gain: search_space.unit(law, gain) or units.Unit() for gain in law.gains}
+    known = {}
+    for gain in law.gains:
+        known[gain] = search_space.unit(law, gain) or units.Unit()
     return dataclasses.replace(
         law, gains={g: v * known[g].of(system) for g, v in law.gains.items()}
     )
