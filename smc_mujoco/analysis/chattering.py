@@ -104,7 +104,7 @@ class Chattering:
     coupling: float = math.nan
     gain: complex = complex(math.nan)  # N at the cycle
     response: complex = complex(math.nan)  # L at the cycle
-    assumptions: tuple[str, ...] = ()  # what was left out or is doubtful, in sentences
+    assumptions: tuple[str, ...] = ()  # what was left out or is doubtful
 
     def __bool__(self) -> bool:
         return not math.isnan(self.frequency)
@@ -134,7 +134,7 @@ def chattering(
 
     Returns:
       The stable limit cycle. If there are several, the fastest, and of equally fast ones the
-      smallest. The others are in `assumptions`.
+      smallest. `assumptions` says if there are others.
 
     Raises:
       ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.
@@ -160,24 +160,11 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
         return Chattering(assumptions=assumptions)
     fastest = max(omega for _, omega in stable)
     one = min(one for one in stable if one[1] > fastest / (1.0 + SAME_CYCLE_TOLERANCE))
-    assumptions += tuple(_other_cycles(loop, [other for other in stable if other is not one]))
+    if len(stable) > MAX_OTHER_CYCLES + 1:
+        assumptions += ("N L is about 1 at many frequencies: do not trust the prediction",)
+    elif len(stable) > 1:
+        assumptions += ("other starts may end in another cycle",)
     return _prediction(loop, one, _threshold(loop, one, unstable), assumptions, ranges)
-
-
-def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
-    """Yield a remark on each other stable cycle, or one remark if there are too many to be
-    cycles.
-    """
-    if len(others) > MAX_OTHER_CYCLES:
-        slow, *_, fast = sorted(omega / math.tau for _, omega in others)
-        yield (
-            f"N L is about 1 everywhere from {slow:.3g} to {fast:.3g} Hz: the prediction is "
-            "not to be trusted"
-        )
-        return
-    for amplitude, omega in others:
-        s = f"{loop.wave(amplitude, omega).s:.2g} {loop.scenario.plant.units[loop.channel]}/s"
-        yield f"from elsewhere a run may end in another cycle, of {s} at {omega / math.tau:.3g} Hz"
 
 
 def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
@@ -215,10 +202,7 @@ def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
     if not stable:
         return Chattering(assumptions=assumptions)
     wave = later.wave(*max(stable, key=lambda one: one[1]))
-    assumptions += (
-        "the balance has no solution, but the law switches: a cycle locked to the samples is "
-        "possible",
-    )
+    assumptions += ("no solution, but a cycle locked to the samples is possible",)
     return Chattering(
         amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.s_of_one_count),
         frequency_range=(wave.omega / FREQUENCY_FACTOR / math.tau, 0.5 / control_period),
@@ -460,28 +444,13 @@ def _prediction(
     sine = loop.wave(*balance)
     wave = _with_harmonics(loop, sine)
     response = loop.response(wave.omega)
-    if not math.isnan(wave.third):
-        passed = abs(loop.response(3.0 * wave.omega) / response)
-        words = (
-            f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its "
-            "answer to the first"
-        )
-        assumptions += (words,)
     coupling = loop.coupling(wave.omega)
     if coupling:
-        words = (
-            "other driven channels rest, though this command moves one of them "
-            f"{coupling:.2g} times as far"
-        )
-        assumptions += (words,)
+        assumptions += ("other driven channels at rest",)
     if threshold:
-        unit = loop.scenario.plant.units[loop.channel]
-        assumptions += (
-            f"x has moved beyond {threshold:.2g} {unit}, an unstable cycle: smaller oscillations "
-            "die out",
-        )
+        assumptions += ("x beyond threshold_x",)
     if wave.drift > MAX_GAIN_DRIFT:
-        assumptions += ("gains or memories of the law drift: the prediction is a snapshot",)
+        assumptions += ("the gain of the law drifts",)
     sizes = [math.nan]
     omegas = [math.nan]
     if ranges:
@@ -514,24 +483,18 @@ def _prediction(
 
 
 def _assumptions(loop: Loop) -> Iterator[str]:
-    """Yield what the prediction assumes, and what a run has but the prediction leaves out."""
+    """Yield what the prediction leaves out of a scenario."""
     scenario = loop.scenario
-    yield "about rest at x = 0, without reference, disturbance and noise"
+    yield "at rest at x = 0"
+    yield "no reference, disturbance or noise"
     if any(isinstance(part, RateLimit) for part in scenario.actuator):
-        yield "the actuator's rate limit is not reached"
+        yield "no rate limit"
     if any(isinstance(part, Backlash) for part in scenario.actuator):
-        yield "rotor and joint are free masses while the rotor crosses its play"
+        yield "rotor and joint free in the play"
     if scenario.friction:
         yield "no dry friction"
     if loop.s_of_one_count:
-        step = f"{loop.s_of_one_count:.2g} {scenario.plant.units[loop.channel]}/s"
-        yield f"no rounding by the encoder: a count moves s by {step}, which hides smaller cycles"
-
-
-def shared_assumptions(cycles: Sequence[Chattering]) -> list[str]:
-    """Return the assumptions that all cycles have in common."""
-    first, *others = cycles
-    return [one for one in first.assumptions if all(one in other.assumptions for other in others)]
+        yield "no rounding by the encoder"
 
 
 def save(
@@ -545,25 +508,15 @@ def save(
     changes, as JSON.
     """
     rows = []
-    for one, cycle, (amplitude, frequency), change in zip(
+    for scenario, cycle, (amplitude, frequency), change in zip(
         scenarios, cycles, measured, changes, strict=True
     ):
-        rows.append(
-            {
-                "plant": one.plant.name,
-                "law": one.law.name,
-                "gains": dict(one.law.gains),
-                **vars(cycle),
-            }
-            | {
-                "gain": [cycle.gain.real, cycle.gain.imag],
-                "response": [cycle.response.real, cycle.response.imag],
-            }
-            | {
-                "uncertainty": cycle.uncertainty,
-                "measured_amplitude": amplitude,
-                "measured_frequency": frequency,
-            }
-            | {"half_step_changes": vars(change), "marked": change.marked}
-        )
+        row = {"plant": scenario.plant.name, "law": scenario.law.name}
+        row |= {"gains": dict(scenario.law.gains), **vars(cycle)}
+        row["gain"] = [cycle.gain.real, cycle.gain.imag]
+        row["response"] = [cycle.response.real, cycle.response.imag]
+        row["uncertainty"] = cycle.uncertainty
+        row |= {"measured_amplitude": amplitude, "measured_frequency": frequency}
+        row |= {"half_step_changes": vars(change), "marked": change.marked}
+        rows.append(row)
     return write_json(with_ending(path, ".json"), rows)

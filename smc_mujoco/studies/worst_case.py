@@ -90,7 +90,7 @@ class WorstCase(Tables):
             sets = [f"any of {self.sets} parameter sets"]
         else:
             sets = []
-        return ", ".join([*sets, self.within.words(self.nominal.plant)])
+        return ", ".join([*sets, self.within.words()])
 
     def shown(self, value: float) -> str:
         """Return a value of the metric as text: "fails" where a run failed."""

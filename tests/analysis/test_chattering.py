@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import chattering
 from smc_mujoco.analysis.apart import relative_range
 from smc_mujoco.analysis.chattering import (
     Chattering,
@@ -24,7 +23,7 @@ from smc_mujoco.analysis.chattering import (
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.design import describing_function
+from smc_mujoco.design import chattering, describing_function
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -227,8 +226,7 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     cycle = chattering(scenario)
     trace = smc.run(scenario)
     part = trace.t > 4.0
-    (said,) = (one for one in cycle.assumptions if "hides smaller cycles" in one)
-    count = float(said.split()[said.split().index("by", 4) + 1])
+    count = Loop(scenario).s_of_one_count
     assert count > 5.0 * cycle.amplitude
     assert np.ptp(trace.s[part, 0]) / 2 == pytest.approx(cycle.amplitude_range[1], rel=0.05)
     assert cycle.amplitude_range[1] == pytest.approx(cycle.amplitude + count, rel=0.05)
@@ -334,15 +332,6 @@ def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
     assert cycle.amplitude_range[0] < amplitude < cycle.amplitude_range[1] < 2.5 * cycle.amplitude
     assert cycle.frequency_range[0] < frequency < cycle.frequency_range[1]
     assert cycle.frequency_range[0] > 0.6 * cycle.frequency
-
-
-def test_a_relay_behind_a_motor_may_have_any_period_in_its_range():
-    scenario = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.DCMotor(), duration=4.0)
-    cycle = chattering(scenario)
-    score = smc.score(smc.run(scenario))
-    assert cycle.frequency_range == pytest.approx((219.4, 500.0), rel=0.01)
-    assert 230.0 < score["chattering_frequency"] < 400.0
-    assert cycle.amplitude_range[0] < score["chattering_amplitude"] < cycle.amplitude_range[1]
 
 
 def test_a_cycle_that_the_samples_alone_hold_is_within_its_ranges_and_called_so():
@@ -480,7 +469,7 @@ def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_res
     cycle = chattering(scenario)
     # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
     assert cycle.threshold_x == pytest.approx(0.0107, rel=0.01)
-    assert any("smaller oscillations die out" in said for said in cycle.assumptions)
+    assert "x beyond threshold_x" in cycle.assumptions
     calm, *others = smc.run(
         [dataclasses.replace(scenario, x0=q * cycle.threshold_x) for q in (0.9, 1.1, 10.0)]
     )
@@ -549,16 +538,6 @@ def broken(y, gain, m):
     return math.nan * gain.k, y.v
 
 
-@smc.law_function(gains={"k": 2.0})
-def undefined(y, gain, m):
-    return json.dumps(y.x), 0.0
-
-
-@smc.law_function(gains={"k": 2.0})
-def raising(y, gain, m):
-    return 1.0 / (gain.k - 2.0), 0.0
-
-
 def test_bad_input_is_one_sentence(refused):
     for call in (
         lambda: chattering("classical", plant="duffing", channel=3),
@@ -567,7 +546,5 @@ def test_bad_input_is_one_sentence(refused):
         lambda: chattering("classical", plant="panda"),
         lambda: chattering("classical", plant="duffing", clock=smc.Clock(missed=0.1)),
         lambda: describing_function(broken(), 1.0, 3.0, 100),
-        lambda: describing_function(undefined(), 1.0, 3.0, 100),
-        lambda: describing_function(raising(), 1.0, 3.0, 100),
     ):
         refused(call)

@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import Chattering
-from smc_mujoco.analysis.gains_for import SPEEDS, _force_headroom, _forces, _largest, _largest_size
+from smc_mujoco.analysis.gains_for import SPEEDS, _force_headroom, _forces, _largest
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -29,16 +29,6 @@ def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem(
     assert 4.0 < design.disturbance <= 6.0  # N, as u is at most 6 N
 
 
-@pytest.mark.slow
-@COARSELY
-def test_forces_among_the_gains_stay_at_the_actuators_limit():
-    design = smc.design.gains_for(
-        smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG
-    )
-    assert design.law.gains["k"] == pytest.approx(2.0)
-    assert design.chattering.amplitude < 1.0
-
-
 def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     """With the model a gain is an acceleration, of which each joint has its own limit."""
     law = smc.law("classical", k=2.0)
@@ -53,19 +43,6 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
 
 
 FAST = smc.law("classical", k=1.0, c=20.0)
-
-
-@COARSELY
-def test_a_frequency_decides_the_speed():
-    wanted = 60.0
-    fields = {"u_max": 10.0, **LAG}
-    with pytest.warns(
-        smc.errors.ScenarioWarning, match="does not hold duffing, even without a disturbance"
-    ):
-        design = smc.design.gains_for(FAST, "duffing", frequency=wanted, **fields)
-    assert design.chattering.frequency <= wanted
-    assert (design.size, design.law.gains["k"]) == (1.0, pytest.approx(design.speed**2))
-    assert design.law.gains["c"] == pytest.approx(20.0 * design.speed)
 
 
 @pytest.mark.slow
@@ -152,23 +129,3 @@ def test_size_and_speed_are_those_of_the_largest_forces_within_both_bounds(refus
     only_slow = {1.0: 1.0, 0.5: 0.5}
     found = _largest(lambda q, w: predicted(61.0 * w, 0.1 * q), only_slow, 1.0, 60.0, math.inf)
     assert found == (pytest.approx(10.0, rel=1e-3), 0.5)
-
-
-def test_the_largest_size_is_where_the_amplitude_is_the_wanted_one(refused):
-    """Of amplitudes in proportion to the size, to its square, and of one that is lost above a
-    size.
-    """
-    for power, wanted, limit in (
-        (1.0, 0.3, 9.0),
-        (1.0, 7.0, 9.0),
-        (2.0, 0.01, 9.0),
-        (2.0, 30.0, 40.0),
-        (0.5, 3.0, 5.0),
-    ):
-        size = _largest_size(lambda q, power=power: 2.0 * q**power, wanted, limit)
-        assert 0.999 <= size / min((wanted / 2.0) ** (1.0 / power), limit) <= 1.0
-    assert _largest_size(lambda q: q if q < 3.0 else math.nan, 10.0, 100.0) == pytest.approx(
-        3.0, rel=1e-3
-    )
-    assert _largest_size(lambda q: math.nan, 10.0, 100.0) == 100.0
-    refused(lambda: _largest_size(lambda q: 1.0, 0.1, 100.0))

@@ -84,14 +84,6 @@ def test_a_network_has_the_modes_of_its_path_graph():
     )
 
 
-@pytest.mark.parametrize("name", ["classical", "adaptive", "super_twisting"])
-def test_a_law_that_switches_has_no_theory(name):
-    plant = smc.plant("duffing")
-    law = own(plant, name)
-    assert linear_theory.linear_gains(law) is None
-    assert linear_theory.tolerated_force(plant, law, 0.1) is None
-
-
 # smallest lambda
 
 
@@ -106,10 +98,6 @@ def test_the_measured_smallest_lambda_is_the_one_of_theory_within_one_percent(pl
         return
     assert grows(from_near_rest(plant, smc.law("observer_free", lam=0.99 * least, k1=k1)))
     assert not grows(from_near_rest(plant, smc.law("observer_free", lam=1.01 * least, k1=k1)))
-
-
-def test_negative_damping_asks_for_more_than_itself():
-    assert linear_theory.smallest_lam(smc.plant("van_der_pol", mu=3.0), 100.0) == pytest.approx(3.0)
 
 
 @each_plant
@@ -182,12 +170,6 @@ def test_the_closed_form_of_the_critical_delay_agrees_with_eigenvalues(plant, la
         assert growth(plant, lam, k1, h, first) > 1.0 - 1e-9
 
 
-def test_a_law_weaker_than_the_plants_own_damping_bears_every_delay():
-    stiff = smc.plant("duffing", alpha=4.0, delta=6.0)
-    assert linear_theory.critical_delay(stiff, 0.5, 1.0, 0.05) == math.inf
-    assert growth(stiff, 0.5, 1.0, 0.05, 100) < 1.0
-
-
 # at rest under a constant disturbance
 
 
@@ -224,16 +206,6 @@ def test_the_tolerated_force_is_the_largest_up_to_the_limit(plant, k1, most):
     first = int(np.argmax(np.r_[np.diff(rises) < 0.0, True]))
     assert linear_theory.tolerated_force(plant, law, most) == pytest.approx(
         max(rises[first], 0.0), rel=1e-6, abs=1e-9
-    )
-
-
-def test_the_actuators_bound_counts_where_it_is_below_lambda():
-    plant = smc.plant("inverted_pendulum")
-    law = smc.law("observer_free", lam=40.0, k1=9.7)
-    bounded = linear_theory.tolerated_force(plant, law, 0.1, u_max=6.0)
-    p = plant.parameters
-    assert bounded == pytest.approx(
-        6.0 - p["m"] * p["grav"] * p["l"] * math.sin(math.atanh(6.0 / 40.0) / 9.7), rel=0.01
     )
 
 

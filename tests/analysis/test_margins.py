@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
+from smc_mujoco.analysis.margins import COARSE, FINE, Margin
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Plant
 
@@ -92,28 +92,6 @@ def test_a_run_that_fails_tolerates_nothing():
     assert not margins.tolerates(smc.run(dataclasses.replace(BASE, law=broken())))
 
 
-def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_for(found):
-    assert [(margin.law, margin.kind) for margin in found] == [
-        (law, kind) for law in ("observer_free", "classical") for kind in KINDS
-    ]
-    assert [margin.unit for margin in found[:5]] == ["s", "N", "N", "1", "m"]
-    for margin in found:
-        if not margin.open:
-            if margin.kind == "delay":
-                step = 5 * BASE.control_period
-            else:
-                step = COARSE * margin.value
-            assert margin.resolution <= step * (1.0 + 1e-9)
-
-
-@pytest.mark.slow
-def test_it_does_not_depend_on_company_or_threads(found):
-    assert margins.margins_of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [
-        found[1],
-        found[0],
-    ]
-
-
 # the search
 
 SEARCHED = [  # whether a level is tolerated, of 1, 2 and 4 first, and the margin
@@ -168,16 +146,6 @@ def test_a_law_that_fails_anyway_has_no_margin():
     assert not margin.open
 
 
-def test_it_tells_how_far_it_is():
-    told = []
-    margins.margins_of(
-        [BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole))
-    )
-    assert all(0.0 < done <= whole for done, whole in told)
-    assert [done for done, _ in told] == sorted(done for done, _ in told)
-    assert told[-1][0] == told[-1][1]
-
-
 # theory beside it
 
 
@@ -210,14 +178,6 @@ def test_dry_friction_up_to_theory_is_tolerated(found):
     assert friction.value >= friction.theory - friction.resolution
 
 
-def test_dry_friction_is_tolerated_beside_what_a_condition_has():
-    rough = smc.Scenario(plant="duffing", law="pid", friction=(smc.Viscous(0.1), smc.Coulomb(0.1)))
-    put = margins.MARGIN_KINDS["friction"].put(rough, 0.2)
-    assert set(put.friction) == {smc.Viscous(0.1), smc.Coulomb(0.1 + 0.2)}
-    none = smc.Scenario(plant="duffing", law="pid")
-    assert margins.MARGIN_KINDS["friction"].put(none, 0.2).friction == (smc.Coulomb(0.2),)
-
-
 def test_linear_theory_is_only_for_the_loop_that_it_describes():
     """None for a plant that is pushed or changed, a law that reads an encoder or the model, or
     another reference.
@@ -246,14 +206,6 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
         for kind in ("delay", "disturbance")
     ]
     assert told == [False, True]
-
-
-def test_only_laws_with_a_linear_part_have_theory(found):
-    assert [margin.kind for margin in found if margin.theory is not None] == [
-        "delay",
-        "disturbance",
-        "friction",
-    ]
 
 
 POLES = """
@@ -287,24 +239,6 @@ def test_theory_knows_the_weakest_motor(poles):
     at = 15.0 / (30.0 * 5.0 / 0.01)
     expected = margins.MARGIN_KINDS["disturbance"].expected(base)
     assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
-
-
-def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
-    """Of a model that is not known, of two units, and of a pole without an actuator."""
-    law = smc.law("boundary_layer", k=30.0, phi=0.1, c=5.0)
-    runs = {"duration": 1.5}
-    tied = poles('<equality><joint joint1="a" joint2="b"/></equality>', ["a"])
-    bases = [
-        smc.Scenario(plant=tied, law=law, x0=0.2, **runs),
-        smc.Scenario(
-            plant=dataclasses.replace(poles(), mixed=("rad", "m")), law=law, x0=0.2, **runs
-        ),
-        smc.Scenario(plant="cart_pole", law=law, x0=0.0, **runs),
-    ]
-    found = margins.margins_of(bases, ["disturbance"], COARSE)
-    assert [margin.theory for margin in found] == [None] * 3
-    assert found[0].value > 0.1
-    assert found[1].value > 0.1
 
 
 @pytest.mark.parametrize("kind", margins.MARGIN_KINDS)
@@ -351,11 +285,3 @@ def test_margins_survive_their_file(found, tmp_path):
     assert math.isnan(rough.value)
     assert rough.theory == math.inf
     json.loads(path.read_text(), parse_constant=pytest.fail)
-
-
-def test_what_holds_no_margins_is_refused(tmp_path, refused):
-    path = tmp_path / "margins.json"
-    for text in ("", "3", '[{"plant": 1}]'):
-        path.write_text(text)
-        refused(lambda: margins.load(path))
-    refused(lambda: margins.save([], tmp_path / "margins.csv"))

@@ -3,7 +3,6 @@ it errs.
 """
 
 import dataclasses
-import json
 import math
 
 import numpy as np
@@ -120,26 +119,12 @@ def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_poole
     assert covered[1] < 0.7 * 300
 
 
-def test_intervals_are_the_same_each_time_and_in_any_order():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=30)  # whose upper end is near the next value
-    assert {interval(rng.permutation(values)) for _ in range(20)} == {interval(values)}
-    assert np.exp(interval(values)[1:3]) == pytest.approx(interval(np.exp(values))[1:3])
-
-
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 17), (3, 20), (15, 15), (20, 20)])
 def test_the_interval_of_a_share_is_wilson_s(k, n):
     wanted = stats.binomtest(k, n).proportion_ci(method="wilson")
     found = share_interval(k / n, n)
     assert found[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
     assert found.low <= found.median <= found.high
-
-
-def test_a_block_without_randomness_is_in_every_resample():
-    (one,) = blocks(1.0)
-    both = median_of(np.stack([one, [5.0, *[NAN] * 19]]))
-    alone = median_of(one[None])
-    assert both[:3] == pytest.approx([(5.0 + end) / 2 for end in alone[:3]])
 
 
 def test_intervals_of_medians_have_sets_of_gains_as_samples():
@@ -265,17 +250,6 @@ def test_two_laws_apart_by_what_is_just_relevant_have_a_false_winner_in_at_most_
         wrong += any(Comparison({"a": (1 - RELEVANT) * a, "b": b, "c": 9 * c}).winners)
     assert stats.binomtest(wrong, 800, 0.05, alternative="greater").pvalue > 1e-3
     assert wrong > 8  # the test is not idle: one of its two sides is exact
-
-
-@pytest.mark.slow
-def test_a_lead_of_ten_percent_over_ten_laws_is_seen_with_a_probability_of_eighty_percent():
-    rng = np.random.default_rng(0)
-    seen = 0
-    for _ in range(100):
-        cells = spreading(11, 5, 0.05, rng)
-        cells[0] *= 0.9
-        seen += Comparison({f"law{i}": cell for i, cell in enumerate(cells)}).winners[0] == "law0"
-    assert seen >= 80
 
 
 def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relevant_difference():
@@ -406,17 +380,6 @@ def test_the_difference_of_a_sample_is_the_median_of_its_runs():
     assert np.isnan(found.leads[0, 0, 1, 3:]).all()
 
 
-def test_distinct_runs_are_counted_for_each_pair():
-    low, high = blocks(1.0, 2.0)
-    did = {"a": np.arange(20), "b": np.arange(20) // 2, "c": np.arange(20) % 2}
-    scores = {"a": low, "b": high, "c": 2 * high}
-    found = Comparison(scores, outcomes=did)
-    assert found.samples[0].tolist() == [[0, 20, 20], [20, 0, 20], [20, 20, 0]]
-    found = Comparison(scores, outcomes=did | {"a": did["b"]})
-    assert found.samples[0, 0, 1] == found.samples[0, 1, 0] == 10
-    assert found.p[0, 0, 2] == found.p[0, 1, 2] < found.p[0, 0, 1] == pytest.approx(0.5**10)
-
-
 def test_seeds_that_change_nothing_but_rounding_are_one_sample_of_two_laws_beside_a_third():
     still = np.ones((1, 20))
     moved = blocks(2.0)
@@ -501,20 +464,6 @@ def test_a_median_that_half_the_step_moves_is_marked(factor, floor, first_order,
         wanted = None
     assert found.step_change(0, "a") == wanted
     assert found.step_change(0, "b") is None
-
-
-@pytest.mark.parametrize(
-    ("parts", "marked"), [({}, False), ({"actuator": smc.Backlash(0.01)}, True)]
-)
-def test_without_rk4_half_of_the_change_is_marked(parts, marked):
-    """Of runs under RK4, and under implicitfast: half the step moves a by 3 %."""
-    runs = {"a": blocks(1.0), "b": blocks(3.0)}
-    halves = [json.dumps({"itae": 1.03 * y}) for y in runs["a"][0]]
-    halves += [json.dumps({"itae": 1.02 * y}) for y in runs["b"][0]]
-    ran = run_key.row(paper.scenario("duffing", "none", changes=parts))["scenario"]
-    table = table_of(runs, half_step=np.array(halves, object), scenario=np.array([ran] * 40))
-    (board,) = leaderboard(table, ["itae"])
-    assert list(board.blocks[0].by_step) == ["a"] * marked
 
 
 # boards
@@ -605,20 +554,6 @@ def test_only_runs_that_all_laws_have_are_compared():
         assert [[block.runs for block in board.blocks] for board in boards] == [counts] * 2
 
 
-def test_the_verdict_on_a_block_does_not_depend_on_how_runs_are_grouped_into_boards():
-    rng = np.random.default_rng(4)
-    for _ in range(4):
-        cells = spreading(3, 4, 0.08, rng)
-        cells[0] *= np.array([0.85, 0.9, 0.95, 1.0])[:, None]
-        table = table_of({f"law{i}": cell for i, cell in enumerate(cells)})
-        winners = []
-        for by in (("plant",), ("plant", "condition")):
-            boards = leaderboard(table, ["itae"], by)
-            winners.append([block.winner for board in boards for block in board.blocks])
-            assert {board.family for board in boards} == {4}
-        assert winners[0] == winners[1]
-
-
 def test_a_law_that_fails_wins_nothing_and_is_not_better_than_one_that_does_not():
     failing = blocks(0.5, seeds=24)
     failing[0, 3] = INF
@@ -645,24 +580,6 @@ def test_of_equal_laws_none_is_beaten_because_a_run_in_ten_of_another_fails(laws
     for failing, wins in (([3], None), (slice(3, None), "a")):
         scores["b"][0, failing] = INF
         assert Comparison(scores).winners == [wins]
-
-
-def test_over_several_conditions_only_what_holds_in_each_is_told():
-    """a beats b, b beats c and c beats a, each in two of three conditions."""
-    scores = {"a": blocks(1, 2, 3), "b": blocks(2, 3, 1), "c": blocks(3, 1, 2)}
-    (board,) = leaderboard(table_of(scores), ["itae"])
-    assert (board.best, board.winner) == ((), None)
-    assert [board.wins(law) for law in "abc"] == [["c0"], ["c2"], ["c1"]]
-    assert board.losses("a") == ["c1", "c2"]
-    assert "no winner in all 3 conditions: a wins under c0, loses under c1 and c2;" in board.result
-    (both,) = leaderboard(table_of({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])
-    lead = "0.500 of b (0.500 to 0.500), ahead in 20 of 20 runs"
-    assert both.result == f"a wins in both conditions: {lead}, for these gains"
-
-
-def test_a_metric_that_does_not_apply_has_no_board():
-    assert leaderboard(study(), ["spread_settling_time"]) == []
-    assert len(leaderboard(study(), ["spread_settling_time", "itae"])) == 2
 
 
 def test_what_cannot_be_compared_is_refused(refused):

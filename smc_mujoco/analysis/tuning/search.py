@@ -61,7 +61,6 @@ from smc_mujoco.common.errors import (
     users_stacklevel,
 )
 from smc_mujoco.common.progress import bar
-from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.plant import Plant
@@ -497,16 +496,15 @@ def _result(task: Task, found: tuple[SearchResult, ...]) -> Tuned:
 def _warn_of_result(tuned: Tuned) -> None:
     tried = f"tried for {tuned.law.name} on {tuned.plant.name}"
     if tuned.objective > tuned.before:
-        values = f"an objective of {tuned.objective:.3g} s² instead of {tuned.before:.3g} s²"
         _warn(
-            f"no set of gains {tried} is better than the law's own, with {values}: give a larger "
-            "budget"
+            f"no set of gains {tried} is better than the law's own, with an objective of "
+            f"{tuned.objective:.3g} s² instead of {tuned.before:.3g} s²: give a larger budget"
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.definition.excess(first):
-        words = f"to chatter with more than {tuned.definition.chattering:g}"
         _warn(
-            f"all gains {tried} are predicted {words}: give a larger budget, or a larger chattering"
+            f"all gains {tried} are predicted to chatter with more than "
+            f"{tuned.definition.chattering:g}: give a larger budget, or a larger chattering"
         )
 
 
@@ -537,13 +535,5 @@ def _warn(words: str) -> None:
 
 def _without_unit_warning(law: Component) -> str:
     names = list(search_space.without_unit(law))
-    if len(names) > 1:
-        have = "have"
-        whose = "their defaults"
-    else:
-        have = "has"
-        whose = "its default"
-    search = f"no unit, and so a search about {whose} in place of the rule of all laws"
-    return (
-        f"{law.name}'s {joined(names)} {have} {search}: {unit_cure(names[0], law.gains[names[0]])}"
-    )
+    cure = unit_cure(names[0], law.gains[names[0]])
+    return f"gains of {law.name} have no unit and are searched about their defaults: {cure}"

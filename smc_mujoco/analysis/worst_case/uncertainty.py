@@ -24,7 +24,6 @@ from smc_mujoco.common import constraints
 from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesting
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
@@ -125,44 +124,22 @@ class Uncertainty:
         if not any(bounds) and not any(
             low < high for low, high in (*ends, *self.parameters.values())
         ):
-            cure = "give a bound, such as disturbance=2.0"
-            raise ScenarioError(f"Uncertainty allows nothing but the scenario itself: {cure}")
+            raise ScenarioError(
+                "Uncertainty allows nothing but the scenario itself: give a bound, such as "
+                "disturbance=2.0"
+            )
 
-    def words(self, plant: Plant) -> str:
-        """Return the class as a line of text, such as "|d| <= 2 N, mass x 0.7 to 1.3"."""
-        x = plant.units[0]
-        u = EFFORT[plant.units[0]]
-        if self.disturbance:
-            parts = [f"|d| <= {self.disturbance:g} {u}"]
-        else:
-            parts = []
-        if self.disturbance and self.slope is not None:
-            parts += [f"|d'| <= {self.slope:g} {u}/s"]
-        hold = f" held for {self.hold:g} s"
-        if self.position_noise:
-            parts += [f"position errors <= {self.position_noise:g} {x}{hold}"]
-        if self.velocity_noise:
-            parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{hold}"]
-        ranges = {
-            "delay (s)": self.delay,
-            f"friction ({u})": self.friction,
-            "friction x": self.friction_scale,
-        }
-        ranges |= {
-            "mass x": self.mass,
-            **self.parameters,
-            "u_max x": self.bound,
-            "control period x": self.period,
-        }
-        if self.encoder:
-            ranges |= {"encoder counts": self.encoder}
-        parts += [
-            f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high
-        ]
-        if self.jitter:
-            parts += [f"jitter <= {self.jitter:g} s"]
-        if self.x0:
-            parts += [f"x0 within {100 * self.x0:g} %"]
+    def words(self) -> str:
+        """Return the bounds that were given as text, such as "disturbance 2, mass 0.7 to 1.3"."""
+        given = {}
+        for field in dataclasses.fields(self):
+            if getattr(self, field.name) != field.default:
+                given[field.name] = getattr(self, field.name)
+        given |= given.pop("parameters", {})
+        parts = []
+        for name, bound in given.items():
+            ends = bound if isinstance(bound, tuple) else (bound,)
+            parts.append(f"{name.replace('_', ' ')} {' to '.join(f'{end:g}' for end in ends)}")
         return ", ".join(parts)
 
 
@@ -193,40 +170,33 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
     """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if
     nothing is known.
     """
+    disturbance = within.disturbance
+    slope = 0.0
+    if disturbance:
+        slope = within.slope or math.inf
+    for signal in scenario.disturbance:
+        if bounds := bounds_of(signal):
+            disturbance += bounds[0]
+            slope += bounds[1]
     reasons = []
-    u = EFFORT[scenario.plant.units[0]]
-    known = [its for signal in scenario.disturbance if (its := bounds_of(signal))]
-    of_class = within.disturbance, (within.slope or math.inf) if within.disturbance else 0.0
-    d, slope = map(sum, zip(of_class, *known, strict=True))
-    if d >= (largest := strength(scenario)):
-        reasons.append(f"no law holds |d| = {d:g} {u} with drives of {largest:.3g} {u}")
-    if scenario.law.template is None:
-        admits = {}
-    else:
-        admits = scenario.law.template.admits
-    for gains in [
-        SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)
-    ][:1]:
-        if d and "d" in admits and d >= (bound := admits["d"](gains)):
-            reasons.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
-        if d and "d'" in admits and slope >= (bound := admits["d'"](gains)):
-            reasons.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
-    noise = (
-        within.position_noise
-        or within.velocity_noise
-        or scenario.noise != Noise()
-        or scenario.sensor
+    if disturbance >= strength(scenario):
+        reasons.append("the disturbance exceeds what the drives hold")
+    if scenario.law.template is None or not scenario.law.template.admits:
+        return "; ".join(reasons)
+    admits = scenario.law.template.admits
+    gains = SimpleNamespace(**next(iter(scenario.law.of_channels(scenario.plant.driven))).gains)
+    for name, value in {"d": disturbance, "d'": slope}.items():
+        if disturbance and name in admits and value >= admits[name](gains):
+            reasons.append(f"{name} exceeds the bound of the law's theorem")
+    beside = (
+        within.delay[1] or scenario.input_delay,
+        within.position_noise or within.velocity_noise or scenario.noise != Noise(),
+        scenario.sensor,
+        scenario.actuator,
+        within.jitter or not scenario.clock.regular,
     )
-    beside = {
-        "delay": within.delay[1] or scenario.input_delay,
-        "noise": noise,
-        "drives": scenario.actuator,
-    }
-    beside |= {"late or missed samples": within.jitter or not scenario.clock.regular}
-    if admits and any(beside.values()):
-        reasons.append(
-            f"its theorem is without {joined(name for name, there in beside.items() if there)}"
-        )
+    if any(beside):
+        reasons.append("the law's theorem has no delay, noise, sensor, drives or late samples")
     return "; ".join(reasons)
 
 
@@ -279,9 +249,9 @@ class Members:
         else:
             self.times = 0
         if self.times and any(scenario.noise.errors):
-            cure = "the adversary chooses them: leave them out"
             raise ScenarioError(
-                f"the scenario has errors of measurement, {scenario.noise.errors}, and {cure}"
+                f"the scenario has errors of measurement, {scenario.noise.errors}, and the "
+                "adversary chooses them: leave them out"
             )
         middle = np.full(len(self.constants), 0.5)
         if count > 1:
@@ -459,9 +429,8 @@ class Constant:
             try:
                 self.put(scenario, value)
             except ScenarioError as error:
-                unit = f" {self.unit}" * (self.unit not in ("", "added", "%"))
-                named = f"Uncertainty's {self.name.partition(' ')[0]} reaches {value:g}{unit}"
-                raise ScenarioError(f"{named}, with which {error}") from None
+                named = self.name.partition(" ")[0]
+                raise ScenarioError(f"Uncertainty's {named} of {value:g}: {error}") from None
 
 
 def _check_class(scenario: Scenario, within: Uncertainty) -> None:
@@ -515,13 +484,9 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
             )
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
-            cure = (
-                "give it some, such as friction=smc.Coulomb(0.1), or a class with "
-                "friction=(0.0, 0.1)"
-            )
             raise ScenarioError(
                 f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: "
-                f"{cure}"
+                "give it some, such as friction=smc.Coulomb(0.1)"
             )
         yield Constant(
             name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale
@@ -534,10 +499,7 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
         )
     if within.bound != (1.0, 1.0):
         if not math.isfinite(min(scenario.limits)):
-            cure = "give the scenario a u_max"
-            raise ScenarioError(
-                f"Uncertainty's bound is of {plant.name}, whose u_max has none that differs: {cure}"
-            )
+            raise ScenarioError("Uncertainty's bound needs a finite one: give the scenario a u_max")
         yield Constant(name="bound", bounds=within.bound, put=_with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
@@ -562,11 +524,10 @@ def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[flo
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
     if high < max(low, step) or (low == high and bounds[0] < bounds[1]):
-        unit = "" if name == "period" else " s"
-        told = (
-            f"from {bounds[0]:g} to {bounds[1]:g}{unit}, and a run has multiples of {step:g}{unit}"
+        raise ScenarioError(
+            f"Uncertainty's {name} is from {bounds[0]:g} to {bounds[1]:g}, and a run has multiples "
+            f"of {step:g}: give a range with several of these"
         )
-        raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with several of these")
     return low, high
 
 

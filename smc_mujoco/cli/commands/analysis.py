@@ -382,7 +382,7 @@ def chatter(
     chatter
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.chattering import chattering, save, shared_assumptions
+        from smc_mujoco.analysis.chattering import chattering, save
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
@@ -409,7 +409,8 @@ def chatter(
         measured = [channel_cycle(trace, channel) for trace in traces]
         changes = step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
-    terminal.note("assumed: " + "; ".join(shared_assumptions(cycles)), wrap=True)
+    assumed = dict.fromkeys(words for cycle in cycles for words in cycle.assumptions)
+    terminal.note("assumed: " + "; ".join(assumed), wrap=True)
     terminal.note(
         f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True
     )

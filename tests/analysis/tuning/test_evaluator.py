@@ -13,7 +13,6 @@ from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, PYTHON, Evalu
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import itae, tv
-from smc_mujoco.simulation.grid import GRID_SEEDS
 from smc_mujoco.simulation.prepare import prepare
 
 BRIEF = Objective(conditions=("nominal", "noise"), duration=0.5)
@@ -35,25 +34,6 @@ def test_objectives_are_those_of_each_law_on_its_own_unseen_instance():
     assert objectives("duffing", laws[:1], BRIEF, instances=[2]) == pytest.approx(
         found[2:], rel=1e-12
     )
-
-
-def test_instances_of_objectives_belong_to_no_search_and_no_study():
-    law = smc.law("classical")
-    unseen = {case.seed for i in range(50) for case in BRIEF.unseen("duffing", law, i)}
-    assert len(unseen) == 100
-    assert min(unseen) >= GRID_SEEDS
-    searches = [(seed, search) for seed in (0, 1, 10**9) for search in (0, 1, 999)]
-    seen = []
-    for one in searches:
-        for case in BRIEF.scenarios("duffing", law, *one):
-            seen.append(case.seed)
-    assert len(set(seen)) == len(seen)
-    assert not {*seen} & unseen
-    assert min(seen) >= GRID_SEEDS
-
-
-def test_an_instance_for_each_law_is_asked_for(refused):
-    refused(lambda: objectives("duffing", [smc.law("classical")], BRIEF, instances=[1, 2]))
 
 
 # both engines against smc.run

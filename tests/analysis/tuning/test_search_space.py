@@ -167,13 +167,3 @@ def test_a_unit_follows_the_exponent_that_a_law_was_given():
     for a in (0.25, 0.75):
         low, high = search_space.box(smc.law("power_rate", a=a), scales)["k"]
         assert math.sqrt(low * high) == pytest.approx(6.0 / (2.0 / 0.5) ** a)
-
-
-def test_a_plant_without_a_scale_is_refused(refused):
-    duffing = smc.plant("duffing")
-    for plant in (
-        dataclasses.replace(duffing, x0=(0.0,)),
-        dataclasses.replace(duffing, nominal=lambda x, v, i, p: (0.0, 0.0)),
-        smc.plant("cart_pole"),
-    ):
-        refused(lambda plant=plant: search_space.scales(plant, 6.0))
