@@ -218,7 +218,7 @@ def test_the_adversary_chooses_the_set_of_parameters_and_the_scale_of_friction()
         )
     assert worst.value == max(smc.score(trace)["rms_error"] for trace in smc.run(made))
     assert worst.scenario in made
-    assert "any of 3 parameter sets, friction x 0 to 2" in str(worst)
+    assert "any of 3 parameter sets, friction scale 0 to 2" in str(worst)
 
 
 def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
