@@ -49,11 +49,8 @@ SLICE = 10_000  # cases a process at most; each process compiles its laws again,
 MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
-CASES = {
-    "scenarios": 40_000,
-    "batches": 2_000,
-    "files": 8_000,
-}  # 10 minutes on two cores
+# 10 minutes on two cores
+CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000}
 
 
 class Found(AssertionError):
@@ -148,9 +145,8 @@ def sound(trace: smc.Trace) -> None:
         if not np.all(np.abs(getattr(trace, name)[:end]) <= scenario.resolved.u_max):
             raise Found(f"{name} beyond u_max")
     x0 = np.array(scenario.resolved.x0)
-    exact = slice(
-        None, 3 if scenario.plant.pose else None
-    )  # a rotation vector may have another with the same attitude
+    # a rotation vector may have another with the same attitude
+    exact = slice(None, 3 if scenario.plant.pose else None)
     if scenario.plant.pose and np.abs(x0).max() < 1e3:
         turned = pose_errors(trace.x[:1], x0[None])[0, 3:]
     else:
@@ -167,9 +163,8 @@ def scenarios(random: Random) -> str:
     if scenario is None or trace is None:
         return "refused"
     sound(trace)
-    if (
-        random.random() < 0.1 and scenario.law.name in smc.laws()
-    ):  # whose code a file can bring back
+    # whose code a file can bring back
+    if random.random() < 0.1 and scenario.law.name in smc.laws():
         same(trace, smc.load(trace.save("trace.npz")))
     return "ended early" if trace.failure else "ran"
 

@@ -57,13 +57,8 @@ HEAVY = {
 }
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
-SHELVES = {
-    "signals",
-    "hardware",
-    "errors",
-    "design",
-    "fidelity",
-}  # modules of public names, which anything may import
+# modules of public names, which anything may import
+SHELVES = {"signals", "hardware", "errors", "design", "fidelity"}
 PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
@@ -123,7 +118,10 @@ def module(name: str) -> str:
 
 
 def test_the_package_has_these_rooms_and_no_other():
-    entries = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    entries = set()
+    for path in PACKAGE.iterdir():
+        if path.name != "__pycache__":
+            entries.add(path.name)
     assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"} == {
         *ROOMS,
         *(f"{name}.py" for name in SHELVES),
@@ -338,14 +336,8 @@ def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> boo
     """
     if path.parent.name in CATALOGUES or ast.unparse(node.body[0]) == "...":
         return True
-    return node.name in (
-        "value",
-        "bounds",
-        "parameters",
-        "edit",
-        "fields",
-        "structure",
-    )  # of a signal, of a part
+    # of a signal, of a part
+    return node.name in ("value", "bounds", "parameters", "edit", "fields", "structure")
 
 
 def test_everything_public_is_explained():

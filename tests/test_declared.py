@@ -65,7 +65,10 @@ def good_numbers(one):
 
 
 def bad_by_channel(one):
-    many = [[good(one.one)[0], value] for value in bad(one.one) if not isinstance(value, list)]
+    many = []
+    for value in bad(one.one):
+        if not isinstance(value, list):
+            many.append([good(one.one)[0], value])
     return [*(value for value in bad(one.one) if value != []), [], *many]
 
 

@@ -56,7 +56,10 @@ sys.exit(attack.main())
     monkeypatch.setattr(attack, "SCRIPT", str(script))
     monkeypatch.setattr(attack, "LIMIT", 1.0)
     (first, fine, _), (second, found, why), *rest = attack.slice_of(part, 0, 0, 4)
-    assert (first, fine, second, found) == (0, "ran", 1, "found")
+    assert first == 0
+    assert fine == "ran"
+    assert second == 1
+    assert found == "found"
     assert re.search(words, why)
     assert [i for i, _, _ in rest] == [2, 3]
 

@@ -63,15 +63,14 @@ def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
     text = path.read_text("utf-8")
     data = json.loads(text)
     assert text == json.dumps(data, indent=1, ensure_ascii=False) + "\n"
-    assert (data["nbformat"], data["nbformat_minor"], data["metadata"]["kernelspec"]["name"]) == (
-        4,
-        5,
-        "python3",
-    )
+    assert data["nbformat"] == 4
+    assert data["nbformat_minor"] == 5
+    assert data["metadata"]["kernelspec"]["name"] == "python3"
     assert len({cell["id"] for cell in data["cells"]}) == len(data["cells"])
     for cell in data["cells"]:
         if cell["cell_type"] == "code":
-            assert (cell["outputs"], cell["execution_count"]) == ([], None)
+            assert cell["outputs"] == []
+            assert cell["execution_count"] is None
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -81,7 +80,8 @@ def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
         pytest.skip(str(gl.missing()))
     said = "\n".join(line.strip() for line in SAID[path.stem].strip().splitlines())
     done = python(KERNEL, path, "shown.json", QUICK, said, folder=tmp_path)
-    assert (done.stdout, done.stderr) == ("", "")
+    assert done.stdout == ""
+    assert done.stderr == ""
     shown = json.loads((tmp_path / "shown.json").read_text())
     for text, outputs in zip(code(path), shown, strict=True):
         last = ast.parse(text).body[-1]

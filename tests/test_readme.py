@@ -148,7 +148,9 @@ def check_command(line: str, known: dict) -> None:
             unknown.append(option)
     assert unknown == [], line
     given = [argument for argument in rest if not argument.startswith("-")]
-    of_template = {path.stem for path in (ROOT / "examples").glob("*/*/scenes/*.py")}
+    of_template = set()
+    for path in (ROOT / "examples").glob("*/*/scenes/*.py"):
+        of_template.add(path.stem)
     if word == "run" and given and given[0] not in {"NAME", *of_template}:
         assert isinstance(
             scene.read(scene.find(str(ROOT / given[0]) if "/" in given[0] else given[0])), smc.Scene
@@ -166,7 +168,10 @@ def results(folder: Path) -> set[str]:
 
 
 def test_make_targets_exist():
-    wanted = {re.match(r"make (\w+)", line) for _, line in LINES if line.startswith("make ")}
+    wanted = set()
+    for _, line in LINES:
+        if line.startswith("make "):
+            wanted.add(re.match(r"make (\w+)", line))
     assert {"demo", "test"} <= {found[1] for found in wanted if found} <= TARGETS
 
 
@@ -200,7 +205,10 @@ def test_names_that_a_page_takes_from_the_package_are_there(page):
 
 def test_folders_and_modules_that_contributing_lists_are_there():
     text = (ROOT / "CONTRIBUTING.md").read_text()
-    cells = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    cells = []
+    for line in text.splitlines():
+        if line.startswith("| `"):
+            cells.append(line.split("|")[1])
     names = [name for cell in cells for name in re.findall(r"`([\w/]+)`", cell)]
     assert len(names) >= 11
     places = []

@@ -24,7 +24,9 @@ NAMES = [name for name, one in PUBLIC.items() if callable(one)]
 def signature(name):
     """Return a call with its parameters and their defaults, without types."""
     whole = inspect.signature(PUBLIC[name])
-    plain = [one.replace(annotation=one.empty) for one in whole.parameters.values()]
+    plain = []
+    for one in whole.parameters.values():
+        plain.append(one.replace(annotation=one.empty))
     return name + re.sub(" at 0x[0-9a-f]+", "", str(inspect.Signature(plain)))
 
 

@@ -102,7 +102,9 @@ smc.compare("pid", "duffing", "nominal", seeds=1, duration=0.1, out="compared", 
 print(*{module.__file__ for name, module in sys.modules.items() if name.startswith("smc_mujoco")})
 """
     loaded = python("-c", code, folder=tmp_path).stdout.splitlines()[-1].split()
-    rooms = {Path(file).relative_to(ROOT / "smc_mujoco").parts[0] for file in loaded}
+    rooms = set()
+    for file in loaded:
+        rooms.add(Path(file).relative_to(ROOT / "smc_mujoco").parts[0])
     assert rooms.isdisjoint({"exchange", "evidence", "benchmark"})
     total = sum(count(Path(file).read_text(encoding="utf-8"))["tokens"] for file in loaded)
     assert total <= MAX_LOADED

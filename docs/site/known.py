@@ -75,7 +75,7 @@ def tasks() -> dict[str, list[str]]:
 
 def entries() -> dict[str, list[str]]:
     """Return title -> the names on a page of the reference, with their modules."""
-    origins = smc._SHELF.origins  # pyright: ignore[reportAttributeAccessIssue] private
+    origins = smc._LAZY.origins  # pyright: ignore[reportAttributeAccessIssue] private
     found = {}
     for task, its in tasks().items():
         found[task] = [f"{origins[name]}.{name}" for name in its if name in origins]

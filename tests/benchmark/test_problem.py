@@ -61,14 +61,13 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
         one = smc.problem(name)
         drawn, (scenario,) = one.instance(5, SEED), one.scenarios("pid", [5], SEED)
         assert scenario.x0 == (drawn.side * drawn.start * 1.5,)
-        assert (scenario.mismatch, scenario.seed) == ({"mass": drawn.mass}, drawn.seed)
+        assert scenario.mismatch == {"mass": drawn.mass}
+        assert scenario.seed == drawn.seed
         assert getattr(scenario.disturbance[0], field) == 0.2 * drawn.disturbance
-        assert (scenario.u_max, scenario.duration, scenario.control_period, scenario.condition) == (
-            one.u_max,
-            one.duration,
-            1e-3,
-            one.condition,
-        )
+        assert scenario.u_max == one.u_max
+        assert scenario.duration == one.duration
+        assert scenario.control_period == 1e-3
+        assert scenario.condition == one.condition
     (heavy,) = smc.problem("duffing/heavy@1").scenarios("pid", [3])
     assert heavy.mismatch == {
         "mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)
@@ -92,17 +91,16 @@ def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_f
     far = 0.2 * drawn.side * drawn.start
     assert scenario.x0 == pytest.approx((far, -far, 1.0 - far, 0.0, 0.0, 2.0 * far), abs=1e-15)
     assert {name: getattr(scenario, name) for name in fields(1.0)} == fields(drawn.disturbance)
-    assert (scenario.limits, scenario.samples) == (smc.plant("quadrotor").limits, 6000)
+    assert scenario.limits == smc.plant("quadrotor").limits
+    assert scenario.samples == 6000
 
 
 def test_calm_of_flight_is_of_the_rotors_commands():
     one = smc.problem("quadrotor/wind@2")
     whole = smc.run(one.scenarios("geometric", [0])[0])
     applied = np.zeros_like(whole.applied)
-    applied[::2, 2], applied[::2, 5] = (
-        0.06,
-        1.0,
-    )  # half of a rotor's bound; of the last channel there is no rotor
+    # half of a rotor's bound; of the last channel there is no rotor
+    applied[::2, 2], applied[::2, 5] = 0.06, 1.0
     assert one.measures(dataclasses.replace(whole, applied=applied))["calm"] == pytest.approx(
         6000 * 0.5 / 6.0
     )
@@ -144,9 +142,8 @@ def test_measures_by_hand():
     one = smc.problem("duffing/noise@1")
     vars(one)["_frozen"] = {"accuracy": [0.01, 0.1], "settling": [1.5, 2.5], "calm": [0.4, 0.6]}
     e = np.where(np.arange(4001) < 1000, 1.0, 0.05)  # 5 % of the start from 1 s on
-    u = np.where(
-        np.arange(4001) % 1000 < 500, 0.0, 1.5
-    )  # eight changes by 1.5 in 4 s, of 6: 1/2 per second
+    # eight changes by 1.5 in 4 s, of 6: 1/2 per second
+    u = np.where(np.arange(4001) % 1000 < 500, 0.0, 1.5)
     found = one.measures(made_trace(one, e, u))
     itae = 0.5 + 0.05 * (16 - 1) / 2  # the integral of t |e|
     assert found == {
@@ -191,9 +188,7 @@ def test_a_failed_run_reaches_nothing():
 
     one = smc.problem("duffing/sine@1")
     found = one.measures(smc.run(one.scenarios(broken(), [0])[0]))
-    assert (found.pop("failed"), found.pop("accuracy"), found.pop("calm")) == (
-        1.0,
-        math.inf,
-        math.inf,
-    )
+    assert found.pop("failed") == 1.0
+    assert found.pop("accuracy") == math.inf
+    assert found.pop("calm") == math.inf
     assert [name for name, value in found.items() if value < math.inf] == []

@@ -84,8 +84,13 @@ def test_published_criteria_give_their_published_score(robot, version):
 
 def test_unrounded_criteria_give_their_unrounded_score():
     """History SAC's run on the acrobot's board: scores.csv of its data."""
-    values = (1.0000000000000007, 8.077749161960673, 1.8037118196867141,
-              0.009546752841345449, 88.4965605525382)  # fmt: skip
+    values = (
+        1.0000000000000007,
+        8.077749161960673,
+        1.8037118196867141,
+        0.009546752841345449,
+        88.4965605525382,
+    )
     row = dict(zip(VERSIONS["v2"], values, strict=True))
     assert boards.score(row) == pytest.approx(0.6552699844147534, abs=1e-12)
 
@@ -159,9 +164,14 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
     """
     changed = {"m2": 0.55, "b1": 0.03}
     case = Case(
-        response=1.3, delay=2, pulses=((0.02, 0.05, 1.5),), seed=4, parameters=changed,
-        velocity_noise=0.1, torque_noise=0.2,
-    )  # fmt: skip
+        response=1.3,
+        delay=2,
+        pulses=((0.02, 0.05, 1.5),),
+        seed=4,
+        parameters=changed,
+        velocity_noise=0.1,
+        torque_noise=0.2,
+    )
     scenario = dataclasses.replace(boards.on_board(robot, mine), u_max=2.5, model="nominal")
     states, torque = Machine(scenario).simulate(case)
     noise = np.random.default_rng([simulator.SEED, 4, 0]).normal(size=(5000, 3)) * [0.1, 0.1, 0.2]
@@ -196,7 +206,9 @@ def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
     ends = [3.4, 3.4, 0.0, 3.4, 0.0, 0.0, 3.4, 0.0]  # up, or hanging
     kinds = [("model", "a")] + [("model", "b")] * 3
     kinds += [("delay", "c")] * 2 + [("perturbations", "d")] * 2
-    grid = [Case(test=test, name=name, delay=k) for k, (test, name) in enumerate(kinds)]
+    grid = []
+    for k, (test, name) in enumerate(kinds):
+        grid.append(Case(test=test, name=name, delay=k))
     end = lambda case: (np.array([[ends[case.delay], 0.0, 0.0, 0.0]]), None)  # noqa: E731
     monkeypatch.setattr(simulator, "Machine", lambda scenario: SimpleNamespace(simulate=end))
     monkeypatch.setattr(simulator, "cases", lambda: grid)
@@ -253,7 +265,9 @@ def test_a_free_swing_ends_where_the_published_one_does(model, end, digits):
     x = (1.0, 0.5, 0.0, 0.0)
     for _ in range(1000):
         x = stepped(x, 0.0, 0.0, tuple(published.values()))
-    rounded = [round(value, places) for value, places in zip(x, digits, strict=True)]
+    rounded = []
+    for value, places in zip(x, digits, strict=True):
+        rounded.append(round(value, places))
     assert rounded == pytest.approx(end, abs=2e-6)
 
 
@@ -380,7 +394,9 @@ def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_i
         apart = rng.uniform(-0.3, 0.3, 4)
         turns = 2.0 * math.pi * np.array([1, 0, -2, 0])
         x, v, q, dq = np.array([path(now) for path in paths]) + apart + turns
-        rows = [np.interp(t, nodes, table[key]) for key in ("s_x", "s_v", "s_q", "s_dq")]
+        rows = []
+        for key in ("s_x", "s_v", "s_q", "s_dq"):
+            rows.append(np.interp(t, nodes, table[key]))
         y = SimpleNamespace(t=t, dt=0.004, x=x, v=v, q=q, dq=dq)
         u, s = template.function(y, SimpleNamespace(k=0.7, phi=1.3), None)
         assert s == pytest.approx(np.dot(rows, apart), abs=1e-9)

@@ -58,7 +58,8 @@ def test_the_table_has_the_formula(call):
 
 def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     code, out, err = call("list", "--needs", "continuous,finite-time", "--plant", "duffing")
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert err == ""
     assert max(map(len, out.splitlines())) <= 80
     rows = filter(None, map(str.split, out.splitlines()))
     lines = {name: rest for name, *rest in rows if name in laws()}
@@ -78,7 +79,9 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
 )
 def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
     code, out, err = call("list", *words)
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert code == 2
+    assert out == ""
+    assert len(err.splitlines()) == 1
     assert sentence in err
 
 
@@ -88,7 +91,8 @@ def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
 @ONE_BY_ONE
 def test_a_page_has_all_that_is_known(name, template: Template, call):
     code, out, err = call("list", name)
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert err == ""
     assert max(map(len, out.splitlines())) <= 80
     text = flat(out)
     said = law_pages.entry(template)
@@ -149,7 +153,8 @@ def test_a_plant_has_a_page_with_its_parameters_and_its_sets(call):
 )
 def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
     code, out, err = call("list", typed)
-    assert (code, out) == (2, "")
+    assert code == 2
+    assert out == ""
     assert (
         err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean "
         f"{meant!r}?\n"

@@ -57,7 +57,9 @@ def test_a_table_of_tips_has_the_scores_in_its_units():
         ]
     )
     (table,) = tables.tips("runs", {"pressing": pressing})
-    cells = {str(column.header): str(next(iter(column.cells))) for column in table.columns}
+    cells = {}
+    for column in table.columns:
+        cells[str(column.header)] = str(next(iter(column.cells)))
     values = tip_scores(pressing)
     assert cells["largest\nerror\nmm"] == number(1e3 * values["max_error"])
     assert cells["mean\nforce\nN"] == number(values["mean_force"])
@@ -104,7 +106,9 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
         measured = [(0.125, 4.5), (math.nan, math.nan)][:count]
         shown.append(tables.chattering(scenarios, 0, cycles[:count], measured, changes[:count]))
     tables_of = ["\n".join(printed([table]).splitlines()) for table in shown]
-    cells = [[" ".join(line.split()) for line in text.splitlines()] for text in tables_of]
+    cells = []
+    for text in tables_of:
+        cells.append([" ".join(line.split()) for line in text.splitlines()])
     assert cells[0][-4:-1] == [
         "duffing pid 0.500 0.0200 0.250 s",
         "lqr >= 1.00 any s",
@@ -112,10 +116,7 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
     ]
     assert "pid 0.100 0.125 5.00 4.50 100 % 4 %" in cells[1]
     assert "classical none none* none none* > 100 %" in cells[1]
-    assert ["half the physics step" in text for text in tables_of] == [
-        False,
-        True,
-        False,
-    ]  # what a mark means
+    # what a mark means
+    assert ["half the physics step" in text for text in tables_of] == [False, True, False]
     assert "pid 0.100 0.125 5.00 4.50 100 % 25 %" in cells[2]
     assert ["s (m/s)" in tables_of[1], "s (rad/s)" in tables_of[2]] == [True, True]

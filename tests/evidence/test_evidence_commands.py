@@ -291,7 +291,10 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         ["report(Path(there), True, 2, None, progress=True, laws=['pid', 'lqr'])"],
     ),
-    "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3": (
+    (
+        "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set "
+        "mass=5 --starts 2 --seed 3"
+    ): (
         0,
         [
             "load(Path(c.csv), {x: 'position'})",
@@ -364,7 +367,9 @@ def called(tmp_path, monkeypatch, capsys):
         with pytest.raises(SystemExit) as ended:
             main.main(line.split())
         said = capsys.readouterr()
-        left = [json.dumps(json.loads(path.read_text())) for path in tmp_path.glob("*.json")]
+        left = []
+        for path in tmp_path.glob("*.json"):
+            left.append(json.dumps(json.loads(path.read_text())))
         if said.out.startswith("{"):
             out = json.dumps(json.loads(said.out))
         else:
@@ -390,7 +395,9 @@ def test_a_command_hands_on_what_it_is_given_and_prints_what_comes_back(line, ca
 @pytest.mark.parametrize("line", REFUSED)
 def test_options_that_do_not_go_together_are_one_sentence_before_any_work(line, called):
     code, notes, out, said = called(line)
-    assert (code, notes, out.strip()) == (2, [], "")
+    assert code == 2
+    assert notes == []
+    assert out.strip() == ""
     assert said.startswith("smc-mujoco: ")
     assert said.count("\n") == 1
 

@@ -47,13 +47,8 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_first_harmonic_counts_where_a_higher_one_is_larger_in_the_rate(shape):
-    for frequency, noise in (
-        (3.1, 0.01),
-        (7.25, 0.0),
-        (7.25, 0.01),
-        (19.37, 0.01),
-        (81.4, 0.01),
-    ):  # 7.25: between bins
+    # 7.25: between bins
+    for frequency, noise in (3.1, 0.01), (7.25, 0.0), (7.25, 0.01), (19.37, 0.01), (81.4, 0.01):
         wave = SHAPES[shape](math.tau * frequency * T + 0.3)
         amplitude, found = limit_cycle(
             T, wave + noise * np.random.default_rng(0).normal(size=len(T))

@@ -107,9 +107,8 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
         felt = -(A @ pressed.reaction[k]) / (A @ A)
         np.testing.assert_allclose(pressed.reaction[k], -A * felt, atol=0.05)
         assert found.force[k] == pytest.approx(felt, rel=5e-3)
-        np.testing.assert_allclose(
-            found.push[k], [-found.force[k], 0.0, 0.0], atol=1e-6
-        )  # away from the wall
+        # away from the wall
+        np.testing.assert_allclose(found.push[k], [-found.force[k], 0.0, 0.0], atol=1e-6)
 
 
 def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():

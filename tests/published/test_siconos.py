@@ -105,15 +105,16 @@ def test_trajectories_of_siconos_are_reproduced(which, name):
     at = np.arange(101) * round(PERIOD / STEP)
     np.testing.assert_allclose(trace.v[:, 0], data["x2"][at], rtol=0, atol=EXACT)
     np.testing.assert_allclose(x1.v[:, 0], data["x1"][at], rtol=0, atol=EXACT)
-    np.testing.assert_allclose(
-        trace.u[:-1, 0], data["u"][at[:-1] + 1], rtol=0, atol=EXACT
-    )  # of the step that follows
+    # of the step that follows
+    np.testing.assert_allclose(trace.u[:-1, 0], data["u"][at[:-1] + 1], rtol=0, atol=EXACT)
 
 
 def test_only_the_explicit_law_chatters_as_in_siconos():
     implicit, explicit, _ = first_example()
     late = implicit.t > 0.5
-    turns = [np.abs(np.diff(trace.u[late, 0])).sum() for trace in (implicit, explicit)]
+    turns = []
+    for trace in (implicit, explicit):
+        turns.append(np.abs(np.diff(trace.u[late, 0])).sum())
     assert turns[1] > 10.0 * turns[0]
     assert np.abs(implicit.v[late]).max() < 0.5 * np.abs(explicit.v[late]).max()
 

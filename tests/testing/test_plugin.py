@@ -107,13 +107,8 @@ def test_a_pair_of_limits_holds_from_both_sides(value, kept):
     assert found.within == kept
     assert found.limit == "1 .. 2"
     assert bound("driven chattering_amplitude", math.nan, "rad", 0.0).within  # no limit cycle
-    assert (
-        bound("overshoot", value, "%", 2.0).within,
-        bound("overshoot", value, "%", 1.9).within,
-    ) == (
-        value <= 2.0,
-        value < 1.9,
-    )
+    assert bound("overshoot", value, "%", 2.0).within == (value <= 2.0)
+    assert bound("overshoot", value, "%", 1.9).within == (value < 1.9)
 
 
 def test_the_frames_of_this_package_stay_out_of_a_failure(session):
@@ -194,7 +189,8 @@ def test_a_failure_tells_each_limit_with_its_unit_and_whether_it_held(pole):
     with pytest.raises(AssertionError) as told:
         judge(limits, "limit", "not", "r")
     first, heads, _, *rows = [line.split() for line in str(told.value).splitlines()]
-    assert (heads, first[-1]) == (["metric", "value", "limit", "ok"], "(r)")
+    assert heads == ["metric", "value", "limit", "ok"]
+    assert first[-1] == "(r)"
     assert [row[-1] for row in rows] == ["NO", "NO", "yes", "yes"]
     assert [row[0] for row in rows] == ["overshoot", "rise_time", "peak", "chattering_amplitude"]
     assert rows[:2] == [
@@ -216,7 +212,8 @@ def test_a_response_starts_at_rest_at_zero_and_has_every_metric(step_response):
     assert (r.trace.v[0] == 0).all()
     assert (r.trace.r == 0.3).all()
     assert {name: float(value) for name, value in r.metrics.items()} == smc.score(r.trace)
-    assert all(getattr(r, name) is value for name, value in r.metrics.items())
+    for name, value in r.metrics.items():
+        assert getattr(r, name) is value
     assert set(r.metrics) <= set(dir(r))
     with pytest.raises(AttributeError, match="unknown metric 'overshot': did you mean 'overshoot'"):
         r.overshot  # noqa: B018
@@ -294,7 +291,8 @@ def test_a_failing_test_attaches_its_figure_and_with_smc_film_its_film(pytester,
     assert "smc_mujoco" in Path(figure).parts  # a folder in pytest's temporary one
     films = re.findall(r"^film: (.*)$", said, re.MULTILINE)
     assert len(films) == (gl.missing() is None)
-    assert all(Path(film).stat().st_size > 1000 for film in films)
+    for film in films:
+        assert Path(film).stat().st_size > 1000
     assert list(pytester.path.glob("*.png")) == []
 
 
@@ -309,7 +307,9 @@ def test_a(step_response):
         "--smc-out=out",
         failed=1,
     )
-    names = [f"test_my_laws.py_test_a-{plant}.png" for plant in ("duffing", "van_der_pol")]
+    names = []
+    for plant in ("duffing", "van_der_pol"):
+        names.append(f"test_my_laws.py_test_a-{plant}.png")
     assert re.findall(r"^figure: (.*)$", said, re.MULTILINE) == [
         str(pytester.path / "out" / name) for name in names
     ]
@@ -399,7 +399,10 @@ def test_a_golden_metric_is_within_its_tolerance_or_off(
     stored = json.loads(file.read_text())
     stored["test"]["overshoot"]["value"] = str(recorded)
     file.write_text(json.dumps(stored))
-    said = pytest.raises(AssertionError, match=r"^overshoot is 0 %") if off else None
+    if off:
+        said = pytest.raises(AssertionError, match=r"^overshoot is 0 %")
+    else:
+        said = None
     with said or contextlib.nullcontext():
         golden.compare(file, "test", response, of_test)
 
@@ -408,9 +411,9 @@ def test_a_value_of_0_is_recorded_with_a_tolerance_above_rounding(step_response,
     response = step_response("duffing", "none", step=0.1, duration=0.01)
     golden.record(tmp_path / "a.json", "test", response, {})
     stored = golden.read(tmp_path / "a.json")["test"]
-    assert (stored["overshoot"]["tolerance"], stored["peak"]["tolerance"]) == (
-        golden.MIN_TOLERANCE,
-        pytest.approx(0.01 * response.peak, rel=0.05) if response.peak else golden.MIN_TOLERANCE,
+    assert stored["overshoot"]["tolerance"] == golden.MIN_TOLERANCE
+    assert stored["peak"]["tolerance"] == (
+        pytest.approx(0.01 * response.peak, rel=0.05) if response.peak else golden.MIN_TOLERANCE
     )
 
 
@@ -491,7 +494,10 @@ def test_used_it_leaves_the_renderer_to_mujoco():
 
 def test_plugin_imports_nothing_heavy_and_never_sets_mujoco_gl(tmp_path):
     (tmp_path / "test_user.py").write_text(UNUSED)
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "MUJOCO_GL"))}
+    clean = {}
+    for k, v in os.environ.items():
+        if not k.startswith(("PYTEST", "MUJOCO_GL")):
+            clean[k] = v
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", *PLUGIN, "test_user.py"],
         cwd=tmp_path,

@@ -117,5 +117,8 @@ def test_a_picture_has_no_line_for_an_order_that_tells_nothing():
     untold = law("super_twisting", 1.14, -0.21, 2.49)
     page = orders([told, untold])
     for ax in page.axes:
-        fits = [line for line in ax.lines if np.unique(np.asarray(line.get_xdata())).size > 1]
+        fits = []
+        for line in ax.lines:
+            if np.unique(np.asarray(line.get_xdata())).size > 1:
+                fits.append(line)
         assert {line.get_color() for line in fits} == {style.law_colour("twisting")}

@@ -107,7 +107,9 @@ def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
     written = new(tmp_path / "levant")
     assert [path.name for path in written] == [PAPER_FILE, CODE_FILE]
     found = paper(tmp_path / "levant")
-    assert (found.name, list(found.claims), list(found.sets)) == ("levant", ["1", "2"], ["paper"])
+    assert found.name == "levant"
+    assert list(found.claims) == ["1", "2"]
+    assert list(found.sets) == ["paper"]
     first, second = claims(paper=found)
     assert [first.verdict, second.verdict] == ["yes", SUPPORTED]  # a question, and a sentence
     assert list(first.numbers["paper"]) == [
@@ -132,9 +134,9 @@ def {}(y, gains, memory):
 
 
 def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
-    data = (
-        MINIMAL
-        + 'plants = ["duffing"]\nlaws = ["soft"]\n[gains.hard.duffing]\nsoft = { k = 7.0 }\n[gains.own]'
+    data = MINIMAL + (
+        'plants = ["duffing"]\nlaws = ["soft"]\n[gains.hard.duffing]\nsoft = { k = 7.0 '
+        "}\n[gains.own]"
     )
     code = (
         OWN.format("soft")
@@ -150,9 +152,9 @@ def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
 
 
 def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(folder):
-    data = (
-        MINIMAL
-        + '[plants]\nbent = { plant = "duffing", beta = 0.75 }\n[gains.paper]\nclassical = { k = 3.0 }\n'
+    data = MINIMAL + (
+        '[plants]\nbent = { plant = "duffing", beta = 0.75 }\n[gains.paper]\nclassical = '
+        "{ k = 3.0 }\n"
     )
     code = OWN.format("soft") + "made = soft(k=5.0)\n" + SMALL
     found = paper(folder("sets = ['paper', 'tuned', 'default']\n" + data, code))
@@ -165,10 +167,8 @@ def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(f
         match=r"the gains 'paper' of classical lack some.*write in .gains.paper. what.* c = ",
     ):
         found.law("duffing", "classical", "paper")
-    assert (found.plant("bent").parameters["beta"], found.plant("duffing").name) == (
-        0.75,
-        "duffing",
-    )
+    assert found.plant("bent").parameters["beta"] == 0.75
+    assert found.plant("duffing").name == "duffing"
     assert found.condition("noise").name == "noise"
     assert found.condition("far: x0=0.25").on(found.plant("bent"), 1.0)["x0"] == 0.25
     assert found.contents == "1 of its sentences; full text read"
@@ -182,13 +182,11 @@ def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes
     )
     found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
     one = Runs(found, "default").of(found.claims["1"]).scenario("duffing", "pid", "far", u_max=4.0)
-    assert (one.duration, one.x0, one.seed, one.u_max, one.condition) == (
-        1.0,
-        (0.2,),
-        3,
-        4.0,
-        "far",
-    )
+    assert one.duration == 1.0
+    assert one.x0 == (0.2,)
+    assert one.seed == 3
+    assert one.u_max == 4.0
+    assert one.condition == "far"
 
 
 def test_claims_may_import_other_files_of_their_folder(folder):
@@ -324,10 +322,8 @@ def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(fold
     code += "    return [it, runs.check('size', 'other', 3)]\n"
     (one,) = claims(paper=folder(data, code))
     assert one.holds_if == "small, or so"
-    assert (one.numbers["default"]["it"]["limit"], one.numbers["default"]["other"]["limit"]) == (
-        6.0,
-        2.0,
-    )
+    assert one.numbers["default"]["it"]["limit"] == 6.0
+    assert one.numbers["default"]["other"]["limit"] == 2.0
     assert {check.sentence for check in one.checks("default")} == {"small"}
     assert [check.holds for check in one.checks("default")] == [True, False]
     with pytest.raises(ScenarioError, match="unknown threshold 'sise'"):
@@ -337,7 +333,8 @@ def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(fold
 def test_an_edited_folder_is_read_again(folder):
     assert claims(paper=folder())[0].verdict == SUPPORTED
     (one,) = claims(paper=folder(code=SMALL.replace("1.0", "7.0, 'also': {'a': 3}")))
-    assert (one.verdict, one.beside) == (REFUTED, {"default": {"a: also": 3.0}})
+    assert one.verdict == REFUTED
+    assert one.beside == {"default": {"a: also": 3.0}}
 
 
 def test_a_paper_that_is_none_is_refused():

@@ -545,16 +545,12 @@ def test_the_checker_stands_alone(tmp_path):
         subprocess.run, capture_output=True, text=True, check=False, cwd=tmp_path
     )
     done = run([sys.executable, "-I", "apart.py", "duffing.json"])
-    assert (done.returncode, done.stdout) == (
-        0,
-        "duffing.json is accepted: every statement is proven\n",
-    )
+    assert done.returncode == 0
+    assert done.stdout == "duffing.json is accepted: every statement is proven\n"
     file.write_text(file.read_text().replace('"bound": 0.', '"bound": 0.0'))
     done = run([sys.executable, "-I", "apart.py", "duffing.json"])
-    assert (done.returncode, done.stderr) == (
-        1,
-        "duffing.json is refused: not proven is the seal\n",
-    )
+    assert done.returncode == 1
+    assert done.stderr == "duffing.json is refused: not proven is the seal\n"
 
 
 # runs

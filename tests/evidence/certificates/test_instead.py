@@ -93,13 +93,13 @@ def test_comparisons_of_sentences_hold_with_the_tuned_gains():
         if "steady error" in name and name.endswith("<="):
             limits[name] = limit
     assert limits
-    assert all(numbers[name.removesuffix(" <=")] > np.max(limit) for name, limit in limits.items())
+    for name, limit in limits.items():
+        assert numbers[name.removesuffix(" <=")] > np.max(limit)
 
 
 def test_the_series_of_order_7_falls_where_claim_55_says():
-    roots = np.roots(
-        [-17 / 45, 0.0, 2 / 3, 0.0, -1.0, 0.0, 1.0]
-    )  # of the derivative of tanh's series
+    # of the derivative of tanh's series
+    roots = np.roots([-17 / 45, 0.0, 2 / 3, 0.0, -1.0, 0.0, 1.0])
     (falls,) = (root.real for root in roots if abs(root.imag) < 1e-12 and root.real > 0.0)
     assert f"{falls:.2f}" in CLAIMS["55"].instead
 
@@ -109,7 +109,6 @@ def test_the_share_of_van_der_pol_s_map_is_that_of_its_certificate():
     made = smc.audits.certify(
         smc.Scenario(plant="van_der_pol", law=gain_sets.law("van_der_pol", "observer_free"))
     )
-    x, v = np.meshgrid(
-        np.linspace(-4.0, 4.0, 50), np.linspace(-12.0, 12.0, 50)
-    )  # the map that `basin` draws
+    # the map that `basin` draws
+    x, v = np.meshgrid(np.linspace(-4.0, 4.0, 50), np.linspace(-12.0, 12.0, 50))
     assert f"{100.0 * made.contains(x, v).mean():.0f} % of the map" in PAGE

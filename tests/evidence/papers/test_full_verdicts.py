@@ -72,7 +72,9 @@ def test_full_verdicts_are_those_of_the_page(name):
     for id, (verdict, words) in found.items():
         told, said = shown[id]
         assert (verdict, NUMBER.split(words)) == (told, NUMBER.split(said)), id
-        numbers = [[float(one) for one in NUMBER.findall(text)] for text in (words, said)]
+        numbers = []
+        for text in (words, said):
+            numbers.append([float(one) for one in NUMBER.findall(text)])
         assert numbers[0] == pytest.approx(numbers[1], rel=0.05, abs=1e-8), id
 
 

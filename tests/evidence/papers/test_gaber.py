@@ -117,7 +117,9 @@ def drawn_by_lot(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 
 def ends(values: list[float]) -> str:
     """Return a number, or the mean, the least and the largest of several."""
-    several = [f"{one:.4g}" for one in (np.mean(values), np.min(values), np.max(values))]
+    several = []
+    for one in (np.mean(values), np.min(values), np.max(values)):
+        several.append(f"{one:.4g}")
     if several[1] == several[2]:
         return several[0]
     return "{} ({} to {})".format(*several)
@@ -675,7 +677,9 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
     """Super-twisting swings the pendulum beyond upright, the paper's law Van der Pol, and noise
     stays small.
     """
-    found = {one.id: one for one in claims(only=["29", "31", "45", "49"], gains="study")}
+    found = {}
+    for one in claims(only=["29", "31", "45", "49"], gains="study"):
+        found[one.id] = one
     assert {id: one.verdict for id, one in found.items()} == dict.fromkeys(
         ("29", "31", "45", "49"), SUPPORTED
     )

@@ -38,9 +38,8 @@ NUDGES = (0.0, 1e-12, -1e-11)  # of the starts, while a golden is written
 SAME = 0.01  # share of a number by which it may differ
 NOTHING = 1e-9  # difference that is none
 
-Record = dict[
-    str, Any
-]  # of a claim: whose it is, its verdict, and what was measured -> number, or [lowest, highest]
+# of a claim: whose it is, its verdict, and what was measured -> number, or [lowest, highest]
+Record = dict[str, Any]
 
 
 def golden(name: str) -> dict[str, Record]:
@@ -50,9 +49,8 @@ def golden(name: str) -> dict[str, Record]:
 
 def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record]:
     """Return claim -> record of a quick audit, without timings; check whose runs it used."""
-    with mock.patch.object(
-        search, "QUICK_SPREAD_SETS", 1
-    ):  # the verdicts are those of two, in less time
+    # the verdicts are those of two, in less time
+    with mock.patch.object(search, "QUICK_SPREAD_SETS", 1):
         found = audit(name, only, GAINS.get(name), quick=True)
     for id, sets in found.used.items():
         check_runs(name, id, [one.scenario for used in sets.values() for one in used.values()])

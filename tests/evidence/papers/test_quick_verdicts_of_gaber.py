@@ -11,13 +11,8 @@ from tests.evidence.papers.test_quick_verdicts import (
     runs_made_once,
 )
 
-SEARCHES = [
-    "12",
-    "20",
-    "24",
-    "61",
-    "T",
-]  # of millions of steps each; with stubbed runs they are in test_gaber.py
+# of millions of steps each; with stubbed runs they are in test_gaber.py
+SEARCHES = ["12", "20", "24", "61", "T"]
 OTHERS = [id for id in paper("gaber").claims if ("gaber", id) not in TIMINGS and id not in SEARCHES]
 PARTS = [pytest.param(OTHERS[k::6], id=str(k)) for k in range(6)]
 

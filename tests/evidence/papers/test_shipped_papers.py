@@ -35,7 +35,8 @@ def test_at_least_five_papers_ship_with_4_to_12_claims_each():
         found = paper(name)
         assert 4 <= len(found.claims) <= 12, name
         assert found.access, name
-        assert all(claim.where and claim.thresholds for claim in found.claims.values()), name
+        for claim in found.claims.values():
+            assert claim.where and claim.thresholds, name
 
 
 @pytest.mark.parametrize("name", PAPERS)
@@ -80,7 +81,8 @@ def test_a_signal_is_settled_from_where_it_stays_within_a_band(signal, time):
 
 def test_late_values_are_those_of_the_last_samples():
     signal = np.concatenate([np.full(10, 9.0), np.arange(END_SAMPLES + 2) % 3]).reshape(-1, 1)
-    assert (late(signal), late_step(signal)) == (2.0, 2.0)
+    assert late(signal) == 2.0
+    assert late_step(signal) == 2.0
     assert math.isnan(late(np.full((5, 1), math.nan)))
 
 
@@ -104,20 +106,16 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
         )
         assert least_bound(made) == pytest.approx(integral, rel=1e-6)
         assert classical_bound(made) > integral
-    without = {
-        "A": 1.0,
-        "B": 1.0,
-        "p": 0.5,
-        "q": 2.0,
-        "k": 0.5,
-    }  # at the end of what the general formula is for
+    # at the end of what the general formula is for
+    without = {"A": 1.0, "B": 1.0, "p": 0.5, "q": 2.0, "k": 0.5}
     assert general_margins(without) == {"k p < 1": 0.75, "k q > 1": 0.0}
 
 
 @pytest.mark.slow
 def test_fixed_time_is_sampled_finely_enough_for_the_band_that_was_fixed_before_the_first_run():
     (claim,) = audit("aldana_lopez_2019", ["3"], gains=["skew"], quick=True).claims
-    assert (BAND, claim.verdict) == (1e-6, "supported")
+    assert BAND == 1e-6
+    assert claim.verdict == "supported"
 
 
 def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
@@ -220,7 +218,10 @@ def test_random_slopes_are_of_one_size_and_keep_within_the_bound():
     d = slopes(0.125, 40.0, 3)
     t = np.array(d.times)
     values = np.array(d.values)
-    assert (t[0], t[-1], values[0], len(t)) == (0.0, 40.0, 0.0, 321)
+    assert t[0] == 0.0
+    assert t[-1] == 40.0
+    assert values[0] == 0.0
+    assert len(t) == 321
     assert set(np.round(np.diff(values) / np.diff(t), 9)) == {-1.0, 1.0}
     assert np.abs(values).max() == 1.0
     assert slopes(0.125, 40.0, 3).values == d.values != slopes(0.125, 40.0, 4).values
@@ -231,6 +232,7 @@ def test_a_triangle_has_mean_0_over_every_period_and_then_goes_on(sign):
     d = flip(0.1, sign)
     t = np.array(d.times)
     values = sign * np.array(d.values)
-    assert (len(t), t[-1]) == (42, pytest.approx(4.1))
+    assert len(t) == 42
+    assert t[-1] == pytest.approx(4.1)
     np.testing.assert_allclose(np.diff(values) / 0.1, [*[-1.0, 1.0] * 20, 1.0])
     np.testing.assert_allclose(values[1:-1] + values[:-2], 0.0, atol=1e-12)

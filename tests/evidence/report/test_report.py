@@ -130,7 +130,10 @@ def block(condition="nominal", plant="duffing", winner=None, **unbeaten):
 
 def leading(*cells) -> Any:
     """The first line of the first screen: its cell of ITAE."""
-    boards = [board for cell in cells for board in cell]
+    boards = []
+    for cell in cells:
+        for board in cell:
+            boards.append(board)
     return sections.leaders(boards).rows[0][1 + sections.METRICS.index("itae")]
 
 

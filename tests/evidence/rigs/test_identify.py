@@ -114,7 +114,8 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     one, again, other = (
         smc.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6)
     )
-    assert (one.values, one.errors) == (again.values, again.errors)
+    assert one.values == again.values
+    assert one.errors == again.errors
     assert one.values != other.values
     for found in (one, other):
         assert found.values["mass"] == pytest.approx(AXIS.values["mass"], rel=0.02)
@@ -186,9 +187,8 @@ def test_a_search_stays_within_its_ranges_to_the_last_bit():
 
 
 CARRIAGE = {"M": 3.2, "b": 4.1, "cf": 1.7, "offset": 0.6}
-NOISE = math.hypot(
-    1e-5, 2e-5 / math.sqrt(12.0)
-)  # m, of the positions of `pushed`, with their rounding to counts
+# m, of the positions of `pushed`, with their rounding to counts
+NOISE = math.hypot(1e-5, 2e-5 / math.sqrt(12.0))
 
 
 def positions(u, quantities, x=0.0, v=0.0):
@@ -312,7 +312,9 @@ def test_the_twin_of_a_run_has_the_whole_machine_of_the_run():
 
 def test_columns_of_a_plant_s_record_are_those_of_its_channels():
     columns = identification._of_plant(smc.plant("pendulum_network"), None).columns
-    assert (columns.x, columns.u, columns.reference) == (("x0", "x1", "x2", "x3", "x4"), "u0", "r0")
+    assert columns.x == ("x0", "x1", "x2", "x3", "x4")
+    assert columns.u == "u0"
+    assert columns.reference == "r0"
 
 
 def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
@@ -372,7 +374,8 @@ def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
     moved.save(tmp_path / "trace.npz")
     for name in ("a.npz", "a.csv"):
         read = dict(records.load(tmp_path / name))
-        assert all(np.array_equal(read[key], columns[key]) for key in columns)
+        for key in columns:
+            assert np.array_equal(read[key], columns[key])
     assert np.array_equal(
         records.of_trace(smc.load(tmp_path / "trace.npz"), AXIS.columns)["x"], columns["x"]
     )

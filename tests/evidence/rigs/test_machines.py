@@ -47,7 +47,9 @@ def told(value):
         case float():
             text = f"{value:.9g}"
         case _ if dataclasses.is_dataclass(value):
-            given = {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
+            given = {}
+            for one in dataclasses.fields(value):
+                given[one.name] = getattr(value, one.name)
             plain = {one.name: one.default for one in dataclasses.fields(value)}
             text = (
                 f"{type(value).__name__} "

@@ -33,7 +33,9 @@ def told(row):
 
 @pytest.mark.slow
 def test_the_twin_and_the_published_numbers_fit_records_as_the_page_tells():
-    records = [dict(np.load(DATA / f"qube-{name}.npz")) for name in ("06", "18", "30", "42", "11")]
+    records = []
+    for name in ("06", "18", "30", "42", "11"):
+        records.append(dict(np.load(DATA / f"qube-{name}.npz")))
     ours, published = (
         np.array([[fit["theta"], fit["alpha"], fit["u"]] for fit in rig.fits(records)]).T
         for rig in (RIG, RIG.set("driver"))
@@ -66,7 +68,9 @@ def test_a_fall_is_told_with_its_time_in_place_of_a_number():
 @pytest.fixture(scope="module")
 def brushes():
     """Records, and the brush that each has."""
-    checked = [RIG.checked(dict(np.load(path))) for path in sorted(DATA.glob("qube-*.npz"))]
+    checked = []
+    for path in sorted(DATA.glob("qube-*.npz")):
+        checked.append(RIG.checked(dict(np.load(path))))
     return [(record, zero(Values(**RIG.values), record)["brush"]) for record in checked]
 
 
@@ -84,12 +88,15 @@ def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_d
     for record, whole in brushes:
         ends = np.linspace(round(START_TIME / PERIOD), len(record["t"]), parts + 1).astype(int)
         for first, last in itertools.pairwise(ends):
-            part = {name: column[first - ends[0] : last] for name, column in record.items()}
+            part = {}
+            for name, column in record.items():
+                part[name] = column[first - ends[0] : last]
             off += [
                 (found - whole + PITCH / 2) % PITCH - PITCH / 2
                 for found in zero(values, part).values()
             ]
-    assert (len(off), np.sum(np.abs(off) > PITCH / 16)) == (read, wrong)
+    assert len(off) == read
+    assert np.sum(np.abs(off) > PITCH / 16) == wrong
 
 
 @pytest.mark.parametrize(("brush", "amplitude"), [(0.3, 0.5), (0.6, 0.8), (0.0, 0.5)])

@@ -51,7 +51,9 @@ def test_the_cable_takes_energy_from_a_turn_and_hardly_any_from_a_fall():
 
 def test_a_motor_that_brakes_damps_falls_more():
     rig = smc.rig("qube_servo_3")
-    a = [np.abs(moved(rig, volts, np.radians(25.0), 0.6)[2]) for volts in (None, 0.0)]
+    a = []
+    for volts in (None, 0.0):
+        a.append(np.abs(moved(rig, volts, np.radians(25.0), 0.6)[2]))
     late = [one[200:].max() for one in a]
     assert late[1] < 0.9 * late[0]
 

@@ -96,7 +96,10 @@ def test_columns_that_a_replay_needs_and_knows():
 )
 def test_columns_that_are_no_signals_are_named(change, words):
     columns = record([0.0, 1.0]) | change
-    given = {name: values for name, values in columns.items() if values is not None}
+    given = {}
+    for name, values in columns.items():
+        if values is not None:
+            given[name] = values
     if None in change.values():
         del given["r"]
     with pytest.raises(smc.ScenarioError) as error:
@@ -109,13 +112,10 @@ def test_a_state_comes_from_a_cubic_about_it_and_at_the_start_from_the_first_sam
     data = {"t": t, "x": 1.0 + 2.0 * t - 3.0 * t**2 + 4.0 * t**3, "q": np.where(t > 0.505, 9.0, t)}
     for at in (0, 3, 50, 99):
         x, v = records.state(data, NAMES, 0.01, at)
-        assert (x[0], v[0]) == (
-            pytest.approx(data["x"][at]),
-            pytest.approx(2.0 - 6.0 * t[at] + 12.0 * t[at] ** 2),
-        )
-    assert records.state(data, NAMES, 0.01, 35)[1][1] == pytest.approx(
-        1.0
-    )  # 15 samples on each side, and no further
+        assert x[0] == pytest.approx(data["x"][at])
+        assert v[0] == pytest.approx(2.0 - 6.0 * t[at] + 12.0 * t[at] ** 2)
+    # 15 samples on each side, and no further
+    assert records.state(data, NAMES, 0.01, 35)[1][1] == pytest.approx(1.0)
     assert abs(records.state(data, NAMES, 0.01, 36)[1][1] - 1.0) > 0.01
     np.testing.assert_allclose(records.rate(data["x"], 0.01), 2.0 - 6.0 * t + 12.0 * t**2)
     known = dataclasses.replace(NAMES, state=("x", "q", "t", "t"))

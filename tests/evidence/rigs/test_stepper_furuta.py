@@ -19,9 +19,8 @@ from smc_mujoco.evidence.rigs import firmware
 from smc_mujoco.evidence.rigs.firmware import FOUR_STATES, LINEAR, STEPS, TICK, TWO_STATES
 from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS
 
-RECORDS = (
-    Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"
-)  # of the machine; not part of the package
+# of the machine; not part of the package
+RECORDS = Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"
 
 
 def memory(**values):
@@ -63,7 +62,9 @@ def test_the_linear_law_has_a_dead_band_and_the_sliding_modes_a_gate():
             for rate in (gate - 1.0, gate + 1.0)
         )
         assert inside - outside == pytest.approx(315.0)
-        early = [firmware.acceleration(kind, 0.0, m, 0.0, 0.0)[0] for m in (tilted, memory())]
+        early = []
+        for m in (tilted, memory()):
+            early.append(firmware.acceleration(kind, 0.0, m, 0.0, 0.0)[0])
         assert early[0] == early[1]
 
 
@@ -71,10 +72,8 @@ def test_rates_are_tustins_filter_with_the_nominal_period():
     from scipy.signal import bilinear
 
     b, a = bilinear([1.0, 0.0], [1.0 / 450.0, 1.0], 1.0 / TICK)
-    assert (pytest.approx(b[0], rel=1e-5), pytest.approx(a[1], abs=1e-4)) == (
-        firmware.SLOPE,
-        firmware.OLD_RATE,
-    )
+    assert pytest.approx(b[0], rel=1e-5) == firmware.SLOPE
+    assert pytest.approx(a[1], abs=1e-4) == firmware.OLD_RATE
     m = memory(STARTED=1.0, ALPHA=1.0, ALPHA_RATE=10.0)
     passed = firmware.measure(SimpleNamespace(q=math.radians(1.1), x=0.0, t=0.0123), m)
     assert passed == 0.0123
@@ -92,7 +91,8 @@ def test_a_move_is_a_trapezoid_that_ends_at_its_target():
             assert m[firmware.REF] == 20.0
     assert max(rates) == 12.0
     assert np.abs(np.diff(rates)).max() <= 3.0 * 60.0 * TICK
-    assert (m[firmware.REF], m[firmware.REF_RATE]) == (19.0, 0.0)
+    assert m[firmware.REF] == 19.0
+    assert m[firmware.REF_RATE] == 0.0
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -106,9 +106,8 @@ def test_the_compiled_run_is_that_of_the_reference_loop(law):
 
 
 def test_a_machine_that_tips_stops_its_motor():
-    rig = smc.rig(
-        "stepper_furuta", holding_torque=1e-3, arm_friction=0.05
-    )  # too weak to move the arm
+    # too weak to move the arm
+    rig = smc.rig("stepper_furuta", holding_torque=1e-3, arm_friction=0.05)
     trace = smc.run(rig.scenario(x0=(0.0, 0.03), duration=2.0))
     assert abs(trace.x[-1, 1]) > 1.0
     assert (trace.u[-100:] == 0.0).all()
@@ -142,14 +141,10 @@ def test_the_figures_of_known_signals_are_theirs():
     )
     assert found["alpha_rms"] == pytest.approx(math.sqrt(2.0), rel=1e-3)
     assert found["centroid"] == pytest.approx(50.0 * 26.0 / 256.0, abs=0.02)
-    assert (found["ratio"], found["phase"]) == (
-        pytest.approx(2.0, rel=1e-6),
-        pytest.approx(-180.0, abs=1e-6),
-    )
-    assert (found["gain"], found["lag"]) == (
-        pytest.approx(1.2, rel=1e-3),
-        pytest.approx(-80.0, abs=0.1),
-    )
+    assert found["ratio"] == pytest.approx(2.0, rel=1e-6)
+    assert found["phase"] == pytest.approx(-180.0, abs=1e-6)
+    assert found["gain"] == pytest.approx(1.2, rel=1e-3)
+    assert found["lag"] == pytest.approx(-80.0, abs=0.1)
     assert found["acceleration_rms"] == 10.0
 
 
@@ -177,7 +172,8 @@ def test_seconds_count_about_their_mean_and_rests_by_their_angle():
     )
     assert found["second_50"] == pytest.approx(0.0, abs=1e-9)
     assert found["second_90"] == pytest.approx(9.0 / math.sqrt(2.0), rel=1e-3)
-    assert (found["resting_50"], found["resting_90"]) == (2.0, 4.0)
+    assert found["resting_50"] == 2.0
+    assert found["resting_90"] == 4.0
 
 
 def test_a_run_is_logged_as_the_firmware_sees_it():
@@ -210,7 +206,8 @@ def test_a_recording_is_loaded_and_one_that_lacks_a_column_refused(tmp_path):
             out.writerows(np.column_stack([rows[name] for name in names]).tolist())
         if names == told.COLUMNS:
             loaded = told.load(path)
-            assert all(np.array_equal(loaded[name], rows[name]) for name in rows)
+            for name in rows:
+                assert np.array_equal(loaded[name], rows[name])
     with pytest.raises(smc.ScenarioError, match="lacks the column position_clamped"):
         told.load(path)
 
@@ -250,7 +247,9 @@ def test_the_plain_twin_has_the_machines_order_reversed(monkeypatch):
     monkeypatch.setitem(told.CONDITIONS, "hold", {"duration": 22.0})
     plain = told.predicted(rig, "hold", 1, told.PLAIN)
     assert told.ordered(plain) == (0, -1.0)
-    alone = {law: told.standing(runs, "alpha_rms") for law, runs in plain["set 1"].items()}
+    alone = {}
+    for law, runs in plain["set 1"].items():
+        alone[law] = told.standing(runs, "alpha_rms")
     assert alone["linear"] > 100.0 * max(alone["two_states"], alone["four_states"])
     whole = told.predicted(rig, "hold", 2)["set 1"]
     assert {law: len(runs) for law, runs in whole.items()} == dict.fromkeys(told.ORDER, 2)
