@@ -58,7 +58,7 @@ HEAVY = {
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
 # modules of public names, which anything may import
-SHELVES = {"signals", "hardware", "errors", "design", "fidelity"}
+SHELVES = {"signals", "hardware", "errors", "design", "audits", "fidelity"}
 PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))

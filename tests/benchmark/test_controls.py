@@ -7,7 +7,7 @@ import pytest
 from helpers import reference
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import controls, entry
+from smc_mujoco.benchmark import controls
 from smc_mujoco.control.law import law_function
 
 
@@ -95,23 +95,3 @@ def test_who_does_nothing_holds_a_quadrotor_in_the_air():
     (scenario,) = smc.problem("quadrotor/slow_rotors@2").scenarios(controls.zero("quadrotor"), [0])
     trace = smc.run(scenario)
     np.testing.assert_allclose(trace.e, trace.e[0] * np.ones((len(trace.t), 1)), rtol=0, atol=1e-9)
-
-
-@pytest.mark.parametrize("law", ["oracle(w=9.0)", "oracle_of('quadrotor', 9.0, 1.5)"])
-def test_an_entry_is_not_the_oracle(law, tmp_path):
-    code = f"from smc_mujoco.benchmark import controls\n\nmine = controls.{law}\n"
-    (tmp_path / "law.py").write_text(code)
-    about = {"name": "mine", "source": "here", "licence": "MIT", "division": "one set"}
-    lines = [f'{key} = "{value}"' for key, value in about.items()]
-    (tmp_path / "entry.toml").write_text("\n".join([*lines, 'authors = ["A"]']))
-    with pytest.raises(smc.ScenarioError, match="oracle"):
-        entry.read(tmp_path).law("duffing")
-
-
-def test_what_the_true_model_has_not_is_refused():
-    for fields in (
-        {"clock": smc.Clock(jitter=1e-4)},
-        {"jump": smc.Jump(time=0.1, factors={"mass": 2.0})},
-    ):
-        with pytest.raises(smc.ScenarioError, match="true"):
-            smc.Scenario(plant="duffing", law=told(), model="true", **fields)

@@ -60,22 +60,6 @@ def test_an_entry_has_its_gains_on_each_plant(tmp_path):
     assert one.digest != free.digest
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"gains": '[gains."duffing/noise"]\nk = 2.0', "division": "free"}, "duffing/noise"),
-        ({"gains": "[gains.duffing]\nk = 2.0"}, r"\[gains.all\]"),
-        ({"gains": '[gains.all]\nk = "2"'}, "gain k"),
-        ({"division": "best of many"}, "division"),
-        ({"authors": []}, "authors"),
-        ({"place": 1}, "place"),
-    ],
-)
-def test_an_entry_that_says_too_little_or_too_much_is_refused(change, words, tmp_path):
-    with pytest.raises(ScenarioError, match=words):
-        entry.read(written(tmp_path / "entry", **change))
-
-
 def test_an_entry_has_one_law(tmp_path):
     folder = written(tmp_path / "entry")
     (folder / "law.c").write_text("", encoding="utf-8")

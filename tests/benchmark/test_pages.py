@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import enter, pages, results, runs, suite
+from smc_mujoco.benchmark import enter, pages, runs, suite
 from smc_mujoco.benchmark.enter import RESULT, TABLE
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import write_json
@@ -178,17 +178,6 @@ def test_a_forged_result_is_left_out_and_the_others_stand(tmp_path, forge, words
     assert not (tmp_path / "site" / "smc-30@1" / "aforged.html").exists()
     with pytest.raises(ScenarioError, match=words):
         smc.results(tmp_path / "results")
-
-
-def test_the_result_of_another_name_is_left_out(tmp_path):
-    """Else a folder could hold better runs under the name of an entry."""
-    entered(tmp_path / "results", "slow", 2.0)
-    entered(tmp_path / "results", "fast", 1.0)
-    about = json.loads((tmp_path / "results" / "smc-30@1" / "slow" / RESULT).read_text())
-    said(entry=about["entry"])(tmp_path / "results" / "smc-30@1" / "fast")
-    found, (refused,) = results.sound(tmp_path / "results")
-    assert [list(one.entries) for one in found] == [["slow"]]
-    assert "the result of 'slow', in another's folder" in str(refused)
 
 
 def test_a_folder_without_results_is_told(tmp_path):

@@ -114,23 +114,6 @@ def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains()
     assert visible[7].law.source.kind == "shipped"
 
 
-@pytest.mark.parametrize(
-    ("call", "thing"),
-    [
-        (lambda: smc.problem("duffing/noise"), "plant/condition@version"),
-        (lambda: smc.problem("duffin/noise@1"), "plant"),
-        (lambda: smc.problem("duffing/noize@1"), "condition"),
-        (lambda: smc.problem("duffing/noise@99"), "version"),
-        (lambda: smc.problem("duffing/noise@1").scenarios("pid", "hidden"), "hidden"),
-        (lambda: smc.problem("duffing/noise@1").scenarios("pid", [-1]), "instance"),
-        (lambda: smc.problem("duffing/noise@1").scenarios("pid", [0], -1), "seed"),
-    ],
-)
-def test_what_does_not_exist_is_refused_in_a_sentence(call, thing):
-    with pytest.raises(smc.ScenarioError, match=thing):
-        call()
-
-
 def made_trace(one: problems.Problem, e: np.ndarray, u: np.ndarray) -> smc.Trace:
     """A trace of a problem's first instance with errors, relative to the start, and commands."""
     (scenario,) = one.scenarios("pid", [0])

@@ -24,7 +24,6 @@ from scipy.linalg import solve_continuous_are
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
-from smc_mujoco.studies import scene
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
 ORDER = {"acrobot": [1, 0], "pendubot": [0, 1]}  # channels of shoulder and elbow
@@ -80,19 +79,6 @@ def test_published_criteria_give_their_published_score(robot, version):
             ends.append(boards.score(values, version))
         assert ends[0] - 5e-4 <= row.score <= ends[1] + 5e-4, row.name
         assert boards.score(row, version) == pytest.approx(row.score, abs=0.0023), row.name
-
-
-def test_unrounded_criteria_give_their_unrounded_score():
-    """History SAC's run on the acrobot's board: scores.csv of its data."""
-    values = (
-        1.0000000000000007,
-        8.077749161960673,
-        1.8037118196867141,
-        0.009546752841345449,
-        88.4965605525382,
-    )
-    row = dict(zip(VERSIONS["v2"], values, strict=True))
-    assert boards.score(row) == pytest.approx(0.6552699844147534, abs=1e-12)
 
 
 @ROBOTS
@@ -426,15 +412,6 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
     np.testing.assert_allclose(last, row, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    "fields", [{"x0": 3.0}, {"u_max": 3.0}, {"disturbance": smc.Sine(0.5, 1.0)}]
-)
-def test_a_run_by_other_rules_has_no_row(fields, refused, traces):
-    trace = traces["acrobot"]
-    other = dataclasses.replace(trace, scenario=boards.entry("acrobot", **fields))
-    refused(lambda: boards.board(other))
-
-
 def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(capsys):
     folder = str(ROOT / "examples" / "entries" / "soft_relay")
     script.main(["acrobot", "--no-robustness", "--entry", folder])
@@ -442,9 +419,3 @@ def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(capsys):
     assert printed.count("soft relay") == 2
     assert "trajectory + " not in printed
     assert printed.index("History SAC") < printed.index("soft relay")
-
-
-@ROBOTS
-def test_the_scenes_of_the_machines_can_be_read(robot):
-    found = scene.read(ROOT / "benchmarks" / f"{robot}.py")
-    assert {scenario.plant.name for _, _, scenario in found.runs()} == {robot}

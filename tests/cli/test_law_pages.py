@@ -69,22 +69,6 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert f"{len(lines)} of {len(laws())} {words}" in flat(out)
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (("--needs", "smooth"), "unknown property of a law 'smooth': choose from continuous, "),
-        (("--plant", "dufing"), "did you mean 'duffing'?"),
-        (("pid", "--needs", "continuous"), "--needs is for lists: leave out NAME"),
-    ],
-)
-def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
-    code, out, err = call("list", *words)
-    assert code == 2
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert sentence in err
-
-
 # one of them
 
 
@@ -145,20 +129,6 @@ def test_a_plant_has_a_page_with_its_parameters_and_its_sets(call):
     assert "set crazyflie the default" in said
     assert max(map(len, printed.splitlines())) <= 80
     assert "set" not in flat(call("list", "duffing")[1]).partition("parameters")[2]
-
-
-@pytest.mark.parametrize(
-    ("typed", "meant"),
-    [("supertwist", "super_twisting"), ("Classical", "classical"), ("kalmann", "kalman")],
-)
-def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
-    code, out, err = call("list", typed)
-    assert code == 2
-    assert out == ""
-    assert (
-        err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean "
-        f"{meant!r}?\n"
-    )
 
 
 def test_a_law_of_a_file_has_a_page_that_says_how_to_make_it(call, tmp_path, monkeypatch):

@@ -299,28 +299,6 @@ def test_show_prints_every_metric_with_its_value(call, trace):
     }
 
 
-def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):
-    scenario = smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=0.3)
-    trace = smc.run(scenario)
-    trace.save(folder / "pole.npz")
-    code, out, err = call("show", "pole.npz")
-    assert code == 0
-    assert err == ""
-    _, first, driven, second, free = re.split(
-        r"^(driven: slide \(m\)|free: hinge \(rad\)) *$", out, flags=re.M
-    )
-    assert first == "driven: slide (m)"
-    assert second == "free: hinge (rad)"
-    for part, group, x, u in ((driven, "driven", "m", "N"), (free, "free", "rad", None)):
-        rows = {}
-        for line in part.splitlines():
-            if line and not line.startswith(" "):
-                rows[line.split()[0]] = line.split()[1:3]
-        assert rows["peak"] == [tables.number(smc.scores(trace)[group]["peak"]), x]
-        assert rows.get("max_u", ["", None])[1] == u
-        assert "spread_bound" not in rows
-
-
 def test_a_run_that_failed_has_no_answer():
     wild = smc.plant("duffing", alpha=-1e6, beta=0.0)
     runs = {"wild": smc.run(smc.Scenario(plant=wild, law="none", duration=0.1))}
@@ -338,18 +316,6 @@ def test_show_exports_the_columns_and_draws_the_figure_that_it_names(call, trace
     assert (folder / "one.mat").exists()
     assert (folder / "drawn" / "one.svg").read_text().rstrip().endswith("</svg>")
     assert (folder / "drawn" / "one.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_name_with_a_newline_or_with_markup_is_one_line(call, folder):
-    path = folder / "a\n\x1b[31m[b].npz"
-    refused(call("show", path), r"a\n\x1b[31m[b].npz")
-    law = smc.law("classical").named("[/b]")
-    smc.run(smc.Scenario(plant="duffing", law=law, duration=0.05)).save(path)
-    _, out, _ = call("show", path, "--export", "csv")
-    assert out.startswith("duffing under [/b](k=4, c=2.5), 0.05 s at 0.001 s")
-    assert [line for line in out.splitlines() if line.startswith("wrote")] == [
-        rf"wrote {folder}/a\n\x1b[31m[b].csv"
-    ]
 
 
 # mistakes

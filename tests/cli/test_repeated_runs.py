@@ -6,17 +6,14 @@ import dataclasses
 import math
 
 import arms
-import numpy as np
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.apart import apart
-from smc_mujoco.analysis.step_halving import MARK, SCORE_NOTE, halved, nudged
+from smc_mujoco.analysis.step_halving import MARK, halved, nudged
 from smc_mujoco.cli import scene as show
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
-from smc_mujoco.metrics.limit_cycle import channel_cycle
-from smc_mujoco.metrics.tip import tip_scores
 
 pytestmark = pytest.mark.quick
 
@@ -124,31 +121,10 @@ def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
         assert "failed" in said[2]
 
 
-def test_a_limit_cycle_that_half_the_step_loses_is_marked_and_the_mark_explained():
-    swing = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0))
-    swing = dataclasses.replace(swing, s=np.sin(400.0 * swing.t)[:, None])
-    runs = {"nominal": {"a": swing}}
-    again = {"nominal": {"a": [dataclasses.replace(swing, s=0.0 * swing.s), swing]}}
-    (table,) = tables.answers(["chattering_amplitude", "chattering_frequency"], runs, again)
-    amplitude, frequency = map(tables.number, channel_cycle(swing))
-    assert f"none{MARK} to {amplitude}" in cells(table)[0]
-    assert f"none{MARK} to {frequency}" in cells(table)[0]
-    assert table.caption == SCORE_NOTE
-
-
 def arm(duration: float) -> smc.Scenario:
     return dataclasses.replace(
         arms.scenario("sway", arms.gained("passivity_based")), duration=duration
     )
-
-
-def test_scores_of_a_tip_are_marked_like_all_others():
-    swung = smc.run(arm(0.02))
-    off = dataclasses.replace(swung, x=swung.x + 0.01 * (swung.t > 0.015)[:, None])
-    (table,) = tables.tips("t", {"a": swung, "b": swung}, {"a": [swung, off], "b": [swung, swung]})
-    largest, other = (tables.number(1e3 * tip_scores(one)["max_error"]) for one in (swung, off))
-    assert [f"{largest}{MARK} to {other}" in row for row in cells(table)] == [True, False]
-    assert table.caption == SCORE_NOTE
 
 
 def test_every_number_of_a_scene_is_compared_with_its_runs_again(monkeypatch, tmp_path):

@@ -5,15 +5,12 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
-import arms
 from rich.console import Console
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.cli import tables
-from smc_mujoco.common.text import number
-from smc_mujoco.metrics.tip import tip_scores
 
 VOLTS = smc.run(
     smc.Scenario(
@@ -45,27 +42,6 @@ def test_a_summary_has_commands_in_volts_and_reactions_in_newton_metres():
 def test_a_table_of_scores_has_commands_in_volts():
     assert "V/s" in printed(tables.scores("runs", {"none": VOLTS}))
     assert "V/s" in printed(tables.answers(["tv_rate"], {"nominal": {"none": VOLTS}}))
-
-
-def test_a_table_of_tips_has_the_scores_in_its_units():
-    law = arms.hybrid()
-    start = arms.scenario("wall", arms.hybrid()).x0
-    free, pressing = smc.run(
-        [
-            smc.Scenario(plant="panda", law=law, x0=start, duration=0.005, contact=one)
-            for one in ("none", "wall")
-        ]
-    )
-    (table,) = tables.tips("runs", {"pressing": pressing})
-    cells = {}
-    for column in table.columns:
-        cells[str(column.header)] = str(next(iter(column.cells)))
-    values = tip_scores(pressing)
-    assert cells["largest\nerror\nmm"] == number(1e3 * values["max_error"])
-    assert cells["mean\nforce\nN"] == number(values["mean_force"])
-    assert cells["touching\n%"] == number(values["touching"])
-    assert cells["deepest\nmm"] == number(1e3 * values["depth"])
-    assert "touching" not in printed(tables.tips("runs", {"free": free}))
 
 
 def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_marked():

@@ -3,7 +3,6 @@ results.
 """
 
 import contextlib
-import io
 import json
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,13 +11,11 @@ import numpy as np
 import pytest
 from helpers.arguments import told
 from helpers.certificates import certificate
-from rich.console import Console
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
-from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.rig import Fall
 
@@ -183,17 +180,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "cli.scene.filmed": [Path("film.mp4")],
     },
 }
-REFUSED = (
-    "certify",
-    "certify duffing --check d.json",
-    "certify duffing --worst",
-    "claims --json --mutants",
-    "claims --papers --quick",
-    "report --paper gaber --law pid",
-    "rig --fit emps a.csv --set mass=much",
-    "rig emps a.csv b.csv",
-    "rig emps a.csv --starts 3",
-)
 AXIS = (
     "mass 120.500 0.021 95.1 kg",
     "offset 6.000 7 -3.16 N",
@@ -390,26 +376,3 @@ def test_a_command_hands_on_what_it_is_given_and_prints_what_comes_back(line, ca
     text = " ".join("\n".join([*notes, out]).replace(str(tmp_path), ".").split())
     missing = [part for part in GIVEN[line][1] if part not in text]
     assert (code, missing) == (GIVEN[line][0], []), text
-
-
-@pytest.mark.parametrize("line", REFUSED)
-def test_options_that_do_not_go_together_are_one_sentence_before_any_work(line, called):
-    code, notes, out, said = called(line)
-    assert code == 2
-    assert notes == []
-    assert out.strip() == ""
-    assert said.startswith("smc-mujoco: ")
-    assert said.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("full", "id", "verdict"), [(True, "1;36m3", "1;31m"), (False, "36m 3", "31m")]
-)
-def test_a_terminal_shows_a_claim_s_id_in_cyan_and_a_refuted_one_in_red(full, id, verdict):
-    console = Console(
-        record=True, width=80, file=io.StringIO(), force_terminal=True, color_system="standard"
-    )
-    tables.print_claims(CLAIMS[:1], console, full)
-    text = console.export_text(styles=True)
-    assert f"\x1b[{id}\x1b[0m" in text
-    assert f"\x1b[{verdict}○ refuted, flips" in text

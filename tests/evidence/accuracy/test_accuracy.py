@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import warnings
 
 import pytest
 
@@ -143,49 +142,6 @@ def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
     assert "default gains" not in str(table), "no law beside it is tuned"
     beside = type(table)([table[0], dataclasses.replace(table[0], law="pid", gains="shipped")])
     assert "default gains: hierarchical; tuned: pid." in " ".join(str(beside).split())
-
-
-@pytest.mark.slow
-def test_a_table_reads_as_text_html_data_and_file(tmp_path):
-    plants = [double_integrator(), "van_der_pol"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        table = smc.audits.accuracy(
-            ["classical", "observer_free"], plants, (4e-3, 2e-3, 1e-3), seeds=2, duration=4.0
-        )
-    text = str(table)
-    assert max(map(len, text.splitlines())) <= 80
-    assert repr(table) == text
-    assert text.index("duffing, constant: |e| in m") < text.index("van_der_pol, constant")
-    assert table._repr_html_().count("<table") == 2
-    assert "order of e" in table._repr_html_()
-    assert repr(load(table.save(tmp_path / "table.json"))[0]) == repr(table[0])
-    figure = table.plot(tmp_path / "table.svg")
-    assert len(figure.axes) == 4
-    assert (tmp_path / "table.svg").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"periods": (1e-3,)}, "give two or more different ones in s"),
-        ({"periods": (1e-3, 1e-3)}, "give two or more different ones in s"),
-        ({"periods": (0.0, 1e-3)}, "a period is 0: give a number greater than 0"),
-        (
-            {"conditions": "period_10ms"},
-            "condition 'period_10ms' sets control_period, which accuracy varies",
-        ),
-        (
-            {"plants": dataclasses.replace(smc.plant("double_pendulum"), mixed=("m", "rad"))},
-            "double_pendulum has driven channels in m and rad: give a plant with one unit",
-        ),
-        ({"laws": "nonsense"}, "nonsense"),
-        ({"seeds": 0}, "seeds is 0"),
-    ],
-)
-def test_what_cannot_be_measured_is_one_sentence(options, message):
-    with pytest.raises(smc.ScenarioError, match=message):
-        smc.audits.accuracy(**{"laws": "classical", "plants": "duffing"} | options)
 
 
 def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(

@@ -7,9 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from smc_mujoco.draw import style
-from smc_mujoco.evidence.accuracy.orders import orders
-from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling, fit, scaling
+from smc_mujoco.evidence.accuracy.scaling import fit, scaling
 
 pytestmark = pytest.mark.quick
 
@@ -91,34 +89,3 @@ def test_an_order_that_is_not_the_promised_one_has_a_remark(errors, theory, why)
     found = measured(errors, theory=theory).why
     assert why in found
     assert bool(why) == bool(found)
-
-
-def test_a_picture_has_no_line_for_an_order_that_tells_nothing():
-    """Super-twisting's e had the order 1.14 +- 1.35 here, and a legend with the order of its s."""
-    h = (4e-3, 2e-3, 1e-3, 5e-4)
-
-    def law(name, e, low, high):
-        errors = ((8.0**e, 4.0**e, 2.0**e, 1.0),)
-        scalings = {}
-        for q in "es":
-            scalings[q] = Scaling(
-                errors=errors, used=h, order=e, low=low, high=high, theory=2.0, why=""
-            )
-        about = {
-            "plant": "duffing",
-            "condition": "constant",
-            "gains": "shipped",
-            "unit": "m",
-            "floor": 1e-9,
-        }
-        return Accuracy(law=name, periods=h, runs=4, failed=0, **about, **scalings)
-
-    told = law("twisting", 1.75, 1.25, 2.25)
-    untold = law("super_twisting", 1.14, -0.21, 2.49)
-    page = orders([told, untold])
-    for ax in page.axes:
-        fits = []
-        for line in ax.lines:
-            if np.unique(np.asarray(line.get_xdata())).size > 1:
-                fits.append(line)
-        assert {line.get_color() for line in fits} == {style.law_colour("twisting")}

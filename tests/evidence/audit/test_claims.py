@@ -7,12 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import critical_delay
-from smc_mujoco.cli import main
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, measure
@@ -31,7 +28,6 @@ from smc_mujoco.evidence.audit.verdict import (
     Beside,
     check,
     combined,
-    judged,
     ratio,
     verdict,
 )
@@ -79,11 +75,6 @@ def test_never_is_later_than_any_time():
     assert check("x", math.inf, ">", 3.0).holds
     assert check("x", 3.0, "<", math.inf).holds
     assert not check("x", math.inf, "<=", 3.0).holds
-
-
-def test_a_relation_that_is_none_is_refused():
-    with pytest.raises(ScenarioError, match="relation '=='"):
-        check("x", 1.0, "==", 1.0)
 
 
 def test_ratios_of_nothing_are_no_numbers_that_hold():
@@ -163,11 +154,6 @@ def test_universal_claims_are_those_of_the_list():
     assert {id for id, one in GABER.claims.items() if one.quantifier == UNIVERSAL} == UNIVERSALS
 
 
-def test_two_numbers_of_one_name_are_refused():
-    with pytest.raises(ScenarioError, match="'yes' twice"):
-        judged(entry(), {"study": [YES, YES]})
-
-
 def entry(id="900", found=(YES,), note=""):
     told = {"text": "text", "where": "here", "measured": "this", "holds_if": "< 2", "note": note}
     return Entry(
@@ -239,15 +225,6 @@ def test_claims_are_json_without_loss(only):
 
 def test_every_claim_of_the_list_is_there_once_and_in_order():
     assert list(GABER.claims) == LIST.split()
-
-
-def test_unknown_claims_and_sets_are_refused():
-    with pytest.raises(ScenarioError, match="unknown claim '2'"):
-        claims(only=["2"])
-    with pytest.raises(ScenarioError, match="unknown set of gains 'tund': did you mean 'tuned'"):
-        claims(only=["3"], gains=["tund"])
-    with pytest.raises(ScenarioError, match="no set of gains"):
-        claims(only=["3"], gains=[])
 
 
 def test_late_claims_come_last_and_every_one_is_reported(only):
@@ -475,19 +452,6 @@ def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
 
 
 # the command
-
-
-@pytest.fixture
-def terminal(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "100")
-    return lambda *arguments: CliRunner().invoke(main.app, ["claims", *arguments])
-
-
-def test_a_folder_is_no_file_to_write(terminal, tmp_path):
-    (tmp_path / "folder.json").mkdir()
-    done = terminal("3", "--evidence", str(tmp_path / "folder.json"))
-    assert done.exit_code == 2
-    assert "it is a folder" in done.stderr
 
 
 @pytest.mark.parametrize(

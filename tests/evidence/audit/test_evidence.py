@@ -2,7 +2,6 @@
 seal shows changes.
 """
 
-import colorsys
 import dataclasses
 import json
 import re
@@ -17,11 +16,9 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
-from smc_mujoco.draw import style
-from smc_mujoco.evidence.audit import evidence, figure
+from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.verdict import ANSWERS, REFUTED, VERDICTS
-from smc_mujoco.evidence.commands import tables
+from smc_mujoco.evidence.audit.verdict import REFUTED
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.run_key import portable_key
 
@@ -200,14 +197,6 @@ def test_a_change_breaks_the_seal(done, tmp_path):
         evidence.check(tmp_path / "none.json")
 
 
-def test_evidence_of_a_table_or_under_another_ending_is_refused(folder, done, tmp_path):
-    with pytest.raises(ScenarioError, match="leave out the table"):
-        dataclasses.replace(done, sealable=False).save(tmp_path / "a.json")
-    with pytest.raises(ScenarioError, match=r"end the name in \.json"):
-        done.save(tmp_path / "evidence.txt")
-    assert evidence.document(audit(folder, only=["2"]))["left_out"] == ["1"]
-
-
 # figure and table
 
 
@@ -216,17 +205,6 @@ def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
     assert head.get_title().get_text() == "Claims of A. Nobody: Small"
     assert (tmp_path / "checks.svg").is_file()
     assert done._repr_html_() == done.claims._repr_html_()
-
-
-def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_another():
-    for colours in (figure.COLOURS, tables.COLOURS):
-        answers = {colours[answer] for answer in ANSWERS.values()}
-        assert len(answers) == 1
-        assert len({colours[verdict] for verdict in VERDICTS} | answers) == 5
-    refuted, partly, supported = (
-        colorsys.rgb_to_hls(*style.rgb(figure.COLOURS[v]))[0] for v in VERDICTS[2::-1]
-    )
-    assert 0.0 < refuted < 0.05 < partly < 0.15 < supported < 0.4  # red, amber, green
 
 
 # the command

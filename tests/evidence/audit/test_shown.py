@@ -3,10 +3,8 @@
 import math
 import re
 
-import numpy as np
 import pytest
 
-from smc_mujoco.evidence.audit.figure import COLOURS, figure
 from smc_mujoco.evidence.audit.verdict import (
     DERIVED,
     EXISTENTIAL,
@@ -112,13 +110,6 @@ VERDICTS = {  # of each claim: verdict, by gains, what decides by gains, slack o
     "6": ("in part", "yes", "in part", "= 0.25 (< 1", "= inf (<= 0.02", [0.75, 0.75, -math.inf]),
     "7": ("not testable", "not testable", "not testable", "Nothing", "Nothing", []),
 }
-MARKS = {
-    "supported": "●",
-    "partly supported": "◐",
-    "refuted": "○",
-    "not testable": "–",
-    "in part": "◧",
-}
 
 
 def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_limit(claims):
@@ -136,59 +127,3 @@ def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_lim
         assert found == pytest.approx(slack, abs=1e-9)
     assert re.findall("(.) ([0-9])", summary(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
     assert re.findall("(.) ([0-9])", summary([])) == []
-
-
-def test_a_notebook_shows_claims_in_a_line_each(claims):
-    listed = re.sub(' style="[^"]*"', "", claims._repr_html_())
-    rows = re.findall("<tr><td>.*?</tr>", listed)
-    assert len(rows) == len(claims)
-    for one, row in zip(claims, rows, strict=True):
-        assert row.startswith(
-            f"<tr><td>{one.id}</td><td>sentence {one.id} of &lt;this&gt; &amp; $that$</td>"
-        )
-        assert f"<b>{MARKS[one.verdict]} {one.verdict}" in row
-        assert (", flips" in row) == one.flips
-
-
-def test_the_figure_has_a_row_for_each_claim_and_a_dot_for_each_check(claims):
-    """At log10 of measured over asked, from a thousandth to a thousand; filled where it holds."""
-    page = figure(claims, "Claims of nobody")
-    (axes,) = page.axes
-    labels = axes.get_yticklabels()
-    assert [one.get_text()[:3] for one in labels] == [
-        f"{MARKS[one.verdict]} {one.id}" for one in claims
-    ]
-    assert [one.get_color() for one in labels] == [COLOURS[one.verdict] for one in claims]
-    dots = set()
-    for line in axes.lines:
-        if line.get_marker() == "o":
-            for x, y in np.asarray(line.get_xydata()):
-                dots.add((round(x, 3), round(y, 3), line.get_markerfacecolor() != "none"))
-    above = -0.125
-    below = 0.125
-    holds = round(math.log10(0.25), 3)
-    never = 3.0
-    due = {(holds, k + above, True) for k in (0, 1, 2, 5)} | {
-        (holds, k + below, True) for k in (0, 1, 3, 5)
-    }
-    due |= {
-        (never, 1 + below, False),
-        (never, 2 + below, False),
-        (never, 3 + above, False),
-        (never, 5 + below, False),
-    }
-    due |= {
-        (round(math.log10(0.0288 / 0.25), 3), 4 + above, True),
-        (0.301, 4 + above, False),
-        (3.0, 4 + above, False),
-    }
-    due |= {(-3.0, 4 + below, True)}
-    assert {(x, round(y, 3), filled) for x, y, filled in dots} == due
-    (legend,) = page.legends
-    assert [one.get_text() for one in legend.get_texts()] == list(MARKS)
-    narrow = figure(
-        [claim("1", {"slow": [NEAR]}, text="a sentence as long as papers write them")],
-        "One",
-        size=(4.0, 5.0),
-    )
-    assert narrow.axes[0].get_yticklabels()[0].get_text().endswith("…")

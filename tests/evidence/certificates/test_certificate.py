@@ -1,12 +1,8 @@
 """What a certificate says of typed theorems, and draws of them."""
 
-import re
-
 import numpy as np
 import pytest
 from helpers.certificates import LEVELS, certificate, part
-from helpers.sketch import made as trace_of
-from matplotlib.contour import ContourSet
 from scipy.interpolate import RegularGridInterpolator
 
 import smc_mujoco as smc
@@ -95,19 +91,6 @@ def test_units_of_margins_follow_from_those_of_the_plant():
     assert units["slope"] == "N m/s"
 
 
-def test_a_notebook_shows_each_condition_with_its_margin():
-    cells = re.sub(r"(<[^>]*>\s*)+", "|", SAID["a switching law"]._repr_html_())
-    assert "|saturated PD|damping|yes|0.500 N m s/rad|" in cells
-    assert re.search(r"\|start\|(no|NO)\|-0\.100", cells)
-
-
-def test_a_certificate_prints_no_control_characters():
-    named = dict(SAID["without d"].data) | {"law": {"name": "\x1b[31mred", "gains": {}}}
-    assert repr(Certificate(data=named)).startswith(
-        r"<Certificate of \x1b[31mred on inverted_pendulum: proven by"
-    )
-
-
 def test_w_is_bilinear_odd_states_alike_and_1_outside():
     made = SAID["fails and falls"]
     grid = RegularGridInterpolator((LEVELS["x"], LEVELS["s"]), LEVELS["W"])
@@ -133,27 +116,6 @@ def test_the_set_of_a_switching_law_is_a_strip_and_of_a_stable_loop_everything()
         smc.ScenarioError, match="the certificate of terminal on duffing has no level sets"
     ):
         SAID["a terminal surface"].level(x, s)
-
-
-@pytest.mark.parametrize(("name", "axes"), [("fails and falls", 2), ("a switching law", 1)])
-def test_the_plane_of_a_certificate_has_its_levels_bound_and_runs(name, axes, monkeypatch):
-    monkeypatch.setattr("smc_mujoco.evidence.certificates.figure.AXIS_POINTS", 81)
-    made = SAID[name]
-    run = trace_of(smc.Scenario(plant=made.plant, law="pid", duration=0.2))
-    page = made.figure(traces=[run])
-    assert len(page.axes) == axes
-    for ax in page.axes:
-        levels = set()
-        for lines in ax.collections:
-            if isinstance(lines, ContourSet) and not lines.filled:
-                levels |= set(lines.levels)
-        assert {0.1, 0.6} <= levels
-        assert any(np.array_equal(line.get_xdata(), run.x[:, 0]) for line in ax.lines)
-        dashed = []
-        for line in ax.lines:
-            if line.get_linestyle() == "--":
-                dashed.append(line.get_xdata()[0])
-        assert dashed == ([-0.3, 0.3] if axes == 2 else [])
 
 
 def test_what_has_no_level_sets_has_no_plane():

@@ -429,26 +429,6 @@ def test_the_checker_refuses_fields_that_the_format_lacks_and_fields_left_out(pl
     assert tried > 50
 
 
-@pytest.mark.parametrize(
-    ("plant", "law", "path", "value"),
-    [
-        ("pendulum_network", "observer_free", ("plant", "n"), 5.05),
-        ("pendulum_network", "observer_free", ("plant", "n"), 5.0),
-        ("duffing", "super_twisting", ("plant", "parameters", "beta"), None),
-        ("duffing", "classical", ("parts", 0, "V", "springs"), None),
-        ("duffing", "classical", ("parts", 0, "conditions", 0, "margin"), None),
-        ("duffing", "classical", ("disturbance",), None),
-    ],
-)
-def test_the_checker_refuses_what_no_plant_has(plant, law, path, value):
-    whole: Any = copy.deepcopy(
-        certificate(
-            plant, law, **{"disturbance": 0.1, "slope": 0.1} if plant == "duffing" else {}
-        ).data
-    )
-    assert refused(changed(whole, path[:-1], lambda it: it.__setitem__(path[-1], value)))
-
-
 def test_a_field_that_is_there_twice_is_refused(tmp_path, monkeypatch):
     made = certificate("duffing", "classical")
     twice = tmp_path / "twice.json"
@@ -699,9 +679,3 @@ def test_the_command_proves_writes_and_checks(tmp_path, monkeypatch, capsys):
         main(["certify", "--check", "d.json"])
     assert ended.value.code == 2
     assert "refused" in capsys.readouterr().err
-
-
-def test_without_python_flint_one_sentence_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "flint", None)
-    with pytest.raises(smc.ScenarioError, match=r"smc.audits.certify needs .*smc-mujoco\[proof\]"):
-        smc.audits.certify(scenario("duffing"))

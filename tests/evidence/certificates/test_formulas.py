@@ -314,51 +314,6 @@ def test_a_form_attracts_where_it_falls_on_a_dense_grid():
 # the maker
 
 
-def refused(**changes):
-    """What is said of a scenario that no theorem is about."""
-    fields = {"plant": "duffing", "law": smc.law("observer_free", lam=6.0, k1=3.0)} | changes
-    with pytest.raises(smc.ScenarioError) as error:
-        smc.audits.certify(smc.Scenario(**fields))
-    return str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "what"),
-    [
-        (
-            {"plant": "pendulum_network", "law": "super_twisting"},
-            "super_twisting on the 5 pendulums of a network",
-        ),
-        ({"model": "nominal"}, "model='nominal'"),
-        ({"law": "classical", "surface": "linear"}, "a surface"),
-        ({"feedforward": smc.Sine(1.0, 2.0)}, "a feedforward"),
-        ({"reference": smc.Constant(0.5)}, "a reference that is not 0"),
-        (
-            {"plant": "pendulum_network", "u_max": (5.0, 6.0, 6.0, 6.0, 6.0)},
-            "gains or bounds by channel",
-        ),
-        ({"actuator": smc.DCMotor(command="voltage")}, "a motor's voltage as u"),
-        ({"law": smc.law("classical", c=0.0)}, "classical with c not above 0"),
-        ({"mechanism": "springs"}, "mechanism 'springs'"),
-    ],
-)
-def test_what_no_theorem_is_about_is_named(changes, what):
-    assert refused(**changes) == f"there is no theorem for {what}: certify a scenario without it"
-
-
-@pytest.mark.parametrize(
-    ("given", "within", "words"),
-    [
-        ("duffing", None, "certify is about a Scenario, not 'duffing'"),
-        (None, 2.0, "within is 2.0: give a class"),
-        (None, smc.Uncertainty(disturbance=1.0, hold=0.2), "about disturbances alone"),
-    ],
-)
-def test_what_is_no_class_or_scenario_is_named(given, within, words):
-    with pytest.raises(smc.ScenarioError, match=words):
-        smc.audits.certify(given or smc.Scenario(plant="duffing", law="observer_free"), within)
-
-
 @pytest.mark.parametrize(
     ("signals", "bounds"),
     [

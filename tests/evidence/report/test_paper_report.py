@@ -2,17 +2,14 @@
 beside it.
 """
 
-from types import SimpleNamespace
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from typer.testing import CliRunner
 
-import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.audit import evidence
-from smc_mujoco.evidence.report.paper import gains, report
+from smc_mujoco.evidence.report.paper import report
 from tests.evidence.report.test_report import check_page
 
 DATA = """
@@ -62,18 +59,3 @@ def test_the_page_has_claims_with_their_numbers_and_evidence_and_figure_beside_i
 def test_the_command_refuses_what_is_of_the_study(made):
     done = CliRunner().invoke(app, ["report", "--paper", str(made[0]), "--seeds", "3"])
     assert (done.exit_code, "leave them out with --paper" in done.stderr) == (2, True)
-
-
-def test_gains_of_an_audit_are_listed_once_with_their_plants():
-    def used(law, plant):
-        return SimpleNamespace(scenario=smc.Scenario(plant=plant, law=law))
-
-    classical = smc.law("classical", k=2.0, c=1.5)
-    first = {"a": used(classical, "van_der_pol"), "b": used(classical, "duffing")}
-    again = {"c": used(classical, "duffing")}
-    claim = SimpleNamespace(verdicts={"slow": "supported"})
-    done: Any = SimpleNamespace(
-        claims=[claim], used={"1": {"slow": first}, "2": {"slow": again, "other": {}}}
-    )
-    (table,) = gains(done)
-    assert table.rows == [("classical", "k = 2, c = 1.5", "van_der_pol, duffing")]

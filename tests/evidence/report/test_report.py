@@ -7,7 +7,6 @@ skipped, but not in CI.
 
 import dataclasses
 import html.parser
-import math
 import os
 import re
 import shutil
@@ -18,7 +17,6 @@ import pytest
 from helpers.commands import python
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.common import extras
 from smc_mujoco.common.tabular import Cell
 from smc_mujoco.evidence.audit.verdict import Claim
@@ -157,21 +155,6 @@ def leading(*cells) -> Any:
 )
 def test_the_first_screen_names_the_laws_that_are_unbeaten_in_the_most_conditions(cells, cell):
     assert leading(*cells) == cell
-
-
-def test_a_margin_says_where_its_search_ended_and_what_theory_says():
-    some = {"plant": "duffing", "kind": "delay", "unit": "s", "resolution": 0.01, "searched": 0.5}
-    found = []
-    for law, value, theory in (("a", 0.5, None), ("b", 0.25, 0.3), ("c", math.nan, math.inf)):
-        found.append(Margin(**some, law=law, value=value, theory=theory))
-    table = sections.margin_table("duffing", found)
-    assert table.headings == ["law", "input delay (s)"]
-    cells = [cell for _, cell in table.rows]
-    assert [(cell.text, cell.below) for cell in cells] == [
-        ("≥ 0.500", ""),
-        ("0.250", "theory 0.300"),
-        ("none", "theory never"),
-    ]
 
 
 def test_what_comes_from_outside_is_escaped():

@@ -78,15 +78,6 @@ def test_the_published_dry_friction_is_what_its_arctangent_reaches():
             assert values[name] == pytest.approx(cf * reached, rel=1e-3)
 
 
-@pytest.mark.parametrize(("count", "step"), [(400, 2e-3), (50, 0.1)])
-def test_a_record_too_short_or_too_slow_for_torques_is_refused(count, step, swung):
-    t = step * np.arange(count)
-    with pytest.raises(
-        smc.ScenarioError, match="for its torques give at least 1 s, with a sample every"
-    ):
-        RIG.fit(dict.fromkeys(swung[1], t))
-
-
 @pytest.fixture(scope="module")
 def known():
     if not DATA.exists():

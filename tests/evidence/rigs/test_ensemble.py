@@ -194,27 +194,6 @@ def test_a_law_by_name_has_the_gains_of_the_rig():
     assert its["twisting"].source.kind == "default"
 
 
-def test_the_command_compares_laws_on_every_set(tmp_path):
-    words = [
-        "compare",
-        "--rig",
-        PENDULUM.name,
-        "--law",
-        "pid(kp=30, kd=6),super_twisting",
-        "--seeds",
-        "1",
-    ]
-    done = CliRunner().invoke(app, [*words, "--duration", "0.1", "--out", str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    assert "tv_rate: no law wins on all 5 parameter sets (none on any)" in done.output
-    assert "10 runs, 0 of them failed, " in done.output
-    own = ["--condition", "noise=0.1"]
-    for given in (["duffing"], ["--condition", "noise"], own, ["--gains", "study"]):
-        refused = CliRunner().invoke(app, [*words, *given])
-        assert refused.exit_code == 2
-        assert "--rig brings its own plant, parameter sets and gains: leave out" in refused.output
-
-
 def test_the_command_identifies_from_files(tmp_path):
     rig = smc.rig("emps")
     smc.run(rig.scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(

@@ -85,28 +85,6 @@ def test_columns_that_a_replay_needs_and_knows():
     assert torques.known == ("t", "x", "q", "a", "b", "r", "rq", "f", "p", "v")
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"q": None, "u": None}, "no column q, u, r (it has t, x"),
-        ({"x": [[1.0], [2.0]]}, "column x of axis is"),
-        ({"x": [1.0, np.nan]}, "column x of axis is nan at sample 1"),
-        ({"x": [1.0]}, "column x of axis has 1 samples and t has 2"),
-    ],
-)
-def test_columns_that_are_no_signals_are_named(change, words):
-    columns = record([0.0, 1.0]) | change
-    given = {}
-    for name, values in columns.items():
-        if values is not None:
-            given[name] = values
-    if None in change.values():
-        del given["r"]
-    with pytest.raises(smc.ScenarioError) as error:
-        checked(given, NAMES, 1.0, "axis")
-    assert words in str(error.value)
-
-
 def test_a_state_comes_from_a_cubic_about_it_and_at_the_start_from_the_first_sample():
     t = 0.01 * np.arange(100)
     data = {"t": t, "x": 1.0 + 2.0 * t - 3.0 * t**2 + 4.0 * t**3, "q": np.where(t > 0.505, 9.0, t)}

@@ -105,19 +105,6 @@ def test_a_changed_quantity_changes_the_machine_and_its_source():
     assert QUBE.scenario("none").plant.parameters["L"] != 0.1
 
 
-@pytest.mark.parametrize(
-    ("name", "values", "words"),
-    [
-        ("cube_servo", {}, "unknown rig 'cube_servo': did you mean 'qube_servo'?"),
-        ("qube_servo", {"arm": 1.0}, "unknown quantity of qube_servo 'arm'"),
-        ("qube_servo", {"arm_length": -1.0}, "arm_length is -1: give at least 0.01"),
-    ],
-)
-def test_what_is_no_rig_is_refused(name, values, words):
-    with pytest.raises(smc.ScenarioError, match=re.escape(words)):
-        smc.rig(name, **values)
-
-
 def test_the_twin_repeats_its_own_record(record):
     """The start's velocities come from positions, and a count in them is forgotten after two
     seconds.
