@@ -171,7 +171,10 @@ def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
     """Return the amplitude of x of the largest unstable cycle within a stable one in the same turn
     of L, or 0.
     """
-    smaller = [other for other in unstable if other[0] < one[0]]
+    smaller = []
+    for other in unstable:
+        if other[0] < one[0]:
+            smaller.append(other)
     *turns, turn = _turns(loop, [*smaller, one])
     return max(
         (a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0),

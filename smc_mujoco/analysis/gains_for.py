@@ -93,9 +93,9 @@ def gains_for(
             "gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3"
         )
     if not base.law.uniform:
-        cure = "give one number for each gain"
         raise ScenarioError(
-            f"gains_for needs gains that all channels share, not {base.law}: {cure}"
+            f"gains_for needs gains that all channels share, not {base.law}: give one number for "
+            "each gain"
         )
     predictions = 0
     with bar(f"gains of {base.law.name} on {base.plant.name}") as progress_bar:
@@ -125,11 +125,12 @@ def gains_for(
             [dataclasses.replace(chosen, duration=DURATION)], ["disturbance"]
         )
     if math.isnan(tolerated.value):
-        words = (
+        warnings.warn(
             f"{base.law.name} with these gains does not hold {base.plant.name}, even without "
-            "a disturbance"
+            "a disturbance",
+            ScenarioWarning,
+            users_stacklevel(),
         )
-        warnings.warn(words, ScenarioWarning, users_stacklevel())
     law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions))
     return Design(
         law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed
@@ -148,13 +149,9 @@ def _forces(
     """
     speeds = [speed for speed in SPEEDS if speed**2 <= headroom * (1.0 + SIZE_TOLERANCE)]
     if not speeds:
-        found = (
-            f"{1.0 / headroom:.3g} times what u_max allows, and the search makes them at "
-            f"most {SPEEDS[0] ** -2:g}"
-        )
         raise ScenarioError(
-            f"forces among the gains are {found} times smaller: give smaller gains, or a larger "
-            "u_max"
+            f"forces among the gains are {1.0 / headroom:.3g} times what u_max allows: give "
+            "smaller gains, or a larger u_max"
         )
     cycles = {speed: cycle(speed) for speed in speeds}
     first = min((speed for speed, one in cycles.items() if one), default=math.inf)
@@ -165,18 +162,17 @@ def _forces(
     }
     if not slow:
         lowest = min(one.frequency for one in cycles.values() if one)
-        found = f"the law oscillates at {lowest:.3g} Hz at least, at whatever speed"
-        raise ScenarioError(f"frequency is {frequency:g}, and {found}: give a larger one")
+        raise ScenarioError(
+            f"frequency is {frequency:g}, and the law oscillates at {lowest:.3g} Hz at least: give "
+            "a larger one"
+        )
 
     def force(speed: float) -> float:
-        if amplitude is None or not slow[speed]:
-            allowed = math.inf
-        else:
-            allowed = amplitude / slow[speed].amplitude_range[1]
-        if amplitude is None:
-            size = 1.0
-        else:
-            size = min(allowed, MAX_SIZE_RATIO)
+        size = 1.0
+        if amplitude is not None:
+            size = MAX_SIZE_RATIO
+            if slow[speed]:
+                size = min(amplitude / slow[speed].amplitude_range[1], size)
         return min(size * speed**2, headroom)
 
     ordered = sorted(slow, key=lambda speed: (force(speed), speed), reverse=True)
@@ -246,15 +242,10 @@ def _force_headroom(base: Scenario) -> float:
     force = min(accelerations) if with_model else u_max
     limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
     # the force k / b of a gain k that is divided by b
-    if law.template:
-        declared = law.template.gains
-    else:
-        declared = {}
-    limits |= {
-        name: u_max * law.gains[gain.over]
-        for name, gain in declared.items()
-        if gain.over is not None
-    }
+    declared = law.template.gains if law.template else {}
+    for name, gain in declared.items():
+        if gain.over is not None:
+            limits[name] = u_max * law.gains[gain.over]
     sizes = []
     for name, gain in law.gains.items():
         if name in limits and 0.0 < abs(gain) < math.inf:
@@ -288,13 +279,11 @@ def _largest_size(predicted: Callable[[float], float], wanted: float, limit: flo
             amplitude_at(min(size, limit))
     while not low:
         if high < 1.0 / MAX_SIZE_RATIO:
-            found = f"that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}"
-            if math.isinf(amplitude):
-                found = f"gains {MAX_SIZE_RATIO:g} times smaller oscillate faster than wanted"
             raise ScenarioError(
-                f"amplitude is {wanted:g}, and {found}: give a larger amplitude or frequency"
+                f"even gains {MAX_SIZE_RATIO:g} times smaller oscillate by more than {wanted:g} or "
+                "too fast: give a larger amplitude or frequency"
             )
-        amplitude = amplitude_at(high / SIZE_STEP)
+        amplitude_at(high / SIZE_STEP)
     while low < limit and high == math.inf:
         amplitude_at(min(low * SIZE_STEP, limit))
     while min(high, limit) > low * (1.0 + SIZE_TOLERANCE):

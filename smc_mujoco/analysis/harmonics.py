@@ -86,8 +86,9 @@ class Loop:
         s = scenario.resolved
         plant = s.plant
         if not s.clock.regular:
-            cure = "leave the clock out, or measure it in a run"
-            raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
+            raise ScenarioError(
+                "chattering is predicted for samples that are on time: measure it in a run"
+            )
         if s.stepper is not None:
             raise ScenarioError(
                 "chattering is not predicted for a Stepper, whose queue is no lag: measure it in "
@@ -95,9 +96,10 @@ class Loop:
             )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
-                moves = f"joint {joint!r} of {plant.name} moves from {low:g} to {high:g}"
-                cure = "measure it in a run, with smc.score, or choose another plant"
-                raise ScenarioError(f"chattering is predicted about x = 0, and {moves}: {cure}")
+                raise ScenarioError(
+                    f"chattering is predicted about x = 0, which joint {joint!r} of {plant.name} "
+                    "does not reach: measure it in a run"
+                )
         # the joint without an actuator that the channel moves, if there is one
         free = channel + plant.driven
         if free < plant.n:
@@ -155,10 +157,7 @@ class Loop:
             )
             self.rows = dof_ids(model)
             self.nv = model.nv
-            if gear is None:
-                self.gap = 0.0
-            else:
-                self.gap = self._joint_gap(gear, model, data)
+            self.gap = self._joint_gap(gear, model, data) if gear else 0.0
 
     def _nominal_model(self, joint: int) -> tuple[float, ...]:
         """Return nominal f and g of a joint at rest, and the derivatives of f with its x and v."""
@@ -205,9 +204,8 @@ class Loop:
         without one.
         """
         s = self.scenario.resolved
-        if s.sensor is None:
-            count = 0.0
-        else:
+        count = 0.0
+        if s.sensor:
             count = s.sensor.quantum(s.plant.units[self.channel] == "rad")
         if not count:
             return 0.0
@@ -268,11 +266,10 @@ class Loop:
         force = np.eye(model.nv)[dof]
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, mobility[None], force[None])
-        motors = []
+        rotor = gear.rotor_inertia
         for part in self.scenario.resolved.actuator:
             if isinstance(part, DCMotor):
-                motors.append(part)
-        rotor = gear.rotor_inertia + sum(motor.gear**2 * motor.rotor_inertia for motor in motors)
+                rotor += part.gear**2 * part.rotor_inertia
         return gear.gap * rotor * float(mobility[dof])
 
     def wave(self, amplitude: float, omega: float) -> Wave:
@@ -411,21 +408,19 @@ class Controller:
         of the channel, then those of the joint that it moves, if any; `models` is as
         `Loop._nominal_model` returns it for these.
         """
-        if len(motion) == 4:
-            x, v, q, dq = motion
-        else:
-            x, v, q, dq = (*motion, np.empty(0), np.empty(0))
+        x, v, *of_joint = motion
+        q = dq = np.empty(0)
+        joint_model = (0.0,) * 4
+        if of_joint:
+            q, dq = of_joint
+            joint_model = models[1]
         start = np.zeros(len(FIELDS))
-        if len(motion) == 4:
-            of_joint = models[1]
-        else:
-            of_joint = (0.0,) * 4
         for field, value in fixed.items():
             start[field] = value
         out = np.empty((len(x), 2))
         y = np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
-        model = np.array([models[0], of_joint])
+        model = np.array([models[0], joint_model])
         done = _run(
             self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out
         )

@@ -238,7 +238,9 @@ def restoring_force(
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
     def force(x: np.ndarray) -> np.ndarray:
-        nominal = [plant.nominal(np.full(plant.n, each), v, 0, p) for each in x]
+        nominal = []
+        for each in x:
+            nominal.append(plant.nominal(np.full(plant.n, each), v, 0, p))
         return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
 
     return force

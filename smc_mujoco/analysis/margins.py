@@ -153,20 +153,18 @@ class Kind:
         """Return the largest level by linear theory; None if there is none for the law, the plant
         or the condition.
         """
-        changed = (
-            base.disturbance
-            or base.friction
-            or base.mismatch
-            or base.jump
-            or base.sensor
-            or base.feedforward
+        changes = (
+            base.disturbance,
+            base.friction,
+            base.mismatch,
+            base.jump,
+            base.sensor,
+            base.feedforward,
+            not base.clock.regular,
+            base.resolved.model != "none",
+            base.resolved.reference != REST,
         )
-        if (
-            changed
-            or not base.clock.regular
-            or base.resolved.model != "none"
-            or base.resolved.reference != REST
-        ):
+        if any(changes):
             return None  # not in the theory
         try:
             return self.theory(base)
@@ -185,12 +183,9 @@ def tolerates(trace: Trace) -> bool:
 
 
 def _critical_delay(base: Scenario) -> float | None:
-    estimated = base.resolved.velocity.name != "measured"
-    # not in the theory
-    if base.actuator or estimated:
-        lam_k1 = None
-    else:
-        lam_k1 = theory.linear_gains(base.law)
+    if base.actuator or base.resolved.velocity.name != "measured":
+        return None  # not in the theory
+    lam_k1 = theory.linear_gains(base.law)
     if lam_k1 is None:
         return None
     return theory.critical_delay(base.plant, *lam_k1, base.control_period)
@@ -207,10 +202,7 @@ def _with_mass(base: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or
     by its own name.
     """
-    if base.plant.mass in base.mismatch:
-        mass = base.plant.mass
-    else:
-        mass = "mass"
+    mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
 
 
@@ -324,10 +316,7 @@ def margins(
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
     """
     if isinstance(plants, Scenario):
-        words = f"[{plants.plant.name!r}], [{plants.law.name!r}]"
-        raise ScenarioError(
-            f"margins are of plants and laws, not of a scenario: call smc.margins({words})"
-        )
+        raise ScenarioError("margins are of plants and laws, not of a scenario: give their names")
     duration = QUICK_DURATION if quick else DURATION
     bases = []
     for plant in listed("plants", plants):

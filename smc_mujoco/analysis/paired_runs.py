@@ -331,7 +331,10 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     if scenario.sensor:
         for group in driven:
             seen = max(seen, scenario.sensor.quantum(group.unit == "rad") / 2)
-    bounds = [bound for bound in scenario.limits if math.isfinite(bound)]
+    bounds = []
+    for bound in scenario.limits:
+        if math.isfinite(bound):
+            bounds.append(bound)
     u = MIN_COMMAND_SHARE * max(bounds, default=0.0)
     by_unit = {
         "s": scenario.control_period,

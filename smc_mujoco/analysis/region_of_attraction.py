@@ -92,15 +92,10 @@ class Basin:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
-        fields = {}
-        for field in dataclasses.fields(self):
-            fields[field.name] = getattr(self, field.name)
         data = {}
-        for name, value in fields.items():
-            if isinstance(value, np.ndarray):
-                data[name] = value.tolist()
-            else:
-                data[name] = value
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            data[field.name] = value.tolist() if isinstance(value, np.ndarray) else value
         return write_json(with_ending(path, ".json"), data, indent=None)
 
 
@@ -151,16 +146,10 @@ def basin(
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
     nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
     if x is None:
-        xs = np.linspace(-reach, reach, nx)
-    else:
-        xs = x
-    return basin_of(
-        base,
-        xs,
-        np.linspace(-VELOCITY_RATIO * reach, VELOCITY_RATIO * reach, nv) if v is None else v,
-        threads,
-        report,
-    )
+        x = np.linspace(-reach, reach, nx)
+    if v is None:
+        v = np.linspace(-VELOCITY_RATIO * reach, VELOCITY_RATIO * reach, nv)
+    return basin_of(base, x, v, threads, report)
 
 
 def basin_of(
@@ -172,10 +161,10 @@ def basin_of(
 ) -> Basin:
     """Map the region of attraction of any scenario as `basin` does."""
     if base.plant.mixed:
-        words = (
-            "has channels in m and rad, which cannot start from the same state: map another plant"
+        raise ScenarioError(
+            f"{base.plant.name} has channels in m and rad, which cannot start from the same state: "
+            "map another plant"
         )
-        raise ScenarioError(f"{base.plant.name} {words}")
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
         raise ScenarioError(
             f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant "
@@ -183,9 +172,9 @@ def basin_of(
         )
     shortest = math.ceil(MIN_SAMPLES / HORIZONS[0])
     if base.samples < shortest:
-        cure = f"give at least {shortest * base.control_period:g} s"
         raise ScenarioError(
-            f"duration {base.duration:g} s is too short to tell what comes to rest: {cure}"
+            f"duration {base.duration:g} s is too short to tell what comes to rest: give at least "
+            f"{shortest * base.control_period:g} s"
         )
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
@@ -200,7 +189,9 @@ def basin_of(
         left = []
         for begin in range(0, len(undecided), size):
             batch = undecided[begin : begin + size]
-            cases = [dataclasses.replace(shortened, x0=x[k], v0=v[j]) for j, k in batch]
+            cases = []
+            for j, k in batch:
+                cases.append(dataclasses.replace(shortened, x0=x[k], v0=v[j]))
             for index, trace in stream(cases, threads, summed(report, done, needed)):
                 if trace.broken:
                     broken.setdefault(base.law.name, trace.broken)
@@ -246,10 +237,7 @@ def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int |
     middle = square.size // 2
     first_half = square[:middle].max()
     second_half = square[middle:].max()
-    if final or start > NEAR_SQUARE:
-        near = NEAR_SQUARE
-    else:
-        near = 0.0
+    near = NEAR_SQUARE if final or start > NEAR_SQUARE else 0.0
     ratio = MAX_FINAL_RATIO if final else MAX_EARLY_RATIO
     stays = inside.all() and second_half <= max(ratio * first_half, near)
     if final or stays:
@@ -261,10 +249,8 @@ def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int |
     changes = np.stack(
         [np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)]
     )
-    u_max = float(np.max(trace.scenario.resolved.u_max))
-    if math.isfinite(u_max):
-        u_reach = u_max
-    else:
+    u_reach = float(np.max(trace.scenario.resolved.u_max))
+    if not math.isfinite(u_reach):
         u_reach = np.abs(trace.u).max()
     rests = (changes <= REST_TOLERANCE * np.array([x_reach, v_reach, u_reach])).all()
     if rests and not inside.any():

@@ -252,7 +252,9 @@ def indices(
 
 def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
     """Return which points lie within all cuts, (N,)."""
-    sides = [(shares[:, cut.axis] > cut.share) == cut.above for cut in cuts]
+    sides = []
+    for cut in cuts:
+        sides.append((shares[:, cut.axis] > cut.share) == cut.above)
     if sides:
         return np.logical_and.reduce(sides)
     return np.ones(len(shares), bool)

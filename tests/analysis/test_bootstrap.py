@@ -24,7 +24,9 @@ def test_an_interval_of_negated_values_is_the_mirror_image():
 @pytest.mark.parametrize("n", [6, 40])
 def test_the_interval_of_a_share_covers_as_often_as_its_docstring_says(n):
     """By the binomial distribution. The coverage is least beside the ends of intervals."""
-    intervals = [share_interval(k / n, n) for k in range(n + 1)]
+    intervals = []
+    for k in range(n + 1):
+        intervals.append(share_interval(k / n, n))
 
     def coverage(shares):
         covered = np.array([(one.low <= shares) & (shares <= one.high) for one in intervals])

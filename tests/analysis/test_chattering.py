@@ -52,7 +52,9 @@ def measured(trace, part=0.4):
     z = s - s.mean()
     up = np.flatnonzero((z[:-1] < 0) & (z[1:] >= 0))
     at = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
-    ranges = [np.ptp(s[a : b + 1]) for a, b in itertools.pairwise(up)]
+    ranges = []
+    for a, b in itertools.pairwise(up):
+        ranges.append(np.ptp(s[a : b + 1]))
     return np.median(ranges) / 2, (len(at) - 1) / (at[-1] - at[0])
 
 
@@ -386,7 +388,9 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, sna
         changes,
         tmp_path / "a.json",
     )
-    said = [json.dumps(one) for one in json.loads(path.read_text())]
+    said = []
+    for one in json.loads(path.read_text()):
+        said.append(json.dumps(one))
     assert [*said, bool(sure), bool(possible), *(one.marked for one in changes)] == snapshot
 
 
@@ -479,23 +483,6 @@ def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_res
     assert cycle.uncertainty < 0.05  # the law as it is, later and earlier: all of the outer cycle
 
 
-def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lost():
-    runs = (
-        (0.2, 0.25, 0.2),
-        (0.2, 0.2, 0.16),
-        (math.nan,) * 3,
-        (math.nan, 0.2),
-        (0.2, math.nan),
-        (-0.2, 0.2),
-    )
-    assert [relative_range(values) for values in runs] == pytest.approx(
-        [0.25, 0.25, 0.0, math.inf, math.inf, 2.0]
-    )
-    assert [relative_range(values, 0.2) for values in ((0.0, 0.25), (0.1, -0.2))] == pytest.approx(
-        [0.25, 0.0]
-    )
-
-
 def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too():
     """A number with an error of h c and so with c (h - h / 2) = c h / 2 between the runs: the error
     itself is told.
@@ -531,20 +518,3 @@ def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     assert (above.amplitude, above.frequency) == pytest.approx(
         measured(smc.run(scenario)), rel=0.15
     )
-
-
-@smc.law_function(gains={"k": 2.0})
-def broken(y, gain, m):
-    return math.nan * gain.k, y.v
-
-
-def test_bad_input_is_one_sentence(refused):
-    for call in (
-        lambda: chattering("classical", plant="duffing", channel=3),
-        lambda: chattering(smc.Scenario(plant="duffing", law="classical"), plant="duffing"),
-        lambda: chattering("clasical", plant="duffing"),
-        lambda: chattering("classical", plant="panda"),
-        lambda: chattering("classical", plant="duffing", clock=smc.Clock(missed=0.1)),
-        lambda: describing_function(broken(), 1.0, 3.0, 100),
-    ):
-        refused(call)

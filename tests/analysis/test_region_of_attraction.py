@@ -84,7 +84,9 @@ def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **e
         "r": 0.0 * t,
     }
     scenario = SimpleNamespace(resolved=SimpleNamespace(u_max=u_max))
-    columns = {name: values[:, None] for name, values in signals.items()}
+    columns = {}
+    for name, values in signals.items():
+        columns[name] = values[:, None]
     trace = SimpleNamespace(
         t=t, **columns, scenario=scenario, **{"failure": None, "diverged_at": None} | ended
     )

@@ -13,7 +13,7 @@ from helpers import reference
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case import search as attack
-from smc_mujoco.analysis.worst_case.search import Search, loop_frequency, recorded_force
+from smc_mujoco.analysis.worst_case.search import Search, recorded_force
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
@@ -148,15 +148,6 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
     assert searcher.swing.scenario.disturbance == disturbance
 
 
-@pytest.mark.parametrize("hertz", [2.0, 5.0])
-def test_the_frequency_of_a_sine_is_its_own(hertz):
-    t = np.linspace(0.0, 8.0, 8001)
-    x = np.sin(2.0 * np.pi * hertz * t + 0.1)[:, None]
-    clock = SimpleNamespace(control_period=1e-3)
-    found = loop_frequency(SimpleNamespace(t=t, x=x, r=0.0 * x, scenario=clock))
-    assert found == pytest.approx(hertz, abs=0.5 / 6.0)  # half a period of the last 6 s
-
-
 def test_a_relay_replays_from_its_record_to_the_last_bit():
     relay = Relay(2.0, s=0.3, rate=1.0, error=-0.2)
     base = scenario(plant=smc.plant("pendulum_network", n=2), law="super_twisting")
@@ -273,9 +264,6 @@ def test_bad_values_get_a_sentence(refused):
             scenario(noise=smc.Noise(position_error=smc.Step(0.1))), within=CLASSES["errors"]
         ),
         lambda: smc.worst_case(scenario(), within=smc.Uncertainty(parameters={"zz": (1, 2)})),
-        lambda: smc.worst_case(scenario(), "speed", CLASSES["force"]),
-        lambda: smc.worst_case(scenario(), within=2.0),
-        lambda: smc.worst_case("duffing", within=CLASSES["force"]),
         lambda: smc.worst_case([scenario(), scenario(duration=3.0)]),
         lambda: smc.worst_case(scenario(), within=smc.Uncertainty(friction_scale=(0, 2))),
     ):

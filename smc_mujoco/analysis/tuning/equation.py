@@ -82,7 +82,9 @@ class EquationRun:
         self.nominal = cfunctions.compile_nominal(plant)
         functions = callback.callback().address, self.nominal.address
         owners = self.model._address, self.data._address, state.address(self.record)
-        fields = {name: getattr(self.data, name) for name in FIELDS}
+        fields = {}
+        for name in FIELDS:
+            fields[name] = getattr(self.data, name)
         fields["userdata"][:] = callback.MAGIC, state.address(self.record)
         channels = prepared.mechanism.channels
         fields["qpos"][channels["qpos"]], fields["qvel"][channels["qvel"]] = s.x0, s.v0

@@ -327,5 +327,7 @@ def objectives(
             for its in cases
         ]
     traces = iter(run([case for its in cases for case in its], threads))
-    made = [goal.evaluation(its[0], [next(traces) for _ in its]) for its in cases]
+    made = []
+    for its in cases:
+        made.append(goal.evaluation(its[0], [next(traces) for _ in its]))
     return np.array([one.objective for one in made])

@@ -108,20 +108,22 @@ class Objective:
         constrain(self)
 
     def __str__(self) -> str:
-        terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
-        if self.u_max is None:
-            bound = ""
-        else:
-            bound = f", |u| <= {self.u_max:g}"
-        if self.chattering is None:
-            bound += ""
-        else:
+        conditions = ", ".join(condition.name for condition in self.conditions)
+        bound = ""
+        if self.u_max is not None:
+            bound += f", |u| <= {self.u_max:g}"
+        if self.chattering is not None:
             bound += f", predicted chattering of s <= {self.chattering:g}"
-        return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
+        return (
+            f"sum over {conditions} of ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
+            f"{bound}"
+        )
 
     def describe(self) -> dict[str, Any]:
         """Return it as JSON data, from which `restore` makes an equal one."""
-        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        values = {}
+        for f in dataclasses.fields(self):
+            values[f.name] = getattr(self, f.name)
         return values | {
             "conditions": list(map(str, self.conditions)),
             "starts": dataclasses.asdict(self.starts),
@@ -142,7 +144,9 @@ class Objective:
         for name in ("duration", "control_period", "u_max"):
             common[name] = getattr(self, name)
         first = Scenario(plant=plant, law=law, **common)
-        fields = [one.on(first.plant, self.duration) for one in self.conditions]
+        fields = []
+        for one in self.conditions:
+            fields.append(one.on(first.plant, self.duration))
         cases = []
         for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):
             self.starts.check_condition(condition.name, changes)

@@ -178,7 +178,9 @@ class Tuned(Tables):
         """Gain -> its lowest and highest value in sets whose J is within 3 % of the best one of
         their search.
         """
-        of_searches = [found.near(self.bounds) for found in self.searches]
+        of_searches = []
+        for found in self.searches:
+            of_searches.append(found.near(self.bounds))
         return {
             n: (min(one[n][0] for one in of_searches), max(one[n][1] for one in of_searches))
             for n in self.bounds
@@ -272,16 +274,17 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
     """Return the tunings, best first. Raise ScenarioError unless all were made in the same way."""
     if not tuned:
         raise ScenarioError("cannot compare []: give a list of tunings")
+    first = tuned[0]
     for one in tuned:
-        pairs = {}
-        for field in COMPARED_FIELDS:
-            pairs[field] = (getattr(one, field), getattr(tuned[0], field))
-        pairs["number of searches"] = len(one.searches), len(tuned[0].searches)
-        for name, (value, other) in pairs.items():
-            if value != other:
-                words = (
-                    f"{name} cannot be compared, {one.law.name} has {value}, "
-                    f"{tuned[0].law.name} {other}"
+        for name in COMPARED_FIELDS:
+            if getattr(one, name) != getattr(first, name):
+                raise ScenarioError(
+                    f"{one.law.name} and {first.law.name} were tuned with another {name}: tune "
+                    "them in the same way"
                 )
-                raise ScenarioError(f"laws tuned with unequal {words}: tune them in the same way")
+        if len(one.searches) != len(first.searches):
+            raise ScenarioError(
+                f"{one.law.name} and {first.law.name} were tuned in unequal numbers of searches: "
+                "tune them in the same way"
+            )
     return sorted(tuned, key=lambda one: one.objective)

@@ -317,7 +317,9 @@ class Search:
             ]
             keys = [one.key for one in self.tried[before:]]
             order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
-            ranks = {i: float(rank) for rank, i in enumerate(order)}
+            ranks = {}
+            for rank, i in enumerate(order):
+                ranks[i] = float(rank)
             if len(keys) == BATCH_MEMBERS:
                 evolution.tell([(points[i], ranks[i]) for i in range(BATCH_MEMBERS)])
 

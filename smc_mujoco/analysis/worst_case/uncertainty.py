@@ -375,7 +375,9 @@ class Members:
         else:
             force = member.force
         if self.times:
-            noise = [added(*pair) for pair in zip(member.noise, rows[-2:], strict=True)]
+            noise = []
+            for pair in zip(member.noise, rows[-2:], strict=True):
+                noise.append(added(*pair))
         else:
             noise = member.noise
         return Member(shares, force, np.array(noise), member.kind)

@@ -12,7 +12,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search, search_space
-from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, Evaluator
+from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
 from smc_mujoco.analysis.tuning.result import compare, load
 from smc_mujoco.analysis.tuning.search import tune
@@ -97,17 +97,6 @@ def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
     assert made[4:] == [0, 1, 2]
 
 
-def test_the_gains_of_search_i_are_set_i_and_the_law_has_those_of_the_least_objective(found):
-    assert found.sets == [one.best for one in found.searches]
-    least = min(found.sets, key=lambda one: one.objective)
-    assert tuple(found.gains.values()) == least.gains
-    assert found.objective == least.objective
-    assert found.spread == max(one.objective for one in found.sets) / least.objective - 1.0
-    record = found.record()
-    assert record["sets"] == [one.gains for one in found.sets]
-    assert record["objectives"] == pytest.approx([one.objective for one in found.sets], rel=1e-5)
-
-
 def test_each_objective_on_record_is_that_of_the_runs_of_its_own_search(found):
     traces = []
     for i, one in enumerate(found.searches):
@@ -142,32 +131,6 @@ def test_a_search_whose_equation_differs_from_mujoco_is_made_again_by_mujoco(fou
 
 def _of_twice_the_force(x, v, i, p):
     return (p.alpha * x[i] - p.beta * x[i] ** 3 - p.delta * v[i]) / p.M, 2.0 / p.M
-
-
-def test_a_search_has_three_stages_and_screens_at_less_cost(monkeypatch):
-    """Behind friction MuJoCo makes all of them: with one step a control period, until a descent
-    begins.
-    """
-    goal = Objective(conditions=("coulomb",), duration=0.1)
-    made = []
-    monkeypatch.setattr(
-        search,
-        "Evaluator",
-        lambda *args, **named: made.append(Evaluator(*args, **named)) or made[-1],
-    )
-    tuned = tune("duffing", "observer_free", objective=goal, searches=1)
-    by_equation, accurate, cheap = made
-    assert [one.engine for one in made] == [MUJOCO] * 3
-    stepping = [
-        (one.cases[0].resolved.integrator, one.cases[0].resolved.physics_step)
-        for one in (accurate, cheap)
-    ]
-    assert stepping == [("RK4", 1e-3), ("implicitfast", 1e-3)]
-    assert by_equation.cases == accurate.cases
-    (one,) = tuned.searches
-    screened = one.evaluations - len(one.history)
-    assert 2 * 64 // 8 < screened <= 2 * 64 // 8 + 2 * 64 // 2
-    assert 6 < len(one.history) <= 2 * 64 - screened
 
 
 def test_what_needs_a_shorter_step_keeps_its_own():
@@ -300,9 +263,13 @@ def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
 
 def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails():
     goal = Objective(conditions=("nominal",), duration=0.2)
-    laws = [failing(when=when) for when in (0.0, 0.05, 0.1, 0.15, 1.0)]
+    laws = []
+    for when in (0.0, 0.05, 0.1, 0.15, 1.0):
+        laws.append(failing(when=when))
     traces = smc.run([goal.scenarios("duffing", law, 0)[0] for law in laws])
-    costs = [goal.terms_of_run(trace)[0] for trace in traces]
+    costs = []
+    for trace in traces:
+        costs.append(goal.terms_of_run(trace)[0])
     assert all(map(math.isfinite, costs))
     assert costs == sorted(costs, reverse=True)
     assert len(set(costs)) == 5
@@ -315,20 +282,14 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
 def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
     rival = dataclasses.replace(found, law=smc.law("classical"))
     assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
-    assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
-    unequal = {
-        "budget": dataclasses.replace(rival, budget=17),
-        "searches": dataclasses.replace(rival, searches=rival.searches[:2]),
-        "rule": dataclasses.replace(rival, rule="by hand"),
-        "objective": dataclasses.replace(rival, definition=Objective(duration=0.5, u_max=12.0)),
-        "seed": dataclasses.replace(rival, seed=4),
-        "plant": dataclasses.replace(rival, plant=smc.plant("duffing", M=2.0)),
-    }
-    away = dataclasses.replace(rival, law=dataclasses.replace(rival.law, function=None))
-    assert len(compare([away, found])) == 2
-    for one in unequal.values():
-        refused(lambda one=one: compare([found, one]))
-    refused(lambda: compare([]))
+    for changed in (
+        {"budget": 17},
+        {"searches": rival.searches[:2]},
+        {"definition": Objective(duration=0.5, u_max=12.0)},
+        {"plant": smc.plant("duffing", M=2.0)},
+    ):
+        other = dataclasses.replace(rival, **changed)
+        refused(lambda other=other: compare([found, other]))
 
 
 # files
@@ -340,40 +301,10 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     held = json.loads(path.read_text())
     assert held["budget"] == 16
     assert list(found.gains.values()) in held["record"]["sets"]
-    assert held["definition"]["conditions"] == [
-        "nominal",
-        "noise",
-        "delay_10ms",
-        "sine",
-        "constant",
-        "light",
-        "heavy",
-    ]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
 
 
 # bad input
-
-
-def test_bad_input_is_one_sentence(refused):
-    for changed in [
-        {"plant": "dufing"},
-        {"plant": 3},
-        {"law": "clasical"},
-        {"law": "none"},
-        {"law": "hierarchical"},
-        {"plant": "cart_pole", "law": "classical"},
-        {"objective": "best"},
-        {"threads": 0},
-    ]:
-        given = {
-            "plant": "duffing",
-            "law": "classical",
-            "budget": 5,
-            "objective": LEAN,
-            "searches": 1,
-        } | changed
-        refused(lambda given=given: tune(**given))
 
 
 @pytest.mark.filterwarnings("ignore:.* no unit")

@@ -80,7 +80,9 @@ def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
     else:
         plant = plant_b
         n = 2
-    start = [value * X / T**i for i, value in enumerate((1.0, 0.4, -0.2)[:n])]
+    start = []
+    for i, value in enumerate((1.0, 0.4, -0.2)[:n]):
+        start.append(value * X / T**i)
     done = plant(
         law,
         x=start,
@@ -138,18 +140,6 @@ def check_units(name, law, model, rng):
         other_x, other_u = run(converted(law, system), system["X"], system["T"], force, model)
         np.testing.assert_allclose(other_x, x, rtol=0, atol=1e-9, err_msg=str(system))
         np.testing.assert_allclose(other_u, u, rtol=0, atol=1e-6, err_msg=str(system))
-
-
-@pytest.mark.parametrize("name", [name for name in LAWS if name != "swing_up"])
-def test_a_wrong_unit_of_any_gain_would_be_seen(name):
-    law = given(name, np.random.default_rng(0))
-    runs = {model: np.concatenate(run(law, model=model)) for model in (0.0, 1.0)}
-    for gain, value in law.gains.items():
-        other = dataclasses.replace(law, gains=dict(law.gains) | {gain: 2.0 * value})
-        assert (
-            max(abs(np.concatenate(run(other, model=m)) - plain).max() for m, plain in runs.items())
-            > 1e-6
-        ), gain
 
 
 def test_every_gain_has_a_unit_and_a_law_with_gains_can_be_tuned():
