@@ -61,6 +61,7 @@ MIN_GAIN_GROWTH = 3.0  # of a law that switches, from an amplitude to a thousand
 CYCLE_TOLERANCE = 1e-4  # of the logs of amplitude and omega of a cycle: the last step of the search
 # of the logs of amplitude and omega: smaller ones see jumps of the gain by the samples; chosen
 DERIVATIVE_STEP = 1e-3
+ROOT_OPTIONS = {"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP}
 STABILITY_STEP = 0.1  # relative, in Loeb's criterion: smaller ones see these jumps too; chosen
 # Factors on the ends of ranges. With them the ranges have the truth in 95 % of random loops:
 # benchmarks/chattering.py.
@@ -268,10 +269,12 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         turns = winding[tuple(cells.T)]
         for sign in (1.0, -1.0):
             if sign * turns.sum() >= 0.0:
-                yield [
-                    ((start + step * one)[::-1], (start + step * (one + 1))[::-1])
-                    for one in cells[turns == sign]
-                ]
+                found = []
+                for cell in cells[turns == sign]:
+                    low = start + step * cell
+                    high = start + step * (cell + 1)
+                    found.append((low[::-1], high[::-1]))
+                yield found
 
 
 def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
@@ -306,9 +309,7 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
         return np.array([product.real, product.imag]) + (inside - z)
 
     def solved() -> Iterator[np.ndarray]:
-        yield root(
-            excess, 0.5 * (low + high), options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP}
-        ).x
+        yield root(excess, 0.5 * (low + high), options=ROOT_OPTIONS).x
         yield _bisected(excess, low, high)
 
     for z in solved():
@@ -348,9 +349,10 @@ def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
     later = loop.later(-shift / wave.omega)
     stable, _ = cycles(later)
     sign = math.copysign(1.0, shift)
-    beside = [
-        one for one in stable if sign * math.log(one[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE
-    ]
+    beside = []
+    for cycle in stable:
+        if sign * math.log(cycle[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE:
+            beside.append(cycle)
     if not beside and shift > 0.0:
         beside = _of_two_samples(later)
     nearest = min(beside, key=lambda one: abs(one[1] - wave.omega), default=None)
@@ -372,12 +374,12 @@ def _of_two_samples(loop: Loop) -> list[Balance]:
         return math.log(product) if product > 0.0 else -50.0
 
     places = np.linspace(math.log(MIN_AMPLITUDE), math.log(MAX_AMPLITUDE), GRID_AMPLITUDES + 1)
-    sizes = [excess(z) for z in places]
-    return [
-        (math.exp(float(brentq(excess, low, high))), fastest)  # type: ignore[arg-type]
-        for (low, a), (high, b) in itertools.pairwise(zip(places, sizes, strict=True))
-        if a > 0.0 >= b
-    ]
+    found = []
+    for low, high in itertools.pairwise(places):
+        if excess(low) > 0.0 >= excess(high):
+            amplitude = math.exp(float(brentq(excess, low, high)))  # type: ignore[arg-type]
+            found.append((amplitude, fastest))
+    return found
 
 
 def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
@@ -389,11 +391,11 @@ def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
     """
     decaying = sorted((one for one in balances if _decays(loop, *one)), key=lambda one: one[1])
     turns = _turns(loop, decaying)
-    return [
-        one
-        for k, one in enumerate(decaying)
-        if all(round(turns[k] - before) >= 0 for before in turns[:k])
-    ]
+    stable = []
+    for k, cycle in enumerate(decaying):
+        if all(round(turns[k] - before) >= 0 for before in turns[:k]):
+            stable.append(cycle)
+    return stable
 
 
 def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
@@ -413,10 +415,10 @@ def _turns(loop: Loop, balances: Sequence[Balance]) -> np.ndarray:
     between = np.exp(
         np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP)
     )
-    phases = np.unwrap(
-        [np.angle(loop.response(w * (1.0 - RESONANCE_DAMPING * 1j))) for w in between]
-    )
-    return np.interp(omegas, between, phases) / math.tau
+    phases = []
+    for omega in between:
+        phases.append(np.angle(loop.response(omega * (1.0 - RESONANCE_DAMPING * 1j))))
+    return np.interp(omegas, between, np.unwrap(phases)) / math.tau
 
 
 def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
@@ -433,7 +435,7 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
         return [product.real, product.imag]
 
     start = np.log([wave.amplitude, wave.omega])
-    solved = root(excess, start, options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP})
+    solved = root(excess, start, options=ROOT_OPTIONS)
     near = solved.success and np.abs(solved.x - start).max() < MAX_SHIFT
     if near:
         return loop.wave(*np.exp(solved.x).tolist())
@@ -458,11 +460,15 @@ def _prediction(
     omegas = [math.nan]
     if ranges:
         later, earlier = (_nearest_cycle(loop, sine, phase) for phase in loop.phases(*balance))
-        waves = [one for one in (sine, later, earlier) if one]
-        sizes = [one.s / sine.s * wave.s for one in waves] + [0.0] * (earlier is None)
-        omegas = [one.omega / sine.omega * wave.omega for one in waves] + [math.inf] * (
-            earlier is None
-        )
+        sizes = []
+        omegas = []
+        for locked in (sine, later, earlier):
+            if locked:
+                sizes.append(locked.s / sine.s * wave.s)
+                omegas.append(locked.omega / sine.omega * wave.omega)
+        if earlier is None:
+            sizes.append(0.0)
+            omegas.append(math.inf)
     fastest = max(omegas) * FREQUENCY_FACTOR / math.tau
     nyquist = 0.5 / loop.scenario.control_period
     return Chattering(

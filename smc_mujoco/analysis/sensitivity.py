@@ -74,27 +74,26 @@ class Space:
     def __init__(self, scenario: Scenario, over: Uncertainty):
         self.members = members = Members([scenario], over)
         unit = scenario.plant.units[0]
+        self.names: list[str] = []
+        self.columns: list[Constant | None] = []
+        self.ends: list[tuple[float, float, str]] = []
+
+        def add(name: str, low: float, high: float, unit: str, constant: Constant | None = None):
+            self.names.append(name)
+            self.columns.append(constant)
+            self.ends.append((low, high, unit))
+
+        for constant in members.constants:
+            add(constant.name, *constant.bounds, constant.unit, constant)
+        if members.forced:
+            add("disturbance", 0.0, over.disturbance, scenario.plant.efforts[0])
         if over.position_noise:
-            errors = (over.position_noise, unit)
-        else:
-            errors = (over.velocity_noise, f"{unit}/s")
-        levels = [("disturbance", (over.disturbance, scenario.plant.efforts[0]))] * members.forced
-        levels += [("noise", errors)] * (members.times > 0)
-        drawn = bool(levels) or over.jitter > 0.0 or _random(scenario)
-        self.columns: tuple[Constant | None, ...] = (
-            *members.constants,
-            *(None for _ in levels),
-            *([None] * drawn),
-        )
-        self.names = (
-            *(one.name for one in members.constants),
-            *(name for name, _ in levels),
-            *([CHANCE] * drawn),
-        )
-        ends = [(*one.bounds, one.unit) for one in members.constants] + [
-            (0.0, *level) for _, level in levels
-        ]
-        self.ends = [*ends, *([(math.nan, math.nan, "")] * drawn)]
+            add("noise", 0.0, over.position_noise, unit)
+        elif over.velocity_noise:
+            add("noise", 0.0, over.velocity_noise, f"{unit}/s")
+        levels = len(self.names) > len(members.constants)
+        if levels or over.jitter > 0.0 or _random(scenario):
+            add(CHANCE, math.nan, math.nan, "")
 
     def scenario_at(self, shares: np.ndarray) -> Scenario:
         """Return the scenario at a share of each axis."""

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.step_halving import halved as halved_step
 from smc_mujoco.analysis.tuning import equation
 from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Evaluation, Objective
 from smc_mujoco.common.errors import ScenarioError
@@ -76,12 +77,11 @@ class Evaluator:
                 self.engine = PYTHON
                 self._run = None
             elif by_equation and all(map(equation.fits, prepared)):
-                self.engine, self._run = EQUATION, _Equations(prepared, self.names, self.threads)
+                self.engine = EQUATION
+                self._run = _Equations(prepared, self.names, self.threads)
             else:
-                self.engine, self._run = (
-                    MUJOCO,
-                    _Batches(prepared, self.names, self.threads, constraints, slots),
-                )
+                self.engine = MUJOCO
+                self._run = _Batches(prepared, self.names, self.threads, constraints, slots)
 
     def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
@@ -114,10 +114,11 @@ class Evaluator:
         with warnings.catch_warnings():
             # the runs of the law's own gains have warned
             warnings.simplefilter("ignore", PlainLoopWarning)
-            traces = run(
-                [dataclasses.replace(case, law=law) for law in laws for case in self.cases],
-                self.threads,
-            )
+            cases = []
+            for law in laws:
+                for case in self.cases:
+                    cases.append(dataclasses.replace(case, law=law))
+            traces = run(cases, self.threads)
         return [self.goal.terms_of_run(trace) for trace in traces]
 
     def _terms(self, index: int, failed_at: float | None, log: np.ndarray) -> Costs:
@@ -174,20 +175,14 @@ class _Equations:
         self.slots = _that_fit(prepared, threads)
         self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
         self.put = [_putter(one.prepared, names, one.record[0], one.packed) for one in self.runs]
-        if threads > 1:
-            self.pool = ThreadPoolExecutor(threads)
-        else:
-            self.pool = None
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
         made: list[Costs] = []
         for some in _batched(candidates, self.slots):
             runs = range(len(some) * self.cases)
-            each = functools.partial(self._one, some, terms)
-            if self.pool is None:
-                made += map(each, runs)
-            else:
-                made += self.pool.map(each, runs)
+            mapped = self.pool.map if self.pool else map
+            made += mapped(functools.partial(self._one, some, terms), runs)
         return made
 
     def _one(self, candidates: Sequence[Gains], terms: Terms, i: int) -> Costs:
@@ -197,11 +192,9 @@ class _Equations:
         self.put[i](candidates[i // self.cases])
         one.simulate()
         record = one.record[0]
-        failed = record["failure"] != state.FINE
-        if failed:
+        time = None
+        if record["failure"] != state.FINE:
             time = float(record["failed_step"]) * one.scenario.physics_step
-        else:
-            time = None
         return terms(i % self.cases, time, one.log)
 
 
@@ -312,22 +305,20 @@ def objectives(
       threads: as in `run`.
       halved: whether the runs have half their physics step.
     """
-    if instances is None:
-        numbers = range(len(laws))
-    else:
-        numbers = instances
+    numbers = range(len(laws)) if instances is None else instances
     if len(numbers) != len(laws):
         raise ScenarioError(
             f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law"
         )
-    cases = [goal.unseen(plant, law, number) for law, number in zip(laws, numbers, strict=True)]
+    cases = []
+    for law, number in zip(laws, numbers, strict=True):
+        cases += goal.unseen(plant, law, number)
     if halved:
-        cases = [
-            [dataclasses.replace(c, physics_step=0.5 * c.resolved.physics_step) for c in its]
-            for its in cases
-        ]
-    traces = iter(run([case for its in cases for case in its], threads))
-    made = []
-    for its in cases:
-        made.append(goal.evaluation(its[0], [next(traces) for _ in its]))
-    return np.array([one.objective for one in made])
+        cases = list(map(halved_step, cases))
+    traces = run(cases, threads)
+    found = []
+    count = len(goal.conditions)
+    for first in range(0, len(cases), count):
+        evaluation = goal.evaluation(cases[first], traces[first : first + count])
+        found.append(evaluation.objective)
+    return np.array(found)

@@ -232,22 +232,20 @@ class Members:
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         # N or N m a sample; 0: d may jump
-        if within.slope is None:
-            self.slope = 0.0
-        else:
-            self.slope = within.slope * self.h
+        self.slope = (within.slope or 0.0) * self.h
         _check_class(scenario, within)
         sets = Constant(
             name="set", bounds=(0.0, count), put=lambda _, at: scenarios[min(int(at), count - 1)]
         )
-        self.constants = [sets] * (count > 1) + list(_constants(scenario, within))
+        self.constants = list(_constants(scenario, within))
+        if count > 1:
+            self.constants.insert(0, sets)
         self.ends = [[0.0, 1.0] for _ in self.constants]
         # samples that an error of measurement lasts
         self.hold = max(1, round(within.hold / self.h))
+        self.times = 0
         if within.position_noise or within.velocity_noise:
             self.times = -(-self.samples // self.hold)
-        else:
-            self.times = 0
         if self.times and any(scenario.noise.errors):
             raise ScenarioError(
                 f"the scenario has errors of measurement, {scenario.noise.errors}, and the "
@@ -279,8 +277,12 @@ class Members:
         force = self.within.disturbance * member.force
         if relay:
             force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
-        signals = ([self.signal(force)] if force.any() else []) + ([relay] if relay else [])
-        scenario = dataclasses.replace(scenario, disturbance=(*scenario.disturbance, *signals))
+        signals = [*scenario.disturbance]
+        if force.any():
+            signals.append(self.signal(force))
+        if relay:
+            signals.append(relay)
+        scenario = dataclasses.replace(scenario, disturbance=tuple(signals))
         if not self.times:
             return scenario
         bounds = {
@@ -370,10 +372,7 @@ class Members:
                 row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0
             )
 
-        if self.forced:
-            force = self.limited(added(member.force, rows[0]))
-        else:
-            force = member.force
+        force = self.limited(added(member.force, rows[0])) if self.forced else member.force
         if self.times:
             noise = []
             for pair in zip(member.noise, rows[-2:], strict=True):
@@ -393,10 +392,9 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     switches = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1])) + 1
     if len(switches) and rng.random() < SHIFT_PROBABILITY:
         at = int(rng.choice(switches))
+        piece = slice(at, at + length)
         if rng.random() < 0.5:
             piece = slice(max(0, at - length), at)
-        else:
-            piece = slice(at, at + length)
     else:
         at = int(rng.integers(1 - length, max(last, 2 - length)))
         piece = slice(max(0, at), at + length)
