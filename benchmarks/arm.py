@@ -33,10 +33,8 @@ def main() -> None:
                 law=law, duration=STEPS * 5e-4 + 1.0, integrator=integrator, **machine
             )
             batch = batch_of(scenario, 1, 1)
-            with_law, bare = (
-                stepping(batch, STEPS),
-                stepping(batch, STEPS, BARE),
-            )  # both before the first step
+            # both before the first step
+            with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)
             one, other, factor = ratio(with_law, bare)
             _, _, of_plain = ratio(with_law, plain_steps(scenario, 1, STEPS))
             microseconds = f"{1e6 * one / STEPS:6.2f} us a step, {1e6 * other / STEPS:6.2f} bare"

@@ -24,14 +24,12 @@ import arms
 
 SEEDS = range(1, 4 if "--quick" in sys.argv else 13)
 PAYLOAD = 2.0  # kg
-ROUGH_TV_RATE = (
-    1000.0  # N m/s: TV rate of u that doubles the cost of a draw; chosen before any search
-)
+# N m/s: TV rate of u that doubles the cost of a draw; chosen before any search
+ROUGH_TV_RATE = 1000.0
 SEARCH_PAYLOAD = 1.0  # kg
 SEARCH_SEED = 1000
-MAX_STEP_CHANGE = (
-    0.1  # relative change of an error with half the physics step; more means unstable; chosen
-)
+# relative change of an error with half the physics step; more means unstable; chosen
+MAX_STEP_CHANGE = 0.1
 COLUMNS = (
     "tip rms, mm",
     "tip at the end, mm",

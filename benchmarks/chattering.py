@@ -115,9 +115,8 @@ def main() -> None:
         strict=True,
     ):
         held = np.mean((low <= 1.0) & (high >= 1.0))
-        needed = np.fmax(
-            low * factor, factor / high
-        )  # the factor with which the range just holds the truth
+        # the factor with which the range just holds the truth
+        needed = np.fmax(low * factor, factor / high)
         needed = np.sort(np.where(np.isnan(low), math.inf, needed))[
             math.ceil(SHARE * len(rows)) - 1
         ]

@@ -111,10 +111,8 @@ SENTENCES = (
     ("noise / start", 1e-3, 1e-2, "cost", "smoothed", "is level at best"),
     ("delay x wc", 0.0, 0.4, "cost", "switching", "is level at best"),
 )
-SURE = {
-    "implicit_first_order": "d",
-    "super_twisting": "d'",
-}  # laws whose theorem bounds the load, or its rate
+# laws whose theorem bounds the load, or its rate
+SURE = {"implicit_first_order": "d", "super_twisting": "d'"}
 SCORES = ("error", "cost")
 KINDS = ("switching", "smoothed")
 COLOURS = "#0072B2", "#7CC0E8", "#D55E00", "#F0B080"

@@ -18,13 +18,8 @@ import numpy as np
 
 from smc_mujoco.control import gain_sets
 
-H, SECONDS, RUNS, BOUND, WEIGHT = (
-    1e-3,
-    8.0,
-    12,
-    6.0,
-    1e-3,
-)  # s, s, runs, N or N m, of the variation in the cost
+# s, s, runs, N or N m, of the variation in the cost
+H, SECONDS, RUNS, BOUND, WEIGHT = 1e-3, 8.0, 12, 6.0, 1e-3
 PLANTS: dict[str, Callable[..., np.ndarray]] = {  # x'' of (x, x', u)
     "duffing": lambda x, v, u: -0.2 * v + x - x**3 + u,
     "inverted_pendulum": lambda x, v, u: (

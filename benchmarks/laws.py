@@ -50,11 +50,8 @@ if QUICK:
 else:
     SAMPLES = 500
     PENDULUMS = 100
-MOST, SOLVERS, MOST_OF_PID = (
-    3.0,
-    ("mpc",),
-    4.0,
-)  # times the classical law; other laws; times pid, in a run
+# times the classical law; other laws; times pid, in a run
+MOST, SOLVERS, MOST_OF_PID = 3.0, ("mpc",), 4.0
 AT = {name: i for i, name in enumerate(Measurement._fields)}
 E = AT["e"]
 DE = AT["de"]

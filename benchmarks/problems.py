@@ -42,10 +42,8 @@ CONTROLLED = 24  # of each problem, for the controls
 ATTACKED = 2  # instances against an adversary
 # of a target over the oracle's worst on visible instances: levels are written with three digits
 SEEN = 1.01
-LATER = {
-    "pendulum_network/mpc",
-    "inverted_pendulum_network/mpc",
-}  # got shipped gains after the freeze of version 1
+# got shipped gains after the freeze of version 1
+LATER = {"pendulum_network/mpc", "inverted_pendulum_network/mpc"}
 MARGIN = 1.25  # of a target over the oracle's worst; 2 where no catalogue sets the levels
 NEAR = 0.1  # of the start: no target is easier, and a problem in which u = 0 ends there is left out
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
@@ -89,9 +87,8 @@ def measure(kind: str, out: Path, seed: int, instances: int, names: Sequence[str
     out.write_text(json.dumps(done))
     for name in (name for name in names if name not in runs):
         plant, condition, version = str(name).replace("@", "/").split("/")
-        text = (problems.RULES / f"{version}.toml").read_text(
-            encoding="utf-8"
-        )  # as problem(), also where left out
+        # as problem(), also where left out
+        text = (problems.RULES / f"{version}.toml").read_text(encoding="utf-8")
         one = problems.Problem(
             id=name, plant=plant, condition=condition, version=int(version), rules=text
         )
@@ -130,9 +127,8 @@ def levels(
     if laws:
         medians = [np.median(values[:, MEASURES.index(measure)]) for values in laws.values()]
         chosen = np.quantile(medians, rules["quantiles"], method="higher")
-        chosen = np.minimum(
-            chosen, max(filter(math.isfinite, medians))
-        )  # laws of which half of the runs fail
+        # laws of which half of the runs fail
+        chosen = np.minimum(chosen, max(filter(math.isfinite, medians)))
     else:
         easiest = rules["easiest"][measure] * (worst if measure != "accuracy" else 1.0)
         chosen = np.geomspace(

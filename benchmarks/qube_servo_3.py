@@ -30,9 +30,8 @@ from scipy.optimize import least_squares
 
 EXCERPT = Path(__file__).parents[1] / "tests" / "evidence" / "rigs" / "qube_servo_3_step.csv"
 NAMES = "resistance", "arm_inertia", "arm_damping", "cable", "cable_friction", "cable_stiffness"
-SCALES = np.array(
-    [10.0, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3]
-)  # ohm, kg m^2, N m s/rad, N m/rad, N m, N m/rad
+# ohm, kg m^2, N m s/rad, N m/rad, N m, N m/rad
+SCALES = np.array([10.0, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3])
 START = np.array([0.8, 0.8, 2.4, 2.3, 1.0, 4.0])  # of the search, in SCALES
 LOW = [0.3, 0.1, 0.0, 0.0, 1e-3, 0.05, -3.0, -3.0]
 HIGH = [3.0, 5.0, 20.0, 10.0, 5.0, 100.0, 3.0, 3.0]
@@ -41,10 +40,8 @@ STEP_END, RETURN = 0.8, (0.94, 1.66)  # s
 SPACING = 0.02  # s, between samples that are used
 STEP = 1e-3  # s, of RK4
 NOISE = np.array([[7e-3], [14e-3]])  # rad, of arm and pendulum: what a residual of one is; chosen
-FREQUENCY, DAMPING = (
-    (2.432, 4e-3),
-    (0.0261, 6e-4),
-)  # of falls, Hz and "", and what a residual of one is
+# of falls, Hz and "", and what a residual of one is
+FREQUENCY, DAMPING = (2.432, 4e-3), (0.0261, 6e-4)
 ARM = 0.085
 MASS = 0.024
 LENGTH = 0.12865
@@ -135,9 +132,8 @@ def parts(record):
 
 def errors(q, speeds, step, back):
     """Return the errors of the step and of the way back, (2, K) each, rad."""
-    bend = (
-        -q[4] / q[5] if q[4] > 0.0 else 0.0
-    )  # of bristles that have slipped on the way to the stop
+    # of bristles that have slipped on the way to the stop
+    bend = -q[4] / q[5] if q[4] > 0.0 else 0.0
     starts = (np.zeros(5), np.array([*back[1:, 0], *speeds, bend]))
     found = []
     for start, part in zip(starts, (step, back), strict=True):

@@ -135,10 +135,8 @@ def callback_against_mj_step(table: Table) -> None:
                 **fields,
             )
             batch = batch_of(scenario, 16)
-            with_law, bare = (
-                stepping(batch, STEPS),
-                stepping(batch, STEPS, BARE),
-            )  # both before the first step
+            # both before the first step
+            with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)
             plain = plain_steps(scenario, 16, STEPS)
             per = 1e6 / (16 * STEPS)
             for other, steps, goal in (

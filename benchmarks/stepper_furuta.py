@@ -35,10 +35,8 @@ from stepper_figures import (
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs.machines.stepper_furuta import NAMES
 
-SEEDS = {
-    False: ({11: 230, 12: 130, 13: 180}, {14: 240}),
-    True: ({21: 240}, {22: 160}),
-}  # of rounds -> draws
+# of rounds -> draws
+SEEDS = {False: ({11: 230, 12: 130, 13: 180}, {14: 240}), True: ({21: 240}, {22: 160})}
 BATCH = 10
 NEAR = 24
 KEPT = 8

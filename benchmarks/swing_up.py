@@ -324,10 +324,15 @@ def machines(count=80):
         pulses = tuple((rng.uniform(0.3, 8.0), 0.07, rng.uniform(-3.0, 3.0)) for _ in range(3))
         found.append(
             Case(
-                parameters=changed, pulses=pulses, delay=int(rng.integers(0, 8)), response=rng.uniform(0.5, 1.0),
-                velocity_noise=rng.uniform(0.0, 0.05), torque_noise=rng.uniform(0.0, 0.3), seed=seed,
+                parameters=changed,
+                pulses=pulses,
+                delay=int(rng.integers(0, 8)),
+                response=rng.uniform(0.5, 1.0),
+                velocity_noise=rng.uniform(0.0, 0.05),
+                torque_noise=rng.uniform(0.0, 0.3),
+                seed=seed,
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -48,15 +48,10 @@ DURATION = 60.0
 STEPS = 30_000
 SEEDS = (0, 1, 2, 3)
 RESETS, RESET_TIME, APART = 15, 0.2, 1.0  # of a minute; s; s, between two swing-ups that count
-KP, KI, KD, PID_PERIOD = (
-    10.0,
-    0.1,
-    1.0,
-    1e-3,
-)  # N m/rad, N m/(rad s), N m s/rad; s, which is not the step
-LEVER = (
-    MODEL_1_1["m1"] * MODEL_1_1["r1"] + MODEL_1_1["m2"] * MODEL_1_1["l1"]
-)  # kg m, of the shoulder's gravity
+# N m/rad, N m/(rad s), N m s/rad; s, which is not the step
+KP, KI, KD, PID_PERIOD = 10.0, 0.1, 1.0, 1e-3
+# kg m, of the shoulder's gravity
+LEVER = MODEL_1_1["m1"] * MODEL_1_1["r1"] + MODEL_1_1["m2"] * MODEL_1_1["l1"]
 
 
 class Run(NamedTuple):

@@ -94,9 +94,8 @@ def criteria(trace: Trace) -> Criteria:
     t = trace.t
     l1 = plant.parameters["l1"]
     tip = -l1 * np.cos(q[:, 0]) - L2 * np.cos(q[:, 0] + q[:, 1])
-    low = (
-        np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1
-    )  # as published: first and last left out
+    # as published: first and last left out
+    low = np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1
     first = low[-1] + 1 if len(low) else 1
     step = np.diff(t)
     torque = np.abs(u[:-1])

@@ -48,16 +48,10 @@ REPEATS = 10
 PROFILES = 50
 PULSES = 3
 MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s; s; N m
-SCALED_PARAMETERS = {
-    "m1r1": "r1",
-    "I1": "I1",
-    "m2r2": "r2",
-    "m2": "m2",
-    "I2": "I2",
-}  # what is scaled -> the parameter
-MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(
-    SCALED_PARAMETERS, (0.75, 1.25)
-)  # parameter -> ends of its values
+# what is scaled -> the parameter
+SCALED_PARAMETERS = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}
+# parameter -> ends of its values
+MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(SCALED_PARAMETERS, (0.75, 1.25))
 MODEL_LEVELS |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
 MEASUREMENT_SIZE = len(Measurement._fields)
 ROOM = 11
@@ -75,9 +69,8 @@ class Case:
     test: str = ""  # one of TESTS
     name: str = ""  # the parameter that differs in the test "model", else the test
     value: float = 0.0  # its level
-    parameters: Mapping[str, float] = dataclasses.field(
-        default_factory=dict
-    )  # true values, where they differ
+    # true values, where they differ
+    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
     velocity_noise: float = 0.0  # standard deviation, rad/s
     torque_noise: float = 0.0  # standard deviation, N m
     response: float = 1.0  # r of the motor
@@ -94,9 +87,8 @@ class Robustness:
     0 .. 1.
     """
 
-    survived: Mapping[
-        str, tuple[tuple[str, float, bool], ...]
-    ]  # test -> (name, level, whether the law survived it)
+    # test -> (name, level, whether the law survived it)
+    survived: Mapping[str, tuple[tuple[str, float, bool], ...]]
 
     def __repr__(self) -> str:
         tests = ", ".join(f"{test} {percent:.1f} %" for test, percent in self.percent.items())

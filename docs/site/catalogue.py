@@ -85,10 +85,10 @@ def pages() -> dict[str, dict[str, list[Page]]]:
     }
 
 
-SURFACES = """`smc.Scenario(surface=smc.surface("terminal"), ...)` replaces the sliding variable $e' + c e$ of a law of
-relative degree 1."""
-ESTIMATORS = """`smc.Scenario(velocity=smc.estimator("levant"), ...)` replaces the velocity sensor by an estimate from
-the position $x$."""
+SURFACES = """`smc.Scenario(surface=smc.surface("terminal"), ...)` replaces the sliding variable
+$e' + c e$ of a law of relative degree 1."""
+ESTIMATORS = """`smc.Scenario(velocity=smc.estimator("levant"), ...)` replaces the velocity sensor by
+an estimate from the position $x$."""
 
 
 def files(drawn_stills: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -117,7 +117,8 @@ def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Pag
         _display(parts.formula, template.gains),
         _symbols(parts.formula),
         f'<div class="figures">{shown}</div>\n<p class="key">{KEY}</p>',
-        "With [tuned gains](../run_study.md#gains-by-the-same-rule), from the plant's own start. $u$ is held between "
+        "With [tuned gains](../run_study.md#gains-by-the-same-rule), from the plant's own start. "
+        "$u$ is held between "
         "samples of 1 ms; where it chatters, the line is its mean and the band its range.",
         f"## Use it\n\n```python\n{_call(template)}\n```",
         _gain_table(template),
@@ -140,7 +141,10 @@ def _symbols(formula: str) -> str:
         brackets = r" $\lfloor s \rceil^p$ is $\left| s \right|^p \, \mathrm{sgn}(s)$."
     else:
         brackets = ""
-    return f"$e$ is the error, $s$ the sliding variable: see [the mathematics](../mathematics.md).{brackets}"
+    return (
+        "$e$ is the error, $s$ the sliding variable: see [the "
+        f"mathematics](../mathematics.md).{brackets}"
+    )
 
 
 def _front(description: str) -> str:
@@ -173,9 +177,10 @@ def _call(template: Template) -> str:
     else:
         plant = "duffing"
     call = f'law = smc.law("{template.name}"{gains})'
-    return f'import smc_mujoco as smc\n\n{call}\ntrace = smc.run(smc.Scenario(plant="{plant}", law=law))'.replace(
-        "=inf", '=float("inf")'
-    )
+    return (
+        f'import smc_mujoco as smc\n\n{call}\ntrace = smc.run(smc.Scenario(plant="{plant}", '
+        "law=law))"
+    ).replace("=inf", '=float("inf")')
 
 
 def _gain_table(template: Template) -> str:
@@ -196,7 +201,8 @@ def _gain_table(template: Template) -> str:
             default = f"{gain.default:g}"
         tuned = "no" if gain.held else "yes"
         rows.append(
-            f"| ${notation.symbol(name)}$ `{name}` | {meaning} | {_unit(unit)} | {default} | {allowed} | {tuned} |"
+            f"| ${notation.symbol(name)}$ `{name}` | {meaning} | {_unit(unit)} | {default} | "
+            f"{allowed} | {tuned} |"
         )
     head = "| gain | meaning | unit | default | range | tuned |\n|---|---|---|---|---|---|\n"
     unit = "Units are those of a joint that slides; for a hinge read N m for N and rad for m."
@@ -355,7 +361,10 @@ def _prose(text: str, names) -> str:
 def _c_form(name: str) -> str:
     """Return the law in C99, without the header that all exported laws share."""
     code = law_to_c(law(name)).rpartition(HEADER_END)[2].strip()
-    made = f"`smc-mujoco export {name}.c` writes this law as one file, with [the header](../c.md) at its top."
+    made = (
+        f"`smc-mujoco export {name}.c` writes this law as one file, with [the "
+        "header](../c.md) at its top."
+    )
     return (
         f'## In C {{ data-search-exclude }}\n\n{made}\n\n??? note "The law in C99"\n\n'
         + _indented(f"```c\n{code}\n```")
@@ -423,9 +432,13 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
             if p.strip(" .\n")
         ),
         more,
-        f'<div class="figures">{_figure(drawn["plant_figure", name], "")}</div>\n<p class="key">{key}</p>',
+        (
+            f'<div class="figures">{_figure(drawn["plant_figure", name], "")}</div>\n<p '
+            f'class="key">{key}</p>'
+        ),
         "Without noise or disturbance, from the plant's own start.",
-        f'## Use it\n\n```python\nimport smc_mujoco as smc\n\nplant = smc.plant("{name}"{_change(plant)})\n'
+        "## Use it\n\n```python\nimport smc_mujoco as smc\n\nplant = "
+        f'smc.plant("{name}"{_change(plant)})\n'
         f'trace = smc.run(smc.Scenario(plant=plant, law="{laws_shown[0]}"))\n```',
         _parameters(plant),
         _shape(plant),

@@ -17,10 +17,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".cache" / "site"
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing")
-CONDITIONS = {
-    "nominal": "#2E86C1",
-    "noise + sine": "#D35400",
-}  # condition -> colour, seen on white and on slate
+# condition -> colour, seen on white and on slate
+CONDITIONS = {"nominal": "#2E86C1", "noise + sine": "#D35400"}
 FLIGHT_LAWS = "geometric", "quaternion_sliding", "cascaded_pid"
 ARM_LAWS = (
     "computed_torque_sliding",
@@ -66,7 +64,9 @@ def plant_figure(plant: str) -> bytes:
 
 
 def still(plant: str) -> bytes:
-    """Return a picture of a plant under the laws of `plant_laws`, as WebP; nothing without OpenGL."""
+    """Return a picture of a plant under the laws of `plant_laws`, as WebP; nothing without
+    OpenGL.
+    """
     import tempfile
 
     from PIL import Image
@@ -193,9 +193,8 @@ def _version(also: Iterable[Path]) -> str:
 
 def _draw(name: str, draw: Callable[..., bytes], arguments: tuple[str, ...]) -> tuple[str, bytes]:
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore"
-        )  # figures show what a condition does, whatever a law asks for
+        # figures show what a condition does, whatever a law asks for
+        warnings.simplefilter("ignore")
         return name, draw(*arguments)
 
 

@@ -25,9 +25,8 @@ import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
 PAGES: list[catalogue.Page] = []  # of this build
-BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5} | dict.fromkeys(
-    known.reference(), 0.3
-)  # in search
+# in search
+BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5} | dict.fromkeys(known.reference(), 0.3)
 
 
 def on_config(config):

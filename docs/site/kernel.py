@@ -1,7 +1,7 @@
 """Run the cells of a notebook in IPython, as a notebook's kernel does, and write what each shows as
 JSON.
 
-python kernel.py NOTEBOOK FILE [BEFORE [AFTER]]    # BEFORE and AFTER are code that runs first and last
+python kernel.py NOTEBOOK FILE [BEFORE [AFTER]]    # code that runs first and last
 
 FILE gets a list for each cell: its outputs, MIME type -> content, pictures in base64. What is
 printed is text/plain.
@@ -18,7 +18,9 @@ from traitlets.config import Config
 
 
 class ZMQInteractiveShell(InteractiveShell):
-    """IPython's shell under the name of a notebook's, by which progress bars and smc.show know one."""
+    """IPython's shell under the name of a notebook's, by which progress bars and smc.show know
+    one.
+    """
 
 
 def main() -> None:
@@ -43,10 +45,8 @@ def _shown(shell: InteractiveShell, code: str) -> list[dict[str, str]]:
     """Run a cell and return its outputs, without those that are updated while it runs: progress
     bars.
     """
-    with (
-        shell.display_trap,
-        capture_output() as caught,
-    ):  # run_cell would set its own hook in place of the capture
+    # run_cell would set its own hook in place of the capture
+    with shell.display_trap, capture_output() as caught:
         done = shell.run_cell(code)
     sys.stderr.write(caught.stderr)
     if not done.success:

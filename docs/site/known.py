@@ -21,12 +21,10 @@ from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 
-AUDITS = json.loads(
-    (Path(__file__).parent / "verdicts.json").read_text(encoding="utf-8")
-)  # see test_full_verdicts.py
-TASKS = re.compile(
-    r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE
-)  # of the package's docstring
+# see test_full_verdicts.py
+AUDITS = json.loads((Path(__file__).parent / "verdicts.json").read_text(encoding="utf-8"))
+# of the package's docstring
+TASKS = re.compile(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE)
 
 SHELVES = {  # module of public names -> title of its page
     "signals": "References and disturbances",

@@ -29,9 +29,20 @@ SIGN = re.compile(
 )
 # Unicode ranges that equations use: Latin, Greek, punctuation, operators, arrows, brackets, italics
 LETTERS = [
-    (0x20, 0x7E), (0xA0, 0xFF), (0x2C6, 0x2DC), (0x300, 0x308), (0x391, 0x3F5), (0x2010, 0x2057), (0x210E, 0x210F),
-    (0x2190, 0x21D4), (0x2200, 0x22EF), (0x2308, 0x230B), (0x23B0, 0x23E1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B),
-]  # fmt: skip
+    (0x20, 0x7E),
+    (0xA0, 0xFF),
+    (0x2C6, 0x2DC),
+    (0x300, 0x308),
+    (0x391, 0x3F5),
+    (0x2010, 0x2057),
+    (0x210E, 0x210F),
+    (0x2190, 0x21D4),
+    (0x2200, 0x22EF),
+    (0x2308, 0x230B),
+    (0x23B0, 0x23E1),
+    (0x1D434, 0x1D467),
+    (0x1D6E2, 0x1D71B),
+]
 LONG = 60  # letters of LaTeX: what is longer may be wider than a phone, and scrolls
 
 
@@ -62,9 +73,8 @@ REPAIRS = [  # pattern, replacement: what browsers space or raise wrongly
 @functools.cache
 def mathml(latex: str, block: bool = False) -> str:
     """Return LaTeX as MathML; a long equation is in an element that scrolls."""
-    latex = latex.replace(r"\lvert", r"\left|").replace(
-        r"\rvert", r"\right|"
-    )  # else there is space before the second
+    # else there is space before the second
+    latex = latex.replace(r"\lvert", r"\left|").replace(r"\rvert", r"\right|")
     latex = FUNCTION.sub(lambda f: rf"\,\mathrm{{{f[1]}}}{f[2]}" + (f["bracket"] or r"\,"), latex)
     text = convert(latex, display="block" if block else "inline")
     for pattern, replacement in REPAIRS:

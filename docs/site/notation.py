@@ -92,7 +92,9 @@ TOKEN = re.compile(
 
 
 class Token(NamedTuple):
-    """A piece of text: its kind, its text, a name's mark (primes, + or ^), and the space before it."""
+    """A piece of text: its kind, its text, a name's mark (primes, + or ^), and the space before
+    it.
+    """
 
     kind: str
     text: str
