@@ -15,6 +15,7 @@ from smc_mujoco.analysis import region_of_attraction as region
 from smc_mujoco.analysis.tuning import objective, search, search_space
 from smc_mujoco.analysis.worst_case import search as attack
 from smc_mujoco.analysis.worst_case import uncertainty
+from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
 from smc_mujoco.evidence.accuracy import scaling
 from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
@@ -115,7 +116,7 @@ SAID = {
         f"to a {PARTS[scenario.DRIVE_STEPS]} of that period or half of the drive's time constant",
         f"up to {1e3 * scenario.REALISTIC_STEP:g} ms with friction",
         f"up to a {PARTS[scenario.MIN_JITTER_STEPS]} of the clock's jitter",
-        f"0 .. 2^{math.log2(scenario.MAX_SEED + 1):g} - 1",
+        f"0 .. 2^{math.log2(constraints.MAX_SEED + 1):g} - 1",
     ],
     conditions: [
         f"dry friction of {(level := under('coulomb')['friction'].level):g} N m or N is u_max / "

@@ -312,14 +312,14 @@ class Loop:
         for n, power in enumerate(powers, 2):
             rest.append(self.response(n * omega) * _first(u, power) / 1j)
         # u is shifted in time until the answer to its first harmonic has the phase of e
+        shift = 0j
         if first:
             shift = 1j * amplitude / (first * self.response(omega))
-        else:
-            shift = 0j
-        return [
-            amplitude,
-            *(x * (shift / abs(shift)) ** n if shift else 0j for n, x in enumerate(rest, 2)),
-        ]
+        turn = shift / abs(shift) if shift else 0j
+        harmonics: list[complex] = [amplitude]
+        for n, answer in enumerate(rest, 2):
+            harmonics.append(answer * turn**n)
+        return harmonics
 
     def _excited(
         self, amplitudes: Sequence[complex], omega: float, max_samples: float, position: float = 0.0
@@ -523,7 +523,9 @@ def play(amplitude: float, gap: float) -> complex:
     def excess(c: float) -> float:
         return (c - math.sin(c)) * amplitude - gap * abs(_play_at(c))
 
-    return _play_at(math.pi if excess(math.pi) < 0.0 else float(brentq(excess, 0.0, math.pi)))  # type: ignore[arg-type]
+    if excess(math.pi) < 0.0:
+        return _play_at(math.pi)
+    return _play_at(float(brentq(excess, 0.0, math.pi)))  # type: ignore[arg-type]
 
 
 def _play_at(c: float) -> complex:

@@ -130,7 +130,10 @@ class Kind:
 
     def scenarios(self, base: Scenario, level: float) -> list[Scenario]:
         """Return the scenarios that tell whether a level is tolerated."""
-        return [self.put(base, signed) for signed in ((level, -level) if self.signed else (level,))]
+        scenarios = [self.put(base, level)]
+        if self.signed:
+            scenarios.append(self.put(base, -level))
+        return scenarios
 
     def search(self, base: Scenario, resolution: float) -> Search:
         """Return the search for the margin of a scenario."""

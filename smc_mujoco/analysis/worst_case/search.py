@@ -132,7 +132,11 @@ class Search:
             scenarios.append(self.members.scenario_of(case.member, case.relay))
         for i, trace in stream(scenarios, self.threads, self.report):
             member, relay, origin = cases[i]
-            if self.swing is None and (relay.rate > 0.0 if relay else not self.members.forced):
+            if relay:
+                swings = relay.rate > 0.0
+            else:
+                swings = not self.members.forced
+            if swings and self.swing is None:
                 self.swing = trace
             if relay:
                 member = dataclasses.replace(
@@ -142,10 +146,14 @@ class Search:
                     # the recorded force differs a little from that of the relay
                     replays.append(Case(member))
                     continue
-            tried[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
+            if origin < 0:
+                origin = first + i
+            tried[i] = Tried(member, self._key(trace), origin)
         done = [one for one in tried if one]
         self.tried += done
-        return done + (self.run(replays) if replays else [])
+        if replays:
+            return done + self.run(replays)
+        return done
 
     def _key(self, trace: Trace) -> tuple[float, float]:
         if trace.failure is not None:
@@ -154,7 +162,9 @@ class Search:
         groups = by_group(trace)
         value = self.metric.worst(groups)
         error = CATALOGUE["rms_error"].worst(groups)
-        return (self.metric.absent if math.isnan(value) else value), error
+        if math.isnan(value):
+            value = self.metric.absent
+        return value, error
 
     def _simple(self) -> Iterator[list[Case]]:
         """Yield constant forces and relays, with the constants of the class in the middle of their
@@ -200,7 +210,9 @@ class Search:
             end = self.members.samples * self.members.h
             kind = worst.member.kind
             then = "sign of e'"
-            member = worst.member.named(kind if kind == then else f"{kind}, then {then}")
+            if kind != then:
+                kind = f"{kind}, then {then}"
+            member = worst.member.named(kind)
             relays = []
             for share in SWITCH_TIMES:
                 relays.append(Relay(self.members.within.disturbance, rate=1.0, start=share * end))

@@ -150,13 +150,12 @@ def default_class(scenario: Scenario) -> Uncertainty:
     If the plant declares nothing: a disturbance up to a sixth of the force of the weakest drive.
     """
     declared = scenario.plant.uncertain
-    return Uncertainty(
-        disturbance=0.0 if declared else DEFAULT_FORCE_SHARE * strength(scenario),
-        parameters=declared,
-        friction_scale=DEFAULT_FRICTION_SCALE
-        if scenario.friction or _dry(scenario.plant)
-        else (1.0, 1.0),
-    )
+    bounds = {}
+    if not declared:
+        bounds["disturbance"] = DEFAULT_FORCE_SHARE * strength(scenario)
+    if scenario.friction or _dry(scenario.plant):
+        bounds["friction_scale"] = DEFAULT_FRICTION_SCALE
+    return Uncertainty(parameters=declared, **bounds)
 
 
 def strength(scenario: Scenario) -> float:
@@ -308,7 +307,10 @@ class Members:
         else:
             bends = np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
         at = np.unique(np.concatenate([[0], np.flatnonzero(bends) + 1, [len(values) - 1]]))
-        return (Held if steps else TimeSeries)((at * self.h).tolist(), values[at].tolist())
+        times = (at * self.h).tolist()
+        if steps:
+            return Held(times, values[at].tolist())
+        return TimeSeries(times, values[at].tolist())
 
     def limited(self, force: np.ndarray) -> np.ndarray:
         """Return a force limited to -1 .. 1, and in its slope."""
