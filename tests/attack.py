@@ -50,7 +50,11 @@ MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
 # 10 minutes on two cores
-CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000}
+CASES = {
+    "scenarios": 40_000,
+    "batches": 2_000,
+    "files": 8_000,
+}
 
 
 class Found(AssertionError):
@@ -237,7 +241,22 @@ def _first(error: BaseException) -> str:
         return "?"
 
 
-ABSURD = [None, True, 0, -1, 1e308, 10**30, 0.5, "", "x", "\ud800", [], [[]], {}, {"x": 1}]
+ABSURD = [
+    None,
+    True,
+    0,
+    -1,
+    1e308,
+    10**30,
+    0.5,
+    "",
+    "x",
+    "\ud800",
+    [],
+    [[]],
+    {},
+    {"x": 1},
+]
 ABSURD += ["NaN", math.nan, math.inf]
 
 

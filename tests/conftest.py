@@ -96,7 +96,9 @@ def _possible(node: ast.expr, text: str) -> bool:
         return node.id.lower() in text
     if isinstance(node, ast.BoolOp):
         parts = [_possible(value, text) for value in node.values]
-        return all(parts) if isinstance(node.op, ast.And) else any(parts)
+        if isinstance(node.op, ast.And):
+            return all(parts)
+        return any(parts)
     return True
 
 

@@ -54,7 +54,10 @@ def mutate(node: ast.AST) -> ast.AST | None:
         case ast.Constant(value=bool(value)):
             mutant.value = not value
         case ast.Constant(value=int(value) | float(value)):
-            mutant.value = value + 1 if isinstance(value, int) else 1.1 * value + 0.1
+            if isinstance(value, int):
+                mutant.value = value + 1
+            else:
+                mutant.value = 1.1 * value + 0.1
         case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=[first, *_]):
             return first if name in FIRST_ARGUMENT else None
         case ast.IfExp() | ast.If():
@@ -70,7 +73,10 @@ def mutants(path: Path) -> list[tuple[int, str, Callable[[], str]]]:
     found = []
     for parent in ast.walk(tree):
         for field, value in ast.iter_fields(parent):
-            children = value if isinstance(value, list) else [value]
+            if isinstance(value, list):
+                children = value
+            else:
+                children = [value]
             for i, child in enumerate(children):
                 if not isinstance(child, ast.expr | ast.stmt) or field in ("annotation", "returns"):
                     continue
@@ -78,9 +84,10 @@ def mutants(path: Path) -> list[tuple[int, str, Callable[[], str]]]:
                     continue
 
                 def make(parent=parent, field=field, value=value, i=i, mutant=mutant) -> str:
-                    changed = (
-                        [*value[:i], mutant, *value[i + 1 :]] if isinstance(value, list) else mutant
-                    )
+                    if isinstance(value, list):
+                        changed = [*value[:i], mutant, *value[i + 1 :]]
+                    else:
+                        changed = mutant
                     setattr(parent, field, changed)
                     text = ast.unparse(ast.fix_missing_locations(tree))
                     setattr(parent, field, value)
@@ -150,8 +157,13 @@ def run_tests(folder: Path, room: str) -> str:
         )
     except subprocess.TimeoutExpired:
         return "(it never ends)"
-    failed = [line for line in run.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return (failed or ["(it does not start)"])[0] if run.returncode else ""
+    failed = []
+    for line in run.stdout.splitlines():
+        if line.startswith(("FAILED", "ERROR")):
+            failed.append(line)
+    if run.returncode:
+        return (failed or ["(it does not start)"])[0]
+    return ""
 
 
 if __name__ == "__main__":

@@ -20,5 +20,9 @@ for i, block in enumerate(blocks((ROOT / "README.md").read_text(), "python"), 1)
 for name, text in titled(ROOT / "docs" / "tutorial.md").items():
     (folder / name).write_text(text)
 strict = ["readme_1.py", "compare.py"]
-settings = {"typeCheckingMode": "standard", "strict": strict, "extraPaths": [str(ROOT)]}
+settings = {
+    "typeCheckingMode": "standard",
+    "strict": strict,
+    "extraPaths": [str(ROOT)],
+}
 (folder / "pyrightconfig.json").write_text(json.dumps(settings))

@@ -130,7 +130,9 @@ def test_the_package_has_these_rooms_and_no_other():
 
 def test_no_two_files_of_tests_share_a_name():
     """They would be one module, and pytest would run neither."""
-    names = [path.name for path in (ROOT / "tests").rglob("*.py")]
+    names = []
+    for path in (ROOT / "tests").rglob("*.py"):
+        names.append(path.name)
     assert sorted(set(names)) == sorted(names)
 
 
@@ -359,5 +361,7 @@ def test_no_file_names_a_folder_of_one_machine():
     folder = re.compile(
         r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users"""
     )
-    found = {label(path): folder.findall(path.read_text()) for path in TEXTS}
+    found = {}
+    for path in TEXTS:
+        found[label(path)] = folder.findall(path.read_text())
     assert {name: folders for name, folders in found.items() if folders} == {}

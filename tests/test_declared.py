@@ -31,7 +31,13 @@ from smc_mujoco.simulation.signals import Signal
 
 pytestmark = pytest.mark.quick
 
-NO_NUMBERS = ["1", None, True, [], 1j]
+NO_NUMBERS = [
+    "1",
+    None,
+    True,
+    [],
+    1j,
+]
 GIVEN = {  # what a class also needs, or two fields that depend on each other
     "Scenario": {"plant": "duffing", "law": "classical"},
     "Jump": {"factors": {}},
@@ -54,7 +60,10 @@ def bad_numbers(one):
         low = one.above
     else:
         low = below(one.low)
-    ends = [x for x in (low, beyond(one.high)) if math.isfinite(x)]
+    ends = []
+    for x in (low, beyond(one.high)):
+        if math.isfinite(x):
+            ends.append(x)
     return [*NO_NUMBERS, math.nan, -math.inf, *([] if one.infinite else [math.inf, 10**400]), *ends]
 
 
@@ -155,7 +164,10 @@ def modules():
 def of_class(kind):
     """Field -> constraint. The other parameters of a signal are numbers."""
     if issubclass(kind, Signal):
-        plain = [f.name for f in dataclasses.fields(kind) if f.type is float]
+        plain = []
+        for f in dataclasses.fields(kind):
+            if f.type is float:
+                plain.append(f.name)
     else:
         plain = []
     return dict.fromkeys(plain, Number()) | constraints.of_fields(kind)

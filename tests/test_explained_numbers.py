@@ -26,8 +26,21 @@ pytestmark = pytest.mark.quick
 
 margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
 ROOT = Path(__file__).parents[1]
-PARTS = {2: "half", 3: "third", 4: "quarter", 6: "sixth", 8: "eighth", 10: "tenth"}
-WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 9: "nine"}
+PARTS = {
+    2: "half",
+    3: "third",
+    4: "quarter",
+    6: "sixth",
+    8: "eighth",
+    10: "tenth",
+}
+WORDS = {
+    2: "two",
+    3: "three",
+    4: "four",
+    5: "five",
+    9: "nine",
+}
 
 
 def percent(share: float) -> str:

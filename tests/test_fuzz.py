@@ -12,7 +12,13 @@ import wild
 import smc_mujoco as smc
 
 
-@pytest.mark.parametrize(("part", "cases"), [("scenarios", 100), ("batches", 10)])
+@pytest.mark.parametrize(
+    ("part", "cases"),
+    [
+        ("scenarios", 100),
+        ("batches", 10),
+    ],
+)
 def test_wild_scenarios_are_refused_or_run_to_sound_traces(part, cases, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ended = [attack.case(part, 0, i) for i in range(cases)]
@@ -40,7 +46,9 @@ def test_wild_files_end_well_or_in_a_sentence(tmp_path, monkeypatch):
 def test_the_attack_finds_exceptions_crashes_and_hangs(part, broken, words, tmp_path, monkeypatch):
     """A child whose second case is broken: it is found, and the cases behind it run."""
     script = tmp_path / "broken.py"
-    path = [str(place) for place in (attack.HERE, attack.HERE.parent)]
+    path = []
+    for place in (attack.HERE, attack.HERE.parent):
+        path.append(str(place))
     script.write_text(f"""
 import sys
 sys.path[:0] = {path!r}

@@ -28,7 +28,10 @@ def test_records_of_cases_that_quick_leaves_out_are_kept_and_not_called_unused(
     assert pytester.runpytest_subprocess("--snapshot-update").ret == 0
     (records,) = pytester.path.glob("__snapshots__/*.ambr")
     both = records.read_text(encoding="utf-8")
-    for arguments in (["--quick"], ["--quick", "--snapshot-update"]):
+    for arguments in (
+        ["--quick"],
+        ["--quick", "--snapshot-update"],
+    ):
         run = pytester.runpytest_subprocess(*arguments)
         run.assert_outcomes(passed=1, deselected=1)
         assert run.ret == 0

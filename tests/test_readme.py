@@ -65,7 +65,12 @@ RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].start
 SHORTLY = Objective(duration=0.5)
 BRIEFLY = Objective(conditions=("nominal",), duration=0.25)
 LITTLE = {
-    "compare": {"seeds": 2, "duration": 0.3, "searches": 2, "budget": 4},
+    "compare": {
+        "seeds": 2,
+        "duration": 0.3,
+        "searches": 2,
+        "budget": 4,
+    },
     "tune": {"objective": SHORTLY, "searches": 2},
     "identify": {"most": 2},
     "worst_case": {"budget": 8},
@@ -147,7 +152,10 @@ def check_command(line: str, known: dict) -> None:
         if option.startswith("-") and option.partition("=")[0] not in options:
             unknown.append(option)
     assert unknown == [], line
-    given = [argument for argument in rest if not argument.startswith("-")]
+    given = []
+    for argument in rest:
+        if not argument.startswith("-"):
+            given.append(argument)
     of_template = set()
     for path in (ROOT / "examples").glob("*/*/scenes/*.py"):
         of_template.add(path.stem)

@@ -185,9 +185,17 @@ def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(t
     read = {}
     for name, value in step["env"].items():
         read[name] = given[value.removeprefix("${{ inputs.").removesuffix(" }}")]
-    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", **read}
+    environment = {
+        **os.environ,
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        **read,
+    }
     out = subprocess.run(
-        ["bash", "-c", step["run"]], env=environment, capture_output=True, text=True, check=True
+        ["bash", "-c", step["run"]],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     assert out.splitlines() == [
         "enter",

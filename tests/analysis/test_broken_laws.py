@@ -35,5 +35,12 @@ def test_a_law_that_raises_is_told_once(ask):
 
 
 def test_a_plant_that_diverges_is_no_broken_law():
-    trace = smc.run(smc.Scenario(plant="duffing", law="none", x0=1e5, duration=1.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant="duffing",
+            law="none",
+            x0=1e5,
+            duration=1.0,
+        )
+    )
     assert (trace.plant_diverged, trace.broken) == (True, "")

@@ -29,7 +29,11 @@ from smc_mujoco.metrics.limit_cycle import channel_cycle
 COARSELY = pytest.mark.usefixtures("coarse_grid")
 
 HALF = math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # of sqrt|sin| sign(sin), over 2
-INTEGRATOR = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a free mass
+INTEGRATOR = {
+    "alpha": 0.0,
+    "beta": 0.0,
+    "delta": 0.0,
+}  # of a Duffing oscillator: a free mass
 LAWS = {
     "classical": smc.law("classical", k=2.0, c=0.01),
     "super_twisting": smc.law("super_twisting", k1=1.5, k2=1.1, c=0.01),
@@ -38,7 +42,12 @@ LAWS = {
 
 def lagging(law, mu, **fields):
     """An integrator of s (c is small) behind two equal lags."""
-    given = {"actuator": (smc.Lag(mu), smc.Lag(mu)), "control_period": 1e-4, "x0": 0.0, "v0": 1e-3}
+    given = {
+        "actuator": (smc.Lag(mu), smc.Lag(mu)),
+        "control_period": 1e-4,
+        "x0": 0.0,
+        "v0": 1e-3,
+    }
     return smc.Scenario(plant=smc.plant("duffing", **INTEGRATOR), law=law, **(given | fields))
 
 
@@ -138,7 +147,11 @@ def fitted(scenario, omega):
     [
         {"actuator": (smc.Lag(5e-3), smc.Lag(5e-3))},
         {"actuator": (smc.Lag(5e-3), smc.DCMotor(inductance=1e-3))},
-        {"actuator": smc.Lag(0.01), "input_delay": 0.004, "control_period": 2e-3},
+        {
+            "actuator": smc.Lag(0.01),
+            "input_delay": 0.004,
+            "control_period": 2e-3,
+        },
     ],
     ids=["two lags", "motor", "lag and delay"],
 )
@@ -176,11 +189,24 @@ def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_mode
     answer = loop._answer(omega) / loop._answer(omega)[loop.rows[0]]
     (x, q), (v, dq) = answer[loop.rows], answer[loop.nv + loop.rows]
     (*_, fx, fv), (*_, fqx, fqv) = loop.nominal_models
-    expected = {"x": x, "v": v, "f": fx * x + fv * v, "q": q, "dq": dq, "fq": fqx * q + fqv * dq}
+    expected = {
+        "x": x,
+        "v": v,
+        "f": fx * x + fv * v,
+        "q": q,
+        "dq": dq,
+        "fq": fqx * q + fqv * dq,
+    }
     assert loop.gain(1e-6, omega) == pytest.approx(expected[name], rel=1e-3)
 
 
-@pytest.mark.parametrize(("gap", "omega"), [(1e-3, 60.0), (5e-2, 20.0)])
+@pytest.mark.parametrize(
+    ("gap", "omega"),
+    [
+        (1e-3, 60.0),
+        (5e-2, 20.0),
+    ],
+)
 def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omega):
     scenario = smc.Scenario(
         plant=smc.plant("duffing", **INTEGRATOR),
@@ -200,11 +226,21 @@ def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omeg
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("law", "gap"), [("twisting", 2e-2), ("quasi_continuous", 2e-3)])
+@pytest.mark.parametrize(
+    ("law", "gap"),
+    [
+        ("twisting", 2e-2),
+        ("quasi_continuous", 2e-3),
+    ],
+)
 def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
     gear = smc.Backlash(gap, rotor_inertia=5e-3)
     scenario = smc.Scenario(
-        plant="duffing", law=law, x0=0.02, duration=6.0, actuator=(smc.Lag(0.01), gear)
+        plant="duffing",
+        law=law,
+        x0=0.02,
+        duration=6.0,
+        actuator=(smc.Lag(0.01), gear),
     )
     cycle = chattering(scenario)
     # with play, positions lead by half a step
@@ -289,7 +325,13 @@ SLOWLY = {"velocity": smc.estimator("filtered_difference", tau=0.01)}  # 1.5 tim
     ],
 )
 def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, fields):
-    scenario = smc.Scenario(plant=plant, law=law, x0=0.02, duration=6.0, **fields)
+    scenario = smc.Scenario(
+        plant=plant,
+        law=law,
+        x0=0.02,
+        duration=6.0,
+        **fields,
+    )
     cycle = chattering(scenario)
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(
         measured(smc.run(scenario)), rel=0.15
@@ -298,7 +340,11 @@ def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, fields):
 
 def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
     scenario = smc.Scenario(
-        plant="inverted_pendulum", law="power_rate", actuator=smc.DCMotor(), x0=0.02, duration=3.0
+        plant="inverted_pendulum",
+        law="power_rate",
+        actuator=smc.DCMotor(),
+        x0=0.02,
+        duration=3.0,
     )
     cycle = chattering(scenario)
     assert cycle.frequency * scenario.control_period == pytest.approx(0.5)
@@ -327,7 +373,11 @@ def test_samples_delay_a_relay_by_half_a_period_and_a_smooth_law_by_none():
 @pytest.mark.parametrize("lag", [0.007, 0.03])
 def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
     scenario = smc.Scenario(
-        plant="duffing", law=RELAY, actuator=smc.Lag(lag), x0=0.02, duration=6.0
+        plant="duffing",
+        law=RELAY,
+        actuator=smc.Lag(lag),
+        x0=0.02,
+        duration=6.0,
     )
     cycle, (amplitude, frequency) = chattering(scenario), measured(smc.run(scenario))
     assert cycle.uncertainty > 1.0
@@ -337,7 +387,12 @@ def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
 
 
 def test_a_cycle_that_the_samples_alone_hold_is_within_its_ranges_and_called_so():
-    scenario = smc.Scenario(plant="duffing", law="power_rate", x0=0.02, duration=2.0)
+    scenario = smc.Scenario(
+        plant="duffing",
+        law="power_rate",
+        x0=0.02,
+        duration=2.0,
+    )
     cycle, (amplitude, frequency) = chattering(scenario), channel_cycle(smc.run(scenario), 0)
     assert math.isnan(cycle.amplitude)
     assert cycle.amplitude_range[0] < amplitude < cycle.amplitude_range[1]
@@ -355,7 +410,10 @@ def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
     for field, kinds in parts.items():
         for word, part in kinds.items():
             run = smc.Scenario(
-                plant="inverted_pendulum", law="classical", physics_step=2.5e-4, **{field: part}
+                plant="inverted_pendulum",
+                law="classical",
+                physics_step=2.5e-4,
+                **{field: part},
             )
             said = " ".join(one for one in _assumptions(Loop(run)) if one not in plain)
             others = {each for its in parts.values() for each in its} - {word}
@@ -413,8 +471,19 @@ class Formula:
         return self.size / (1j * omega * (1.0 + 1j * omega / self.turn) ** 2)
 
     def wave(self, amplitude, omega):
-        nothing = {"third": math.nan, "s": amplitude, "u": 0.0, "rate": 0.0, "drift": 0.0}
-        return Wave(amplitude=amplitude, omega=omega, gain=self.gain(amplitude, omega), **nothing)
+        nothing = {
+            "third": math.nan,
+            "s": amplitude,
+            "u": 0.0,
+            "rate": 0.0,
+            "drift": 0.0,
+        }
+        return Wave(
+            amplitude=amplitude,
+            omega=omega,
+            gain=self.gain(amplitude, omega),
+            **nothing,
+        )
 
 
 def saturation(a):
@@ -468,7 +537,11 @@ def thruster(y, gains, memory):
 def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_rests():
     damped = smc.plant("duffing", alpha=0.0, beta=0.0, delta=2.0)
     scenario = smc.Scenario(
-        plant=damped, law=thruster(), actuator=smc.Lag(0.02), v0=0.0, duration=20.0
+        plant=damped,
+        law=thruster(),
+        actuator=smc.Lag(0.02),
+        v0=0.0,
+        duration=20.0,
     )
     cycle = chattering(scenario)
     # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
@@ -512,7 +585,11 @@ def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     assert math.isnan(calm.frequency)
     assert math.isnan(calm.uncertainty)
     scenario = smc.Scenario(
-        plant=plant, law=law, input_delay=round(1.15 * critical, 3), x0=0.1, duration=40.0
+        plant=plant,
+        law=law,
+        input_delay=round(1.15 * critical, 3),
+        x0=0.1,
+        duration=40.0,
     )
     assert above
     assert (above.amplitude, above.frequency) == pytest.approx(

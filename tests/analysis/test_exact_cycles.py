@@ -28,7 +28,13 @@ def scenario(loop, **fields):
             current=math.inf,
         )
     return smc.Scenario(
-        plant=smc.plant("duffing", M=loop.M, alpha=loop.alpha, beta=0.0, delta=loop.delta),
+        plant=smc.plant(
+            "duffing",
+            M=loop.M,
+            alpha=loop.alpha,
+            beta=0.0,
+            delta=loop.delta,
+        ),
         law=smc.law(NAMES[loop.kind], **dict(zip(GAINS[loop.kind], loop.gains, strict=True))),
         control_period=loop.period,
         input_delay=loop.periods_late * loop.period,
@@ -121,7 +127,11 @@ def test_gains_for_an_amplitude_keep_the_machine_below_it(name):
     loop, amplitude, _ = VECTORS[name]
     base = scenario(loop)
     wanted = 0.5 * amplitude
-    fields = {"actuator": base.actuator, "control_period": loop.period, "u_max": math.inf}
+    fields = {
+        "actuator": base.actuator,
+        "control_period": loop.period,
+        "u_max": math.inf,
+    }
     design = smc.design.gains_for(base.law, base.plant, amplitude=wanted, **fields)
     gains = tuple(design.law.gains[gain] for gain in GAINS[loop.kind])
     realised, _ = ExactLoop(loop.kind, gains, loop.period, loop.lags).cycle()

@@ -54,7 +54,15 @@ def from_near_rest(
 ) -> np.ndarray:
     """|x| of the worst channel at the samples, after a push that leaves every mode moving."""
     x0 = [SMALL * x for x in plant.x0]
-    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=x0, input_delay=delay, duration=duration))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            x0=x0,
+            input_delay=delay,
+            duration=duration,
+        )
+    )
     return np.abs(trace.x).max(axis=1)
 
 
@@ -178,7 +186,13 @@ def test_the_measured_steady_error_is_the_one_of_theory_within_one_percent(plant
     d = 0.2
     law = own(plant)
     trace = smc.run(
-        smc.Scenario(plant=plant, law=law, disturbance=smc.Constant(d), x0=0.01, duration=15.0)
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            disturbance=smc.Constant(d),
+            x0=0.01,
+            duration=15.0,
+        )
     )
     measured = steady_error(trace)
     assert measured == pytest.approx(
@@ -191,7 +205,15 @@ def test_under_the_tolerated_force_the_plant_comes_to_rest_at_the_limit(plant):
     law = own(plant)
     most = 0.02
     push = smc.Constant(linear_theory.tolerated_force(plant, law, most) or math.nan)
-    trace = smc.run(smc.Scenario(plant=plant, law=law, disturbance=push, x0=0.01, duration=15.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            disturbance=push,
+            x0=0.01,
+            duration=15.0,
+        )
+    )
     assert steady_error(trace) == pytest.approx(most, rel=1e-3)
 
 
@@ -216,5 +238,13 @@ def test_beyond_what_the_law_can_hold_a_pendulum_rests_nowhere():
     assert summit is not None
     for factor in (0.99, 1.01):
         push = smc.Constant(factor * summit)
-        trace = smc.run(smc.Scenario(plant=plant, law=law, x0=0.1, disturbance=push, duration=20.0))
+        trace = smc.run(
+            smc.Scenario(
+                plant=plant,
+                law=law,
+                x0=0.1,
+                disturbance=push,
+                duration=20.0,
+            )
+        )
         assert (abs(trace.x[-1, 0]) < 0.5) == (factor < 1.0)

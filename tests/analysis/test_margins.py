@@ -38,7 +38,12 @@ def found():
 
 
 def kind_of(put):
-    return margins.Kind(label="push", unit="{u}", levels=(1.0, 2.0, 4.0), put=put)
+    return margins.Kind(
+        label="push",
+        unit="{u}",
+        levels=(1.0, 2.0, 4.0),
+        put=put,
+    )
 
 
 def pushed(level):
@@ -79,7 +84,14 @@ def test_a_run_tolerates_what_leaves_it_within_five_percent_of_its_start():
 
 
 def test_a_run_tolerates_nothing_if_its_pole_has_fallen_though_the_cart_is_home():
-    trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 0.0), duration=1.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant="cart_pole",
+            law="none",
+            x0=(0.0, 0.0),
+            duration=1.0,
+        )
+    )
     fallen = trace.x.copy()
     assert margins.tolerates(trace)
     fallen[:, 1] = np.linspace(0.0, 3.0, len(fallen))

@@ -21,7 +21,12 @@ WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a
 
 
 def base(plant: str, law: Law, duration: float = 6.0) -> smc.Scenario:
-    return smc.Scenario(plant=plant, law=law, duration=duration, integrator="implicitfast")
+    return smc.Scenario(
+        plant=plant,
+        law=law,
+        duration=duration,
+        integrator="implicitfast",
+    )
 
 
 def to_the_end(scenario, x, v):
@@ -88,7 +93,10 @@ def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **e
     for name, values in signals.items():
         columns[name] = values[:, None]
     trace = SimpleNamespace(
-        t=t, **columns, scenario=scenario, **{"failure": None, "diverged_at": None} | ended
+        t=t,
+        **columns,
+        scenario=scenario,
+        **{"failure": None, "diverged_at": None} | ended,
     )
     return maps.verdict_of(trace, np.array([-2.0, 1.0]), np.array([0.5, -4.0]), final)
 
@@ -171,7 +179,10 @@ def test_rest_a_turn_away_does_not_converge_and_the_way_back_from_there_takes_ti
         base("inverted_pendulum", counts_no_turns, 3.0), [0.0, 2 * math.pi], [0.0]
     )
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
-    for duration, outcome in ((3.0, UNDECIDED), (6.0, CONVERGES)):
+    for duration, outcome in (
+        (3.0, UNDECIDED),
+        (6.0, CONVERGES),
+    ):
         found = maps.basin_of(
             base("inverted_pendulum", smc.law("lqr"), duration), [2 * math.pi], [0.0]
         )

@@ -36,7 +36,12 @@ def test_a_p_value_is_the_share_of_signs_with_as_large_a_rank_sum(differences):
 
 
 @pytest.mark.parametrize(
-    "differences", [[1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5], [0.0, 0.0, 1.0, -1.0, 2.0]], ids=len
+    "differences",
+    [
+        [1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5],
+        [0.0, 0.0, 1.0, -1.0, 2.0],
+    ],
+    ids=len,
 )
 def test_ties_and_zeros_only_raise_a_p_value(differences):
     pairs = list(itertools.combinations_with_replacement(differences, 2))
@@ -54,7 +59,10 @@ def test_an_interval_has_the_centres_that_the_test_does_not_reject(error):
     differences = np.random.default_rng(5).standard_normal(9) ** 3
     centre, low, high = interval(differences, error)
     assert low < centre < high
-    for end, side in ((low, 1.0), (high, -1.0)):
+    for end, side in (
+        (low, 1.0),
+        (high, -1.0),
+    ):
         outside, inside = (
             float(p_values(side * (differences - end) + shift)) for shift in (1e-9, -1e-9)
         )

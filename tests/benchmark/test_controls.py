@@ -71,7 +71,13 @@ def test_no_law_of_an_entry_is_told_anything():
     assert not controls.is_oracle(told())
 
 
-@pytest.mark.parametrize(("name", "told"), [("geometric", False), ("oracle", True)])
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("geometric", False),
+        ("oracle", True),
+    ],
+)
 def test_the_oracle_of_flight_alone_knows_a_payload(name, told):
     one = smc.problem("quadrotor/payload@2")
     (scenario,) = one.scenarios(

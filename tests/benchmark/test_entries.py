@@ -76,7 +76,16 @@ def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_pat
     visible = entering.enter(folder, out=out, instances=2)
     target = entering.enter(folder, seed=7, out=out, instances=2)
     assert target == out / "smc-30@1-seed-7" / "own_law"
-    assert entering.enter(folder, seed=7, out=out, instances=2, verify=True) == target
+    assert (
+        entering.enter(
+            folder,
+            seed=7,
+            out=out,
+            instances=2,
+            verify=True,
+        )
+        == target
+    )
     found = smc.results(target.parent)
     about = found.entries["own law"].about
     assert about["seed"] == 7
@@ -111,7 +120,10 @@ def test_a_law_that_never_ends_is_stopped(tmp_path, small, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "words"),
-    [("gains.k * y.e / 0.0 * 0.0", "duffing"), ("float(len([0.0] * 10**10))", "MemoryError")],
+    [
+        ("gains.k * y.e / 0.0 * 0.0", "duffing"),
+        ("float(len([0.0] * 10**10))", "MemoryError"),
+    ],
 )
 def test_failed_runs_are_told_and_stand_last(body, words, tmp_path, small):
     out = tmp_path / "results"
@@ -142,7 +154,14 @@ def made(medians):
 
 def test_equal_laws_are_level_and_a_better_one_is_first():
     middle = np.linspace(0.1, 1.0, 30)
-    board = made({"a": middle, "b": middle, "c": 0.5 * middle, "d": 2.0 * middle}).board("speed")
+    board = made(
+        {
+            "a": middle,
+            "b": middle,
+            "c": 0.5 * middle,
+            "d": 2.0 * middle,
+        }
+    ).board("speed")
     places = {}
     for one in board.standings:
         places[one.entry] = (one.place, one.rank, one.level)

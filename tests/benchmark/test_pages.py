@@ -31,8 +31,17 @@ def entered(folder, name, factor, failures=()):
     for cell in PROBLEMS:
         group = []
         for i in range(3):
-            row = {column: factor * rng.uniform(0.1, 1.0) for column in runs.COLUMNS[1:]}
-            group.append({"problem": cell, "instance": i, "failed": 0.0} | row)
+            row = {}
+            for column in runs.COLUMNS[1:]:
+                row[column] = factor * rng.uniform(0.1, 1.0)
+            group.append(
+                {
+                    "problem": cell,
+                    "instance": i,
+                    "failed": 0.0,
+                }
+                | row
+            )
         groups.append(group)
     runs.write(target / TABLE, groups)
     table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()
@@ -80,7 +89,10 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
-    for name, factor in (("slow", 2.0), ("fast", 1.0)):
+    for name, factor in (
+        ("slow", 2.0),
+        ("fast", 1.0),
+    ):
         entered(folder / "results", name, factor)
     entered(folder / "results", "odd", 3.0, ["duffing/noise@1#00: it diverged"])
     return pages.build(folder / "results", folder / "site")[0].parent
@@ -166,7 +178,10 @@ FORGED = {
 
 @pytest.mark.parametrize(("forge", "words"), FORGED.values(), ids=FORGED)
 def test_a_forged_result_is_left_out_and_the_others_stand(tmp_path, forge, words):
-    for name, factor in (("slow", 2.0), ("aforged", 0.5)):
+    for name, factor in (
+        ("slow", 2.0),
+        ("aforged", 0.5),
+    ):
         entered(tmp_path / "results", name, factor)
     forge(tmp_path / "results" / "smc-30@1" / "aforged")
     page, refused = pages.build(tmp_path / "results", tmp_path / "site")

@@ -57,7 +57,10 @@ def test_an_instance_is_drawn_as_the_rules_say(name, index, seed):
 
 
 def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
-    for name, field in (("duffing/sine@1", "amplitude"), ("duffing/process_noise@1", "sigma")):
+    for name, field in (
+        ("duffing/sine@1", "amplitude"),
+        ("duffing/process_noise@1", "sigma"),
+    ):
         one = smc.problem(name)
         drawn, (scenario,) = one.instance(5, SEED), one.scenarios("pid", [5], SEED)
         assert scenario.x0 == (drawn.side * drawn.start * 1.5,)
@@ -80,7 +83,16 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
         ("wind", lambda k: {"disturbance": (smc.signals.Wind(3.0 * k),)}),
         ("gust", lambda k: {"disturbance": (smc.signals.Wind(6.0 * k, time=4.5, width=1.0),)}),
         ("payload", lambda k: {"mismatch": {"payload": 0.006 * k, "mass": 1.0}}),
-        ("slow_rotors", lambda k: {"mismatch": {"rise": 0.625, "fall": 0.625, "mass": 1.0}}),
+        (
+            "slow_rotors",
+            lambda k: {
+                "mismatch": {
+                    "rise": 0.625,
+                    "fall": 0.625,
+                    "mass": 1.0,
+                }
+            },
+        ),
     ],
 )
 def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_from_rest(
@@ -123,7 +135,11 @@ def made_trace(one: problems.Problem, e: np.ndarray, u: np.ndarray) -> smc.Trace
 
 def test_measures_by_hand():
     one = smc.problem("duffing/noise@1")
-    vars(one)["_frozen"] = {"accuracy": [0.01, 0.1], "settling": [1.5, 2.5], "calm": [0.4, 0.6]}
+    vars(one)["_frozen"] = {
+        "accuracy": [0.01, 0.1],
+        "settling": [1.5, 2.5],
+        "calm": [0.4, 0.6],
+    }
     e = np.where(np.arange(4001) < 1000, 1.0, 0.05)  # 5 % of the start from 1 s on
     # eight changes by 1.5 in 4 s, of 6: 1/2 per second
     u = np.where(np.arange(4001) % 1000 < 500, 0.0, 1.5)
@@ -151,7 +167,11 @@ def test_measures_by_hand():
 def test_an_error_that_is_small_by_chance_at_the_end_is_not_kept():
     """As that of a pendulum which swings through its goal."""
     one = smc.problem("duffing/noise@1")
-    vars(one)["_frozen"] = {"accuracy": [0.1], "settling": [4.0], "calm": [9.0]}
+    vars(one)["_frozen"] = {
+        "accuracy": [0.1],
+        "settling": [4.0],
+        "calm": [9.0],
+    }
     found = one.measures(
         made_trace(one, np.where(np.arange(4001) < 3900, 1.0, 0.0), np.zeros(4001))
     )

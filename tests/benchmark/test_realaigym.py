@@ -26,7 +26,10 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
-ORDER = {"acrobot": [1, 0], "pendubot": [0, 1]}  # channels of shoulder and elbow
+ORDER = {
+    "acrobot": [1, 0],
+    "pendubot": [0, 1],
+}  # channels of shoulder and elbow
 DIGITS = {"torque_smoothness": 3}  # of the published criteria after the point; of the others 2
 DRAWN = {  # seed -> first times of resets, and goals
     333: ((3.9924, 8.2595, 11.3649, 15.6190, 18.2143),
@@ -92,7 +95,12 @@ def of_arrays(t, q, v, u, robot):
     scenario = smc.Scenario(plant=robot, law="none")
     order = ORDER[robot]
     trace = SimpleNamespace(
-        t=t, x=q[:, order], v=v[:, order], u=u[:, None], scenario=scenario, failure=None
+        t=t,
+        x=q[:, order],
+        v=v[:, order],
+        u=u[:, None],
+        scenario=scenario,
+        failure=None,
     )
     return boards.criteria(trace)
 
@@ -201,7 +209,11 @@ def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
     monkeypatch.setattr(simulator, "TESTS", ("model", "delay", "perturbations"))
     found = simulator.robustness(boards.entry("acrobot"))
     assert found.survived["model"] == (("a", 0.0, True), ("b", 0.0, True))
-    assert found.percent == {"model": 100.0, "delay": 0.0, "perturbations": 0.0}
+    assert found.percent == {
+        "model": 100.0,
+        "delay": 0.0,
+        "perturbations": 0.0,
+    }
     assert found.score == pytest.approx(1.0 / 3.0)
 
 
@@ -294,7 +306,9 @@ def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, tr
     runs = dict(zip(rows, smc.run(list(rows.values())), strict=True))
     assert boards.board(runs)[0].name in rows
     score = {name: boards.score(trace) for name, trace in runs.items()}
-    published = [row.score for row in boards.SIMULATION[robot]["v2"]]
+    published = []
+    for row in boards.SIMULATION[robot]["v2"]:
+        published.append(row.score)
     for name, value in score.items():
         if "sliding" in name:
             assert value < min(published)
@@ -373,7 +387,12 @@ def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_i
     table = trajectory(robot)
     nodes = float(table["step"]) * np.arange(len(table["u"]))
     paths = []
-    for value, rate in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq")):
+    for value, rate in (
+        ("x", "v"),
+        ("v", "a"),
+        ("q", "dq"),
+        ("dq", "ddq"),
+    ):
         paths.append(CubicHermiteSpline(nodes, table[value], table[rate]))
     for t in (0.0, 0.0013, 1.2345, nodes[-2], nodes[-1] - 1e-4, nodes[-1] + 3.0):
         now = min(t, nodes[-1])
@@ -383,7 +402,14 @@ def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_i
         rows = []
         for key in ("s_x", "s_v", "s_q", "s_dq"):
             rows.append(np.interp(t, nodes, table[key]))
-        y = SimpleNamespace(t=t, dt=0.004, x=x, v=v, q=q, dq=dq)
+        y = SimpleNamespace(
+            t=t,
+            dt=0.004,
+            x=x,
+            v=v,
+            q=q,
+            dq=dq,
+        )
         u, s = template.function(y, SimpleNamespace(k=0.7, phi=1.3), None)
         assert s == pytest.approx(np.dot(rows, apart), abs=1e-9)
         along = np.interp(t + 0.002, nodes, table["u"])
@@ -408,7 +434,9 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
             ahead = plant.nominal(top + d, rest, i, p)[0]
             A[2 + i, j] = (ahead - plant.nominal(top - d, rest, i, p)[0]) / 2e-6
     row = (b.T @ solve_continuous_are(A, b, np.diag([1.0, 1.0, 0.1, 0.1]), [[1.0]])).ravel()
-    last = [table[key][-1] for key in ("s_x", "s_q", "s_v", "s_dq")]
+    last = []
+    for key in ("s_x", "s_q", "s_v", "s_dq"):
+        last.append(table[key][-1])
     np.testing.assert_allclose(last, row, rtol=1e-5)
 
 

@@ -37,7 +37,11 @@ def test_levels_are_the_quantiles_of_the_medians():
     """Of 1, 2, ... 21 the quantiles at 10, 25, 50, 75 and 90 % are 3, 6, 11, 16 and 19."""
     found = frozen(0.001, [1e-6], [1.0])
     assert found is not None
-    for measure, unit in (("accuracy", 0.001), ("settling", 0.1), ("calm", 1.0)):
+    for measure, unit in (
+        ("accuracy", 0.001),
+        ("settling", 0.1),
+        ("calm", 1.0),
+    ):
         assert found[measure] == pytest.approx([unit * i for i in (3, 6, 11, 16, 19)])
     assert found["oracle"] == [16.0, 0.5]
 
@@ -62,7 +66,13 @@ def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize(("seen", "hardest"), [(0.049, 0.05), (0.052, 0.05252)])
+@pytest.mark.parametrize(
+    ("seen", "hardest"),
+    [
+        (0.049, 0.05),
+        (0.052, 0.05252),
+    ],
+)
 def test_a_level_is_no_harder_than_the_oracles_worst_on_visible_instances(seen, hardest):
     """There it has no margin: of drawn ones the worst, 0.04, has one of 1.25."""
     found = frozen(0.01, [0.04], [0.9], seen)
@@ -112,7 +122,10 @@ def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_boar
 def test_both_controls_on_instances_that_nobody_saw(name):
     one = smc.problem(name)
     instances = range(1) if "/worst" in name else range(4)
-    for control, reached in (("zero", False), ("oracle", True)):
+    for control, reached in (
+        ("zero", False),
+        ("oracle", True),
+    ):
         for trace in smc.run(one.scenarios(one.controls[control], instances, FRESH)):
             times = {}
             for key, time in one.measures(trace).items():

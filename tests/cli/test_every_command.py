@@ -214,7 +214,9 @@ def folder(tmp_path, monkeypatch):
 def options(words: list[str]) -> list[tuple[int, int]]:
     """Return where each option and its value begin and end in a command line."""
     starts = [k for k, word in enumerate(words) if word.startswith("--")]
-    alone = [words[k] in FLAGS or "=" in words[k] for k in starts]
+    alone = []
+    for k in starts:
+        alone.append(words[k] in FLAGS or "=" in words[k])
     return [(k, k + (1 if flag else 2)) for k, flag in zip(starts, alone, strict=True)]
 
 

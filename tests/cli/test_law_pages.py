@@ -62,7 +62,10 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert err == ""
     assert max(map(len, out.splitlines())) <= 80
     rows = filter(None, map(str.split, out.splitlines()))
-    lines = {name: rest for name, *rest in rows if name in laws()}
+    lines = {}
+    for name, *rest in rows:
+        if name in laws():
+            lines[name] = rest
     assert lines["continuous_twisting"][:2] == ["Continuous", "twisting:"]
     assert not {"twisting", "lqr"} & {*lines}
     words = "laws that have a continuous u and bring the error to 0 in finite time"

@@ -54,7 +54,10 @@ def test_an_answer_is_the_same_with_equal_words_and_numbers_within_five_percent(
 
 def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():
     scenario = smc.Scenario(
-        plant="duffing", law="classical", noise=smc.Noise(position=0.01), x0=1.0
+        plant="duffing",
+        law="classical",
+        noise=smc.Noise(position=0.01),
+        x0=1.0,
     )
     half = halved(scenario)
     moved = nudged(scenario)
@@ -83,7 +86,12 @@ def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_a_score_that_changes_by_less_is_marked_without_rk4_alone(integrator):
     trace = smc.run(
-        smc.Scenario(plant="duffing", law="adaptive", integrator=integrator, duration=1.0)
+        smc.Scenario(
+            plant="duffing",
+            law="adaptive",
+            integrator=integrator,
+            duration=1.0,
+        )
     )
     larger = dataclasses.replace(trace, x=1.03 * trace.x)
     (table,) = tables.scores("t", {"a": trace}, {"a": [larger, trace]})
@@ -109,8 +117,16 @@ def cells(table) -> list[str]:
 def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
     fine = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.1))
     lost = dataclasses.replace(fine, diverged_at=0.05)
-    runs = {"a": fine, "b": lost, "c": lost}
-    again = {"a": [fine, lost], "b": [fine, fine], "c": [lost, lost]}
+    runs = {
+        "a": fine,
+        "b": lost,
+        "c": lost,
+    }
+    again = {
+        "a": [fine, lost],
+        "b": [fine, fine],
+        "c": [lost, lost],
+    }
     (table,) = tables.scores("t", runs, again)
     shown = tables.number(smc.score(fine)["tv_rate"])
     for said in (
@@ -133,7 +149,10 @@ def test_every_number_of_a_scene_is_compared_with_its_runs_again(monkeypatch, tm
     """
     runs = {"wall": {"a": arm(0.01)}}
     scene = smc.Scene(
-        title="t", conditions=runs, answers=("tv_rate",), answer=lambda outcome: "said"
+        title="t",
+        conditions=runs,
+        answers=("tv_rate",),
+        answer=lambda outcome: "said",
     )
     given = []
     for name in ("scores", "tips"):

@@ -49,7 +49,8 @@ def fresh(code: str, **variables: str) -> str:
         text=True,
         check=False,
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
+    assert done.stderr == ""
     return done.stdout
 
 
@@ -181,7 +182,9 @@ def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monk
 
 
 def test_renderers_have_mujoco_s_size_by_default_and_are_closed_at_the_end(monkeypatch):
-    sizes = [inspect.signature(made).parameters for made in (gl.renderer, mujoco.Renderer)]
+    sizes = []
+    for made in (gl.renderer, mujoco.Renderer):
+        sizes.append(inspect.signature(made).parameters)
     assert [[size[name].default for name in ("height", "width")] for size in sizes] == [
         [240, 320]
     ] * 2

@@ -65,7 +65,8 @@ def test_what_a_trial_returns_comes_back():
 def test_a_trial_has_limits(kind, said, tmp_path):
     with pytest.raises(guard.Failed, match=f"^{said}") as failed:
         guard.run_isolated(__name__, {"kind": kind, "file": str(tmp_path / "large")}, 60.0)
-    assert (failed.value.stage, failed.value.code) == ("working", 0)
+    assert failed.value.stage == "working"
+    assert failed.value.code == 0
     assert not [path for path in tmp_path.iterdir() if path.stat().st_size > 0]
 
 
@@ -152,10 +153,8 @@ def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
     assert arithmetic.changed()
     assert not arithmetic.changed()
     assert library.fegetround() == library.fegetexcept() == 0
-    assert (1.0 / three, 1.0 / ten) == (
-        float.fromhex("0x1.5555555555555p-2"),
-        float.fromhex("0x1.999999999999ap-4"),
-    )
+    assert 1.0 / three == float.fromhex("0x1.5555555555555p-2")
+    assert 1.0 / ten == float.fromhex("0x1.999999999999ap-4")
     assert least / ten * 2.0**1000 > 0.0
 
 

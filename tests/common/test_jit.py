@@ -60,7 +60,9 @@ def test_code_is_kept_if_no_other_process_numbers_a_function_alike_and_no_addres
         ([own], [numbas], "x", True),
         ([own], [], internals.UNRESOLVED, False),
     ):
-        functions = [SimpleNamespace(name=name, is_declaration=False) for name in names_of]
+        functions = []
+        for name in names_of:
+            functions.append(SimpleNamespace(name=name, is_declaration=False))
         functions += [SimpleNamespace(name=name, is_declaration=True) for name in declared]
         module = SimpleNamespace(
             global_variables=[SimpleNamespace(name=filled)], functions=functions

@@ -214,7 +214,8 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
         )
     leave.set()
     slow.let.set()
-    assert all(end.wait(60) for end in ends)
+    for end in ends:
+        assert end.wait(60)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
@@ -255,7 +256,8 @@ thread.join()
 
 def test_a_policy_and_another_thread_may_import_the_batches_at_once():
     done = python("-c", IMPORTS)
-    assert (done.stdout, done.stderr) == ("None\n", "")
+    assert done.stdout == "None\n"
+    assert done.stderr == ""
 
 
 def foreign(*arguments):

@@ -22,10 +22,13 @@ def test_a_command_has_no_input_plain_words_and_its_folder(tmp_path):
         "sys.exit('ä\\udc80')"
     )
     done = timed([sys.executable, "-X", "utf8", "-c", code], 20.0, cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (1, f"C {tmp_path} True\n")
+    assert done.returncode == 1
+    assert done.stdout == f"C {tmp_path} True\n"
     assert done.stderr.endswith("\n")
     quiet = timed([sys.executable, "-c", "print(1)"], 20.0, output=False)
-    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, None, None)
+    assert quiet.returncode == 0
+    assert quiet.stdout is None
+    assert quiet.stderr is None
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell")

@@ -75,7 +75,11 @@ def test_only_the_integral_leaves_no_error_under_a_constant_force():
     """Without it the mass rests where kp e = d."""
     with_it = smc.law("pid")
     without = smc.law("pid", ki=0.0)
-    for law, rest in ((with_it, 0.0), (without, 0.2), (smc.law("computed_torque", kp=10.0), 0.2)):
+    for law, rest in (
+        (with_it, 0.0),
+        (without, 0.2),
+        (smc.law("computed_torque", kp=10.0), 0.2),
+    ):
         trace = free(
             law,
             disturbance=smc.Constant(2.0),
@@ -107,7 +111,15 @@ def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceede
     ("name", "gains"),
     [
         ("pid", {"ki": 0.0, "tau": 0.0}),
-        ("lqi", {"q0": 0.0, "a1": 0.0, "a2": 0.0, "b": 1.0}),
+        (
+            "lqi",
+            {
+                "q0": 0.0,
+                "a1": 0.0,
+                "a2": 0.0,
+                "b": 1.0,
+            },
+        ),
     ],
 )
 def test_a_law_whose_integral_has_no_gain_remembers_no_saturation(name, gains):
@@ -243,7 +255,10 @@ def test_the_catch_holds_all_that_its_torque_can_hold_and_nothing_more(side):
     """Upright with the speed v0, s = v0: it returns for |v0| < u_max / (J w), else it falls
     whatever the law.
     """
-    for part, holds in ((0.95, True), (1.05, False)):
+    for part, holds in (
+        (0.95, True),
+        (1.05, False),
+    ):
         v0 = side * part * 0.3 / (J * W)
         law = smc.law("swing_up", part=0.99)
         trace = smc.run(

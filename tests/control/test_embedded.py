@@ -42,7 +42,14 @@ def test_the_table_is_as_close_as_linear_interpolation_allows(size):
     assert 0.85 * bound < error <= bound
 
 
-@pytest.mark.parametrize(("terms", "error"), [(1, 3.3e-3), (3, 5.5e-6), (5, 2.3e-7)])
+@pytest.mark.parametrize(
+    ("terms", "error"),
+    [
+        (1, 3.3e-3),
+        (3, 5.5e-6),
+        (5, 2.3e-7),
+    ],
+)
 def test_the_series_is_as_close_as_its_terms_allow(terms, error):
     assert (
         0.75 * error

@@ -42,7 +42,14 @@ def differenced(tau):
     return smc.estimator("filtered_difference", tau=tau)
 
 
-@pytest.mark.parametrize(("tau", "h"), [(0.0, 5e-3), (1e-3, 1e-3), (0.1, 5e-3)])
+@pytest.mark.parametrize(
+    ("tau", "h"),
+    [
+        (0.0, 5e-3),
+        (1e-3, 1e-3),
+        (0.1, 5e-3),
+    ],
+)
 def test_filtered_difference_of_a_ramp_is_its_slope_after_an_exponential(tau, h):
     """v_k = c (1 - a^k), a = tau / (tau + h): exact at once for tau = 0."""
     k = np.arange(3000)
@@ -246,7 +253,16 @@ def test_kalman_s_gains_are_those_of_the_riccati_equation(lam):
         )
 
 
-@pytest.mark.parametrize(("window", "degree"), [(2, 1), (5, 2), (15, 3), (31, 2), (128, 4)])
+@pytest.mark.parametrize(
+    ("window", "degree"),
+    [
+        (2, 1),
+        (5, 2),
+        (15, 3),
+        (31, 2),
+        (128, 4),
+    ],
+)
 def test_savitzky_golay_is_scipy_s_filter_at_the_last_point(window, degree):
     x = np.random.default_rng(0).normal(size=400)
     out = both(

@@ -101,7 +101,11 @@ def pushed(law, torque=roll):
     gains = {name: Gain(value, shared=True) for name, value in law.gains.items()}
 
     @smc.law_function(
-        joint=True, requires_model=True, plants=("a free body",), gains=gains, memory=law.memory
+        joint=True,
+        requires_model=True,
+        plants=("a free body",),
+        gains=gains,
+        memory=law.memory,
     )
     def with_torque(y, gains, memory):
         u, s = base(y, gains, memory)
@@ -123,11 +127,18 @@ def grown(trace, i, K0, G, rho, eps):
 
 @pytest.mark.parametrize(
     ("law", "expected"),
-    [("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)), ("geometric", 0.19 * G / 7.0)],
+    [
+        ("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)),
+        ("geometric", 0.19 * G / 7.0),
+    ],
 )
 def test_an_unknown_weight_sags_by_the_closed_form(drone, law, expected):
     scenario = smc.Scenario(
-        plant=drone, law=law, mismatch={"m": 1.19}, duration=12.0, control_period=2e-3
+        plant=drone,
+        law=law,
+        mismatch={"m": 1.19},
+        duration=12.0,
+        control_period=2e-3,
     )
     assert -smc.run(scenario).e[-1, 2] == pytest.approx(expected, rel=1e-3)
 
@@ -362,7 +373,12 @@ def test_commands_are_those_of_the_law_in_python(drone, law):
     }
     trace = smc.run(
         smc.Scenario(
-            plant=drone, law=law, reference=PATH, duration=0.2, control_period=2e-3, **start
+            plant=drone,
+            law=law,
+            reference=PATH,
+            duration=0.2,
+            control_period=2e-3,
+            **start,
         )
     )
     own = smc.law(law)
@@ -529,7 +545,10 @@ def test_a_turn_across_the_back_takes_the_shorter_way(drone, law):
     to 0.
     """
     paths = []
-    for start, end in ((160.0, -160.0), (40.0, 0.0)):
+    for start, end in (
+        (160.0, -160.0),
+        (40.0, 0.0),
+    ):
         goal = [smc.Constant(value) for value in (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(end))]
         at = (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(start))
         trace = smc.run(
@@ -549,11 +568,20 @@ def test_a_turn_across_the_back_takes_the_shorter_way(drone, law):
 
 def rate_by_differences(F, r, dr, h=1e-6):
     """Of the wanted attitude, where force and heading are functions of time."""
-    turns = [Rotation.from_quat(of_thrust(F(t), r + t * dr), scalar_first=True) for t in (-h, h)]
+    turns = []
+    for t in (-h, h):
+        turns.append(Rotation.from_quat(of_thrust(F(t), r + t * dr), scalar_first=True))
     return (turns[0].inv() * turns[1]).as_rotvec() / (2.0 * h)
 
 
-@pytest.mark.parametrize("F", [(0.1, -0.2, 0.3), (0.5, 0.1, -0.2), (-0.3, 0.9, -2.0)])
+@pytest.mark.parametrize(
+    "F",
+    [
+        (0.1, -0.2, 0.3),
+        (0.5, 0.1, -0.2),
+        (-0.3, 0.9, -2.0),
+    ],
+)
 def test_the_rate_of_the_wanted_attitude_is_that_of_its_differences(F):
     F, dF, r, dr = (
         np.array(one) for one in (F, (0.4, -1.1, 0.8), (0.2, -0.3, 0.6), (1.0, 0.5, -2.0))
@@ -637,7 +665,12 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
     )
     trace = smc.run(
         smc.Scenario(
-            plant=body, law=law, reference=PATH, duration=0.1, control_period=2e-3, **start
+            plant=body,
+            law=law,
+            reference=PATH,
+            duration=0.1,
+            control_period=2e-3,
+            **start,
         )
     )
     J = np.diag([12e-6, 20e-6, 29.8e-6])

@@ -77,7 +77,8 @@ def test_a_text_is_its_law(files, text, name, gains):
 def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     tuned.save("st.json")
     law = smc.law("st.json")
-    assert (law, law.source) == (tuned.law, tuned.law.source)
+    assert law == tuned.law
+    assert law.source == tuned.law.source
     assert law.source.kind == "tuned here"
     assert (
         smc.law("st.json", c=9.0).gains

@@ -40,7 +40,8 @@ def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_s
     for name, known in shipped(gain_set, plant).items():
         law = gains.law(plant, name, gain_set)
         scales = search_space.scales(grid.as_plant(plant), scenarios.U_MAX)
-        assert all(set(one) == set(search_space.box(law, scales)) for one in known.sets), name
+        for one in known.sets:
+            assert set(one) == set(search_space.box(law, scales)), name
 
 
 def test_run_i_of_a_law_has_gain_set_i():
@@ -49,16 +50,18 @@ def test_run_i_of_a_law_has_gain_set_i():
         sets = gains.tuned("duffing", name).sets
         assert len(sets) > 1
         ran = [s.law.gains for s in made if s.law.name == name]
-        assert all(
-            law[gain] == value
-            for k, law in enumerate(ran)
-            for gain, value in sets[k % len(sets)].items()
-        )
+        for k, law in enumerate(ran):
+            for gain, value in sets[k % len(sets)].items():
+                assert law[gain] == value
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")]
+    ("gain_set", "law"),
+    [
+        ("tuned", "observer_free"),
+        ("tracking", "super_twisting"),
+    ],
 )
 def test_shipped_gains_cost_what_their_record_says(gain_set, law):
     """Set i in the runs of search i."""

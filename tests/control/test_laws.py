@@ -48,7 +48,14 @@ def test_a_sampled_law_ends_within_a_multiple_of_a_power_of_the_period_and_not_f
     assert np.all((shares > 0.9) & (shares < 1.0 + 1e-5)), shares
 
 
-@pytest.mark.parametrize(("k", "phi", "d"), [(6.0, 0.5, 1.5), (2.0, 1.0, 1.9), (6.0, 0.01, 5.0)])
+@pytest.mark.parametrize(
+    ("k", "phi", "d"),
+    [
+        (6.0, 0.5, 1.5),
+        (2.0, 1.0, 1.9),
+        (6.0, 0.01, 5.0),
+    ],
+)
 def test_boundary_layer_ends_within_phi_d_over_k_and_a_constant_attains_it(k, phi, d):
     law = smc.law("boundary_layer", k=k, phi=phi)
     bound = phi * d / k
@@ -128,7 +135,12 @@ def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, li
     law = smc.law("observer_free", lam=lam, k1=k1)
     trace = smc.run(
         smc.Scenario(
-            plant=plant, law=law, x0=1e-6, duration=20.0, control_period=2e-3, u_max=math.inf
+            plant=plant,
+            law=law,
+            x0=1e-6,
+            duration=20.0,
+            control_period=2e-3,
+            u_max=math.inf,
         )
     )
     closed = np.array([[0.0, 1.0], [-(K + lam * k1) / J, -(D + lam) / J]])

@@ -65,7 +65,11 @@ def traces():
             models = itertools.repeat("nominal" if name in MODELLED else "none")
         found[name] = [
             smc.Scenario(
-                plant=plant, law=name, model=model, duration=8.0 if plant in SLOW else 6.0, **common
+                plant=plant,
+                law=name,
+                model=model,
+                duration=8.0 if plant in SLOW else 6.0,
+                **common,
             )
             for plant, model in zip(plants(name), models, strict=False)
         ]

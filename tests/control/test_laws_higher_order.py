@@ -117,7 +117,11 @@ def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_m
 
 
 def test_clamped_super_twisting_keeps_its_integral_within_w_max_and_its_accuracy_below_it():
-    gains = {"k1": 1.5, "k2": 1.1, "w_max": 0.5}
+    gains = {
+        "k1": 1.5,
+        "k2": 1.1,
+        "w_max": 0.5,
+    }
     for sign in (1.0, -1.0):
         beyond = plant_a(law("super_twisting", **gains), constant(sign * 0.8), duration=40.0)
         assert np.abs(beyond.memory).max() == 0.5
@@ -152,7 +156,13 @@ def test_adaptive_super_twisting_finds_gains_for_disturbances_of_any_size_and_le
 # relative degree 2
 
 
-@pytest.mark.parametrize(("r1", "r2"), [(3.7, 2.3), (4.0, 1.0)])
+@pytest.mark.parametrize(
+    ("r1", "r2"),
+    [
+        (3.7, 2.3),
+        (4.0, 1.0),
+    ],
+)
 def test_twisting_takes_the_time_of_its_geometric_spiral(r1, r2):
     q = (r1 - r2) / (r1 + r2)
     finite = math.sqrt(2 / (r1 - r2)) * (1 + q) / (1 - math.sqrt(q))
@@ -213,7 +223,9 @@ SECOND = ("twisting", "quasi_continuous", "prescribed_convergence", "suboptimal"
 
 def powers(law, d, plant=plant_b, duration=6.0):
     """The power of the period within which each state of a chain ends, and the runs."""
-    runs = [plant(law, d, h=h, duration=duration) for h in STEPS]
+    runs = []
+    for h in STEPS:
+        runs.append(plant(law, d, h=h, duration=duration))
     ends = np.array([np.abs(run.x[-len(run.t) // 5 :]).max(axis=0) for run in runs])
     return np.log10(ends[0] / ends[2]) / DECADES, runs
 
@@ -227,7 +239,11 @@ def test_discontinuous_laws_of_degree_2_are_accurate_to_the_second_power_of_the_
 
 @pytest.mark.parametrize(
     ("name", "power"),
-    [("terminal", 1 / 0.6), ("nonsingular_terminal", 1.6), ("nonsingular_fast_terminal", 1.6)],
+    [
+        ("terminal", 1 / 0.6),
+        ("nonsingular_terminal", 1.6),
+        ("nonsingular_fast_terminal", 1.6),
+    ],
 )
 def test_terminal_laws_are_accurate_to_the_power_of_their_surface_or_better(name, power):
     """de = O(dt), and on the surface |e| goes as |de|^power."""
@@ -284,10 +300,17 @@ def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_t
     slid = surface(name)
     eq = call(slid, measured(*start), np.zeros(slid.memory))[1]
     needed = (abs(f) + (g - 1.0) * abs(eq)) / g
-    for share, stays in ((1.1, True), (0.9, False)):
+    for share, stays in (
+        (1.1, True),
+        (0.9, False),
+    ):
         assert share * needed * g > abs(f)
         run = plant_b(
-            law(name, k=share * needed), x=start, f=math.copysign(f, eq), g=g, duration=0.1
+            law(name, k=share * needed),
+            x=start,
+            f=math.copysign(f, eq),
+            g=g,
+            duration=0.1,
         )
         assert (np.diff(np.sign(run.sigma[2:50])) != 0.0).any() == stays, share
 

@@ -40,7 +40,13 @@ SLOWLY = pytest.param("mpc", {}, marks=pytest.mark.slow)  # compiled
 
 
 @pytest.mark.parametrize(
-    ("name", "gains"), [("adrc", {}), ("pd_observer", {}), ("lqi", {"q0": 5e3}), SLOWLY]
+    ("name", "gains"),
+    [
+        ("adrc", {}),
+        ("pd_observer", {}),
+        ("lqi", {"q0": 5e3}),
+        SLOWLY,
+    ],
 )
 def test_an_outer_law_leaves_no_error_under_a_constant_force(name, gains):
     trace = run(

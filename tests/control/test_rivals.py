@@ -17,8 +17,17 @@ from smc_mujoco.simulation import python_functions
 pytestmark = pytest.mark.quick
 
 RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
-UNIT = {"a1": 0.0, "a2": 0.0, "b": 1.0}  # the plant e'' = u
-PLANTS = ((0.0, 0.0, 1.0), (18.0, 0.7, 0.9), (-23.6, -0.16, 8.0), (5.0, -1.0, 0.4))  # a1, a2, b
+UNIT = {
+    "a1": 0.0,
+    "a2": 0.0,
+    "b": 1.0,
+}  # the plant e'' = u
+PLANTS = (
+    (0.0, 0.0, 1.0),
+    (18.0, 0.7, 0.9),
+    (-23.6, -0.16, 8.0),
+    (5.0, -1.0, 0.4),
+)  # a1, a2, b
 
 
 def call(law, memory, **fields):
@@ -191,7 +200,14 @@ def test_pd_observer_is_incremental_dynamic_inversion():
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("q", [(1.0, 10.0, 2.0), (300.0, 5.0, 0.0), (1e-3, 100.0, 16.0)])
+@pytest.mark.parametrize(
+    "q",
+    [
+        (1.0, 10.0, 2.0),
+        (300.0, 5.0, 0.0),
+        (1e-3, 100.0, 16.0),
+    ],
+)
 def test_lqi_solves_its_riccati_equation(plant, q):
     a1, a2, b = plant
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]])
@@ -208,7 +224,20 @@ def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
     h = 1e-3
     law = smc.law("lqi", q0=q0, tt=tt, **UNIT)
     memory = np.zeros(5)
-    asked = [called(law, measured(e=e, de=0.0, dt=h, limit=1.0), memory)[0] for _ in range(3000)]
+    asked = []
+    for _ in range(3000):
+        asked.append(
+            called(
+                law,
+                measured(
+                    e=e,
+                    de=0.0,
+                    dt=h,
+                    limit=1.0,
+                ),
+                memory,
+            )[0]
+        )
     end = -math.sqrt(q0) * e * tt
     k = np.arange(3000)
     beyond = np.array(asked) + 1.0
@@ -235,7 +264,13 @@ def test_the_end_s_weight_of_mpc_solves_the_discrete_riccati_equation(plant):
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("q1", "q2"), [(100.0, 16.0), (3751.0, 48.0)])
+@pytest.mark.parametrize(
+    ("q1", "q2"),
+    [
+        (100.0, 16.0),
+        (3751.0, 48.0),
+    ],
+)
 def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, q2):
     """From the last plan, its active set or from none: it has one solution.
 
@@ -309,7 +344,14 @@ def shaped(a1, a2, b, k, wi):
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("k", "wi"), [(20.0, 0.5), (4.0, 2.0), (100.0, 5.0)])
+@pytest.mark.parametrize(
+    ("k", "wi"),
+    [
+        (20.0, 0.5),
+        (4.0, 2.0),
+        (100.0, 5.0),
+    ],
+)
 def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
     A, B, C = shaped(*plant, k, wi)
     X = solve_continuous_are(A, B, C.T @ C, np.eye(1))

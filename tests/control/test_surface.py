@@ -205,7 +205,8 @@ def shares(name, law):
             )
         )
     traces = smc.run(runs)
-    assert not any(trace.failure for trace in traces)
+    for trace in traces:
+        assert not trace.failure
     return [smc.score(trace)["ultimate_bound"] / np.abs(trace.x[0]).max() for trace in traces]
 
 
@@ -233,7 +234,11 @@ def test_the_surface_of_order_3_holds_its_polynomial_on_s_equal_to_zero():
 def test_memory_of_a_surface_belongs_to_a_channel_and_a_run():
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
     scenario = smc.Scenario(
-        plant=plant, law="classical", surface="integral", x0=(0.5, 0.0, -0.5), duration=0.5
+        plant=plant,
+        law="classical",
+        surface="integral",
+        x0=(0.5, 0.0, -0.5),
+        duration=0.5,
     )
     trace, again = smc.run([scenario, scenario])
     assert not trace.x[:, 1].any()

@@ -11,7 +11,12 @@ from smc_mujoco.draw.amplitudes import crossover, lag
 def test_the_lag_is_what_all_drives_and_the_delay_add_up_to():
     drives = (smc.Lag(0.01), smc.Lag(0.02), smc.Backlash(0.01))
     assert lag(
-        smc.Scenario(plant="duffing", law="none", actuator=drives, input_delay=0.005)
+        smc.Scenario(
+            plant="duffing",
+            law="none",
+            actuator=drives,
+            input_delay=0.005,
+        )
     ) == pytest.approx(0.035)
 
 

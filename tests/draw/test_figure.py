@@ -60,7 +60,9 @@ def test_a_file_does_not_say_when_it_was_written(tmp_path, monkeypatch):
     written = []
     for second in ("0", "86400"):
         monkeypatch.setenv("SOURCE_DATE_EPOCH", second)
-        paths = [tmp_path / f"{second}.{ending}" for ending in FORMATS]
+        paths = []
+        for ending in FORMATS:
+            paths.append(tmp_path / f"{second}.{ending}")
         write(Figure(), paths)
         written.append([path.read_bytes() for path in paths])
     assert written[0] == written[1]
@@ -100,7 +102,8 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
         for line in ax.lines:
             marks.append((line.get_color(), line.get_marker(), *line.get_xydata().tolist()))
         sides = [("r", 2, [first.t[100], 5.8]), ("r", 3, [first.t[200], -5.8]), ("b", 2), ("b", 3)]
-        assert (ax.get_title(loc="right"), marks) == (title, sides if title else [])
+        assert ax.get_title(loc="right") == title
+        assert marks == (sides if title else [])
 
 
 def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
@@ -128,7 +131,8 @@ def test_chattering_is_drawn_as_its_mean_without_teeth():
         assert np.abs(mean[50:-50]).max() < 0.02
         at, low, high = decimate.band(t, u[:, None])
         assert len(at) <= 360
-        assert (low.min(), high.max()) == (-6.0, 6.0)
+        assert low.min() == -6.0
+        assert high.max() == 6.0
     assert (
         np.abs(decimate.smooth(switching, 100) - decimate.smooth(switching + drift, 100)).max()
         < 0.2
@@ -184,7 +188,8 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     )  # 40: the window
     u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
     (part,) = decimate.chattering_parts(u, 40)
-    assert (part.start, part.stop) == (300, 300 + len(within))
+    assert part.start == 300
+    assert part.stop == 300 + len(within)
     mean = triangle(within, 20)
     line = decimate.smooth(u, 40)
     np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)

@@ -38,7 +38,10 @@ TEN += ("twisting", "terminal")
 @pytest.fixture(scope="module")
 def one() -> smc.Trace:
     scenario = smc.Scenario(
-        plant="duffing", law="classical", duration=1.5, reference=smc.Step(0.5, time=0.3)
+        plant="duffing",
+        law="classical",
+        duration=1.5,
+        reference=smc.Step(0.5, time=0.3),
     )
     return smc.run(scenario)
 
@@ -47,7 +50,9 @@ def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
     """The trace as if another law had made it, a little otherwise."""
     scenario = dataclasses.replace(trace.scenario, law=smc.law(law))
     x = trace.r + factor * (trace.x - trace.r)
-    changed = {name: factor * getattr(trace, name) for name in "vus"}
+    changed = {}
+    for name in "vus":
+        changed[name] = factor * getattr(trace, name)
     return dataclasses.replace(trace, scenario=scenario, x=x, **changed)
 
 
@@ -70,7 +75,13 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
     )
     plant = smc.plant_from(path, [f"j{i}" for i in range(7)])
     trace = smc.run(
-        smc.Scenario(plant=plant, law="classical", duration=0.3, x0=0.2, reference=smc.Step(0.3))
+        smc.Scenario(
+            plant=plant,
+            law="classical",
+            duration=0.3,
+            x0=0.2,
+            reference=smc.Step(0.3),
+        )
     )
     return [trace, under(trace, "super_twisting", 0.8)]
 
@@ -141,7 +152,10 @@ def test_words_are_apart_and_on_the_page(kind, size, one, arm):
         "long": [one, one],
         "signals": [one],
     }[kind]
-    labels = ["_x $6: " + "a law that a paper proposes, " * 3, "x" * 80] if kind == "long" else None
+    if kind == "long":
+        labels = ["_x $6: " + "a law that a paper proposes, " * 3, "x" * 80]
+    else:
+        labels = None
     page = figure(traces, labels=labels, size=size)
     if kind == "signals":
         laws = {"Observer-free": ten(one)[0], "Classical": one}
@@ -192,7 +206,9 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
     page = figure(three, size=COLUMN, panels=["x", "u", "s", "end"])
     assert [len(rows(ax)) for ax in page.axes] == [1, 3, 1, 3]
     for ax in (page.axes[1], page.axes[3]):
-        names = [row.get_legend().get_texts()[0].get_text() for row in rows(ax)]
+        names = []
+        for row in rows(ax):
+            names.append(row.get_legend().get_texts()[0].get_text())
         assert names == ["Observer-free", "Classical", "Adaptive"]
         assert len({row.get_ylim() for row in rows(ax)}) == 1
         assert [to_hex(curves(row)[0].get_color()) for row in rows(ax)] == [
@@ -280,9 +296,12 @@ def test_curves_that_agree_are_drawn_once_in_ink_until_they_part(one):
         ink = [line for line in ax.lines if line.get_gid() == panels.AGREED]
         assert {line.get_color() for line in ink} == {style.INK}
         agreed, late = [np.asarray(line.get_xdata()) for line in ink]
-        assert (agreed[0], late[-1]) == (0.0, one.t[-1])
+        assert agreed[0] == 0.0
+        assert late[-1] == one.t[-1]
         assert agreed[-1] == late[0] == pytest.approx(half, rel=0.1)
-        alone = [np.asarray(line.get_xdata())[0] for line in curves(ax)]
+        alone = []
+        for line in curves(ax):
+            alone.append(np.asarray(line.get_xdata())[0])
         assert alone == [agreed[-1]], "the first law, from where it parts from the others"
         words = [f"all three agree until {late[0]:.3g} s", "b and c agree"]
         assert [text.get_text() for text in ax.texts] == words
@@ -310,7 +329,12 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
     whole = one.t[-1]
     late = np.where(np.arange(len(one.t)) < 0.9 * len(one.t), 0.0, 1.0)[:, None]
     jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.9 * whole, {"mass": 2.0}))
-    for change in ({"x": still.x + late}, {"d": late}, {"r": late}, {"scenario": jump}):
+    for change in (
+        {"x": still.x + late},
+        {"d": late},
+        {"r": late},
+        {"scenario": jump},
+    ):
         assert panels.horizon([still, dataclasses.replace(still, **change)]) == pytest.approx(whole)
     lost = failed(under(still, "pid", 0.5), int(0.9 * len(one.t)))
     assert panels.horizon([still, lost]) == pytest.approx(whole)
@@ -399,10 +423,14 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
     check(page)
     assert len(page.axes) == 6
     assert [label.get_text() for label in page.axes[0].get_yticklabels()] == ["nominal", "noise"]
-    dots = [line for line in page.axes[1].lines if line.get_marker() not in ("None", None)]
+    dots = []
+    for line in page.axes[1].lines:
+        if line.get_marker() not in ("None", None):
+            dots.append(line)
     assert len(dots) == 6
     assert len({to_hex(dot.get_color()) for dot in dots}) == 3
-    assert not any("…" in text.get_text() for text in texts(page))
+    for text in texts(page):
+        assert "…" not in text.get_text()
     assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
     with pytest.raises(smc.ScenarioError, match="unknown metric 'itaee': did you mean 'itae'"):
         smc.plot(Rows(), metrics=["itaee"])
@@ -421,7 +449,10 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
         sizes = []
         for name in ("nominal", "noise"):
             sizes.append([row[4] for row in rows.rows if row[1:3] == (name, law)])
-        dots = [line for line in bound.lines if line.get_marker() not in ("None", None, "")]
+        dots = []
+        for line in bound.lines:
+            if line.get_marker() not in ("None", None, ""):
+                dots.append(line)
         mine = [
             np.array(dot.get_xydata()).tolist()[0]
             for dot in dots
@@ -462,7 +493,14 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
             assert (entry.interval.low, entry.interval.high) in drawn
 
 
-@pytest.mark.parametrize(("law", "unit"), [("classical", " (m/s)"), ("twisting", ""), ("pid", "")])
+@pytest.mark.parametrize(
+    ("law", "unit"),
+    [
+        ("classical", " (m/s)"),
+        ("twisting", ""),
+        ("pid", ""),
+    ],
+)
 def test_only_an_s_that_is_a_velocity_has_its_unit(law, unit, one):
     (shown,) = panels.over_groups([one, under(one, law, 0.9)], "s")
     assert shown.label == f"sliding variable s{unit}"

@@ -65,7 +65,11 @@ def duffing(law: str, **fields) -> smc.Trace:
 
 def machines() -> list[smc.Trace]:
     """Friction, a gear, a jump and a failure."""
-    parts = {"friction": Coulomb(0.4), "actuator": smc.Backlash(0.04), "reference": SINE}
+    parts = {
+        "friction": Coulomb(0.4),
+        "actuator": smc.Backlash(0.04),
+        "reference": SINE,
+    }
     jumping = duffing("classical", jump=smc.Jump(0.5, {"mass": 2.0}), **parts)
     lost = failed(duffing("adaptive", **parts), 700, f"{PLANT_DIVERGED}, at t = 0.7 s")
     rests = dataclasses.replace(jumping, v=np.where(jumping.t < 0.8, 1.0, 0.0)[:, None] * jumping.v)
@@ -82,7 +86,11 @@ def network() -> list[smc.Trace]:
 def cart() -> list[smc.Trace]:
     trace = made(
         smc.Scenario(
-            plant="cart_pole", law="classical", duration=0.4, contact="none", friction=Coulomb(0.01)
+            plant="cart_pole",
+            law="classical",
+            duration=0.4,
+            contact="none",
+            friction=Coulomb(0.01),
         )
     )
     return [dataclasses.replace(trace, x=0.01 * trace.x, u=0.02 * trace.u)]
@@ -90,7 +98,14 @@ def cart() -> list[smc.Trace]:
 
 def arm() -> list[smc.Trace]:
     """One run, and one that is far off."""
-    near = made(smc.Scenario(plant=arms.arm(), law=smc.law("none"), reference=SINE, duration=0.3))
+    near = made(
+        smc.Scenario(
+            plant=arms.arm(),
+            law=smc.law("none"),
+            reference=SINE,
+            duration=0.3,
+        )
+    )
     return [near, dataclasses.replace(near, x=near.r + 50.0 * (near.x - near.r))]
 
 
@@ -130,10 +145,19 @@ def lags():
 
 
 def balance():
-    lag = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 1.2}
-    scenarios = [smc.Scenario(law=law, **lag) for law in ("super_twisting", "observer_free")]
+    lag = {
+        "plant": "duffing",
+        "actuator": smc.Lag(0.01),
+        "duration": 1.2,
+    }
+    scenarios = []
+    for law in ("super_twisting", "observer_free"):
+        scenarios.append(smc.Scenario(law=law, **lag))
     cycle = Chattering(
-        amplitude=0.2, amplitude_x=0.01, frequency=8.0, response=complex(-0.02, 0.003)
+        amplitude=0.2,
+        amplitude_x=0.01,
+        frequency=8.0,
+        response=complex(-0.02, 0.003),
     )
     changes = [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
     return nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
@@ -148,10 +172,30 @@ def accuracy(
     periods = (4e-3, 2e-3, 1e-3, 5e-4)
     errors = tuple(tuple(start * (1e3 * h) ** 2 for h in periods) for start in (0.3, 0.5))
     scaling = Scaling(
-        errors=errors, used=periods[1:], order=order, low=1.8, high=2.1, theory=theory, why=""
+        errors=errors,
+        used=periods[1:],
+        order=order,
+        low=1.8,
+        high=2.1,
+        theory=theory,
+        why="",
     )
-    names = {"plant": plant, "condition": "slow_noise", "law": law, "gains": "shipped", "unit": "m"}
-    return Accuracy(**names, periods=periods, e=scaling, s=scaling, runs=8, failed=0, floor=1e-9)
+    names = {
+        "plant": plant,
+        "condition": "slow_noise",
+        "law": law,
+        "gains": "shipped",
+        "unit": "m",
+    }
+    return Accuracy(
+        **names,
+        periods=periods,
+        e=scaling,
+        s=scaling,
+        runs=8,
+        failed=0,
+        floor=1e-9,
+    )
 
 
 def basins() -> list[Basin]:
@@ -168,7 +212,12 @@ def basins() -> list[Basin]:
     }
     grid = {"x": np.array([-1.0, 0.0, 2.0]), "v": np.array([-3.0, 3.0])}
     return [
-        Basin(law="classical", source="tuned here", **names, **grid),
+        Basin(
+            law="classical",
+            source="tuned here",
+            **names,
+            **grid,
+        ),
         Basin(law="adaptive", **names, **grid),
     ]
 
@@ -235,7 +284,8 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
         for label in words - beside
         if not UNIT.search(label) and not UNITLESS.fullmatch(label)
     ]
-    assert all(ax.get_ylabel() for ax in outer)
+    for ax in outer:
+        assert ax.get_ylabel()
     labelled = [ax for ax in every(page) if ax.get_xlabel()]
     for ax in every(page):
         assert ax in labelled or any(np.allclose(ax.get_xlim(), one.get_xlim()) for one in labelled)
@@ -249,7 +299,9 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
             if len(places(line)) == 1 and not low <= places(line)[0, 0] <= high
         ]
     handles = [one for legend in legends(page) for one in legend.legend_handles]
-    assert all(text.get_text() for legend in legends(page) for text in legend.get_texts())
+    for legend in legends(page):
+        for text in legend.get_texts():
+            assert text.get_text()
     entries = set()
     for one in handles:
         entries.add(to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor()))
@@ -295,7 +347,11 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
     "friction": ({"plant": "duffing", "friction": Coulomb(0.5)}, ["reaction (N)"], ["delivered"]),
     "a drive": ({"plant": "duffing", "actuator": smc.Lag(0.05)}, ["delivered (N)"], ["reaction"]),
     "a pole": (
-        {"plant": "cart_pole", "law": "hierarchical", "model": "nominal"},
+        {
+            "plant": "cart_pole",
+            "law": "hierarchical",
+            "model": "nominal",
+        },
         [
             "position x (m)",
             "velocity v (m/s)",
@@ -330,7 +386,11 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
         ["u (N·m)", "sliding variable"],  # the law has none
     ),
     "torques": (
-        {"plant": "furuta", "law": "none", "actuator": MOTOR},
+        {
+            "plant": "furuta",
+            "law": "none",
+            "actuator": MOTOR,
+        },
         ["control u (N·m)"],
         ["(V)"],
     ),
@@ -345,7 +405,9 @@ def test_a_figure_has_the_panels_that_its_mechanism_has_in_their_units_and_no_ot
         trace = dataclasses.replace(trace, reaction=0.0 * trace.reaction)
     if trace.scenario.law.name == "none":
         trace = dataclasses.replace(trace, s=0.0 * trace.s)
-    words = [unprefixed(ax.get_ylabel().replace("\n", " ")) for ax in figure(trace).axes]
+    words = []
+    for ax in figure(trace).axes:
+        words.append(unprefixed(ax.get_ylabel().replace("\n", " ")))
     assert set(labels) <= set(words), words
     assert not [part for part in absent if part in " ".join(words)]
 
@@ -431,7 +493,12 @@ def test_the_worst_joint_of_an_arm_is_large_and_others_are_sparklines_beside_the
 
 
 @pytest.mark.parametrize(
-    ("size", "unit", "factor"), [(3e-6, "µm", 1e6), (0.02, "mm", 1e3), (0.3, "m", 1.0)]
+    ("size", "unit", "factor"),
+    [
+        (3e-6, "µm", 1e6),
+        (0.02, "mm", 1e3),
+        (0.3, "m", 1.0),
+    ],
 )
 def test_no_axis_has_an_exponent_and_its_numbers_are_in_its_unit(size, unit, factor):
     trace = duffing("classical")
@@ -464,7 +531,10 @@ def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_
         np.testing.assert_allclose(line.get_xdata(), [2.0, 10.0, 50.0])
         np.testing.assert_allclose(line.get_ydata(), factor * np.array([2.0, 10.0, 50.0]) ** power)
     dots = [line for line in ax.lines if line.get_marker() == "o"]
-    hollow = [places(dot)[0, 0] for dot in dots if to_hex(dot.get_mfc()) == to_hex(style.PAPER)]
+    hollow = []
+    for dot in dots:
+        if to_hex(dot.get_mfc()) == to_hex(style.PAPER):
+            hollow.append(places(dot)[0, 0])
     assert hollow == pytest.approx([10.0, 10.0])
     assert len(dots) == 6
 
@@ -488,7 +558,9 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
         ]
         (mesh,) = ax.collections
         assert np.ravel(mesh.get_array()).tolist() == [0, 1, 4, 2, 3, 4]
-        colours = [to_hex(colour) for colour in mesh.get_cmap()(range(5))]
+        colours = []
+        for colour in mesh.get_cmap()(range(5)):
+            colours.append(to_hex(colour))
         assert colours[0] == style.ramp(style.law_colour(its.law), 3, region.LIGHTEST)[2].lower()
         assert colours[4] == style.FAILED.lower(), "grey, not another law's orange"
         assert ax.get_title(loc="left") == style.law_name(its.law)
@@ -525,7 +597,12 @@ REFUSED = {  # call -> arguments, and what replaces them
     smc.plot: ({"table": ONE}, [{}]),
     smc.show: ({"what": ONE}, [{}]),
     smc.film: (
-        {"traces": ONE, "at": 0.0, "path": "a.png", "size": (320, 180)},
+        {
+            "traces": ONE,
+            "at": 0.0,
+            "path": "a.png",
+            "size": (320, 180),
+        },
         [
             {"at": 0.02},
             {"at": None},
@@ -534,7 +611,11 @@ REFUSED = {  # call -> arguments, and what replaces them
             {"size": (318, 180)},
             {"size": (481, 270)},
             {"span": (0.0, 1.0)},
-            {"at": None, "path": "a.mp4", "span": (5.0, 6.0)},
+            {
+                "at": None,
+                "path": "a.mp4",
+                "span": (5.0, 6.0),
+            },
             {"camera": (0.0, 91.0)},
             {"traces": [ONE] * 9},
             {"traces": []},
@@ -581,11 +662,19 @@ def test_marks_of_errors_are_means_of_all_starts_with_the_slopes_of_fit_and_theo
     for ax in page.axes:
         marks = {places(line)[0, 0]: line for line in ax.lines if line.get_marker() == "o"}
         means = {}
-        for h, largest in {4: 8, 2: 2, 1: 0.5, 0.5: 0.125}.items():
+        for h, largest in {
+            4: 8,
+            2: 2,
+            1: 0.5,
+            0.5: 0.125,
+        }.items():
             means[h] = math.sqrt(0.6) * largest
         assert {h: places(line)[0, 1] for h, line in marks.items()} == pytest.approx(means)
         assert [h for h, line in marks.items() if line.get_mfc() == "none"] == [4.0]
-        ends = [places(line) for line in ax.lines if len(places(line)) == 2]
+        ends = []
+        for line in ax.lines:
+            if len(places(line)) == 2:
+                ends.append(places(line))
         slopes = []
         for x, y in (pair.T for pair in ends):
             if x[0] != x[1]:

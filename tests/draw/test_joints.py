@@ -16,12 +16,24 @@ from smc_mujoco.draw.figure import figure
 def trace():
     law = smc.law("computed_torque_sliding", c=8.0)
     return smc.run(
-        smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, duration=0.3)
+        smc.Scenario(
+            plant=arms.arm(),
+            law=law,
+            reference=smc.Sine(0.3, 4.0),
+            x0=0.2,
+            duration=0.3,
+        )
     )
 
 
 def test_a_blow_and_a_payload_are_marked_and_named(trace):
-    push = smc.signals.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
+    push = smc.signals.Push(
+        "hand",
+        y=30.0,
+        z=40.0,
+        time=0.1,
+        width=0.02,
+    )
     hit = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, disturbance=push))
     page = figure([hit])
     shown = page.axes[:3]
@@ -31,8 +43,15 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
         "tip off its path (mm)",
     ]
     assert [text.get_text() for ax in shown for text in ax.texts] == ["blow of 50 N for 20 ms"]
-    assert all([0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines] for ax in shown)
-    push = smc.signals.Push("link5", y=30.0, z=40.0, time=0.001, width=0.02)
+    for ax in shown:
+        assert [0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines]
+    push = smc.signals.Push(
+        "link5",
+        y=30.0,
+        z=40.0,
+        time=0.001,
+        width=0.02,
+    )
     picked = smc.Scenario(
         plant="panda",
         law="none",

@@ -11,16 +11,27 @@ from smc_mujoco.draw.nyquist import nyquist
 
 @pytest.fixture(scope="module")
 def page():
-    fields = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 2.0, "x0": 0.05}
-    scenarios = [smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")]
-    cycles = [predict(scenario, ranges=False) for scenario in scenarios]
+    fields = {
+        "plant": "duffing",
+        "actuator": smc.Lag(0.01),
+        "duration": 2.0,
+        "x0": 0.05,
+    }
+    scenarios = []
+    for law in ("super_twisting", "observer_free"):
+        scenarios.append(smc.Scenario(law=law, **fields))
+    cycles = []
+    for scenario in scenarios:
+        cycles.append(predict(scenario, ranges=False))
     return nyquist(
         scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
     )
 
 
 def test_both_curves_pass_minus_one_where_the_mark_is(page):
-    lines = {line.get_label(): line.get_xydata() for line in page.axes[0].lines}
+    lines = {}
+    for line in page.axes[0].lines:
+        lines[line.get_label()] = line.get_xydata()
     for name in ("L, over frequency", "1/N, over amplitude"):
         assert np.hypot(*(lines[name] - [-1.0, 0.0]).T).min() < 0.1
     (mark,) = [line for line in page.axes[0].lines if line.get_marker() == "o"]

@@ -28,13 +28,16 @@ def wide(labels: list[str], columns: int, size: float) -> float:
 def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_longer_than_its_share(
     width, count
 ):
-    handles = [Line2D([], [], label="law " * (1 + 7 * k % 5)) for k in range(count)]
+    handles = []
+    for k in range(count):
+        handles.append(Line2D([], [], label="law " * (1 + 7 * k % 5)))
     with style.page(width):
         labels, columns = page._legend(handles, width)
         size = style.points(page.TEXT_SIZE)
         room = 72 * width - 16
         assert columns == 1 or wide(labels, columns, size) < room
-        assert all(wide(labels, more, size) >= room for more in range(columns + 1, count + 1))
+        for more in range(columns + 1, count + 1):
+            assert wide(labels, more, size) >= room
         longest = max(wide([label], 1, size) for label in labels)
         assert longest <= 72 * width * (0.55 if columns > 1 else 0.95) + 1.0
 
@@ -45,7 +48,10 @@ def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letter
     """At 800 px ticks had 8 px. A column's PNG had 150 dots an inch."""
     trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2))
     whole = smc.figure(trace)
-    sizes = [float(text.get_fontsize()) for text in whole.findobj(Text) if text.get_text().strip()]
+    sizes = []
+    for text in whole.findobj(Text):
+        if text.get_text().strip():
+            sizes.append(float(text.get_fontsize()))
     assert min(sizes) / 72 * 800 / whole.get_figwidth() > 10.7
     slide = smc.figure(trace, size="slide")
     assert slide.get_size_inches().tolist() == [13.3, 7.5]

@@ -50,7 +50,13 @@ def page(monkeypatch) -> list[Figure]:
     return drawn
 
 
-@pytest.mark.parametrize("size", [None, (6.0, 4.0)])
+@pytest.mark.parametrize(
+    "size",
+    [
+        None,
+        (6.0, 4.0),
+    ],
+)
 def test_a_front_is_the_best_that_was_tried_and_the_better_law_is_named_first(pair, size):
     fronts = [((1.0, 90.0), (2.0, 40.0), (3.0, 60.0), (4.0, 10.0)), ((1.5, 300.0), (2.5, 0.0))]
     made = []
@@ -64,9 +70,13 @@ def test_a_front_is_the_best_that_was_tried_and_the_better_law_is_named_first(pa
         "(s²)",
         "(1/s)",
     ]
-    stairs = [line.get_xydata().tolist() for line in ax.lines[::2]]
+    stairs = []
+    for line in ax.lines[::2]:
+        stairs.append(line.get_xydata().tolist())
     assert stairs == [[[1.0, 90.0], [2.0, 40.0], [4.0, 10.0]], [[1.5, 300.0], [2.5, MIN_VARIATION]]]
-    words = [text.get_text() for text in drawn.legends[0].get_texts()]
+    words = []
+    for text in drawn.legends[0].get_texts():
+        words.append(text.get_text())
     assert [word.split(" = ")[0] for word in words[:2]] == ["Observer-free: J", "Classical: J"]
     assert [word.split(" = ")[1] for word in words[:2]] == ["1.09 s²", "1.8 s²"]
     samples = drawn.legends[0].get_lines()[:2]

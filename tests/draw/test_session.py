@@ -129,7 +129,8 @@ def test_an_own_arm_starts_from_its_keyframe_and_is_saved(arm, tmp_path):
     (scenario,) = studio.runs_of(smc.plant_from(arm, ["shoulder"], keyframe="up"), ["pid"])
     session = Session([dataclasses.replace(scenario, duration=0.2, x0=1.0)])
     session.keyframe(0)
-    assert (session.scenarios[0].x0, session.scenarios[0].v0) == ((3.0,), (0.5,))
+    assert session.scenarios[0].x0 == (3.0,)
+    assert session.scenarios[0].v0 == (0.5,)
     watch(session)
     (saved,) = scene.read(session.save(tmp_path / "view.py")).conditions["view"].values()
     same(session, [saved])
@@ -167,9 +168,22 @@ def test_a_body_is_pushed_once_when_the_mouse_lets_go():
     session = Session([DUFFING])
     panel = types.SimpleNamespace(asked=queue.Queue())
     panel.asked.put(lambda: session.save(Path("no/folder/view.py")))
-    studio.show(session, Page({2: 1.0, 4: 3.0, 7: 0.0}), panel, lambda session: True)
+    studio.show(
+        session,
+        Page(
+            {
+                2: 1.0,
+                4: 3.0,
+                7: 0.0,
+            }
+        ),
+        panel,
+        lambda session: True,
+    )
     (push,) = session.scenarios[0].disturbance
-    assert (push.body, push.x, push.y) == ("cart", 3.0, 0.0)
+    assert push.body == "cart"
+    assert push.x == 3.0
+    assert push.y == 0.0
     assert 0.0 < push.time < session.time
     assert session.sample > 0
 
@@ -182,7 +196,10 @@ def test_runs_of_other_lengths_are_refused():
 def test_a_view_says_what_it_needs(monkeypatch):
     with pytest.raises(smc.ScenarioError, match="one or two"):
         smc.view("duffing", laws=["pid", "adrc", "twisting"])
-    for scenarios in ([], ["duffing"]):
+    for scenarios in (
+        [],
+        ["duffing"],
+    ):
         with pytest.raises(smc.ScenarioError, match="give a Scenario or two, or a plant"):
             smc.view(scenarios)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)

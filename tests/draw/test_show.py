@@ -19,7 +19,11 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, html
 
 SIZE = (320, 180)
-FILM = {"size": SIZE, "fps": 20.0, "speed": 1.0}
+FILM = {
+    "size": SIZE,
+    "fps": 20.0,
+    "speed": 1.0,
+}
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 
 
@@ -92,7 +96,10 @@ def test_show_films_traces_and_frames(cell, trace):
     smc.show([trace, trace], labels=["a", "b"], **FILM)
     smc.show(smc.film(trace, **FILM))
     assert [probe(content(shown)) for shown in cell if shown] == [(320, 180, 20.0, 5)] * 2
-    assert all('width="320"' in shown and "max-width:100%" in shown for shown in cell if shown)
+    for shown in cell:
+        if shown:
+            assert 'width="320"' in shown
+            assert "max-width:100%" in shown
     assert content(cell[0]) != content(cell[-1])
 
 

@@ -15,7 +15,10 @@ pytestmark = pytest.mark.quick
 
 def least(colours, others=()) -> float:
     """The least distance of two colours in four sights, or of one of them to one of `others`."""
-    pairs = itertools.product(colours, others) if others else itertools.combinations(colours, 2)
+    if others:
+        pairs = itertools.product(colours, others)
+    else:
+        pairs = itertools.combinations(colours, 2)
     return min(style.distance(*pair) for pair in pairs)
 
 
@@ -41,7 +44,13 @@ def test_laws_that_are_compared_by_default_are_apart_in_four_sights():
     assert least(colours, [style.FAILED]) > 8.0, "the boundary layer's pink, seen without green"
 
 
-@pytest.mark.parametrize(("count", "reached"), [(12, 13.7), (24, 9.6)])
+@pytest.mark.parametrize(
+    ("count", "reached"),
+    [
+        (12, 13.7),
+        (24, 9.6),
+    ],
+)
 def test_laws_of_one_picture_are_apart_in_four_sights_as_far_as_so_many_can_be(count, reached):
     for k in range(3):
         laws = random.Random(k).sample(sorted(smc.laws()), count)
@@ -53,7 +62,9 @@ def test_laws_of_a_dot_plot_that_share_a_mark_have_colours_that_nobody_mistakes(
     default.
     """
     colours = style.law_colours(COMPARED)
-    shared = [[k, k + len(style.MARKS)] for k in range(len(COMPARED) - len(style.MARKS))]
+    shared = []
+    for k in range(len(COMPARED) - len(style.MARKS)):
+        shared.append([k, k + len(style.MARKS)])
     assert len(set(style.MARKS)) == len(style.MARKS) >= len(COMPARED) / 2
     assert min(least([colours[k] for k in pair]) for pair in shared) > 2 * style.MIN_DISTANCE
 
@@ -107,7 +118,12 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
     labels = style.labels(smc.run(runs), None)
     assert labels == ["PID: delta = 0.2", "PID: delta = 0.5"]
     assert style.distinct(labels) == ["delta = 0.2", "delta = 0.5"]
-    heavy = smc.Scenario(plant="duffing", law="classical", mismatch={"mass": 1.3}, duration=0.01)
+    heavy = smc.Scenario(
+        plant="duffing",
+        law="classical",
+        mismatch={"mass": 1.3},
+        duration=0.01,
+    )
     assert style.labels(smc.run([runs[0], heavy]), None) == ["PID: M = 1", "Classical: M = 1.3"]
     assert style.distinct(["PID: k = 1", "LQR"]) == ["PID: k = 1", "LQR"]
 
@@ -122,5 +138,6 @@ def test_contrasts_are_those_of_wcag():
     )
     assert light / black == pytest.approx(21.0)
     assert 4.5 < light / grey < 4.7
-    assert (style.letters_on("#757575"), style.letters_on("#FFE000")) == (style.PAPER, style.INK)
+    assert style.letters_on("#757575") == style.PAPER
+    assert style.letters_on("#FFE000") == style.INK
     assert style.lighter("#006400") == "#599A59"  # 35 % white

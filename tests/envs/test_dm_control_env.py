@@ -53,7 +53,11 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"control_period": 0.01, "x0": 0.4, "v0": -0.2},
+        {
+            "control_period": 0.01,
+            "x0": 0.4,
+            "v0": -0.2,
+        },
         {"friction": smc.Coulomb(0.1), "actuator": smc.Lag(0.02)},
         {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "x0": 0.3},
         {"mismatch": {"mass": 1.3}, "u_max": 2.0},
@@ -93,9 +97,18 @@ def test_an_agent_with_a_model_of_coupled_channels_starts_afresh_too():
     """What the other channel was told last is part of the model, and must not come from the episode
     before.
     """
-    links = {joint: smc.Channel(motor=True) for joint in ("shoulder", "elbow")}
+    links = {}
+    for joint in ("shoulder", "elbow"):
+        links[joint] = smc.Channel(motor=True)
     arm = smc.plant_from(Path(dm_control.suite.__file__).parent / "acrobot.xml", links)
-    environment = suite.load(arm, changes={"x0": [1.0, 0.5], "duration": 0.05, "u_max": 500.0})
+    environment = suite.load(
+        arm,
+        changes={
+            "x0": [1.0, 0.5],
+            "duration": 0.05,
+            "u_max": 500.0,
+        },
+    )
     act = smc.envs.agent(
         smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal"
     )
@@ -188,10 +201,19 @@ def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
 
 
 def test_a_plant_that_diverges_within_a_step_ends_its_episode_and_the_next_one_begins():
-    environment = suite.load("duffing", changes={"u_max": 1e9, "control_period": 0.1, "x0": 1e5})
+    environment = suite.load(
+        "duffing",
+        changes={
+            "u_max": 1e9,
+            "control_period": 0.1,
+            "x0": 1e5,
+        },
+    )
     environment.reset()
     timestep = environment.step([1.0])
-    assert (timestep.step_type, timestep.reward, timestep.discount) == (StepType.LAST, 0.0, 0.0)
+    assert timestep.step_type == StepType.LAST
+    assert timestep.reward == 0.0
+    assert timestep.discount == 0.0
     assert np.abs(flat(timestep)).max() <= 1e6  # numbers: 0 times NaN is no target
     assert environment.step([0.0]).first()
 

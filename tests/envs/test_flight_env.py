@@ -18,7 +18,10 @@ from smc_mujoco.envs.flight_env import FlightEnv  # noqa: E402
 from smc_mujoco.envs.gymnasium_env import PlantEnv  # noqa: E402
 from smc_mujoco.envs.vector_env import BatchEnv  # noqa: E402
 
-START = {"x0": (0.1, 0.2, 0.9, 0.3, -0.2, 0.4), "v0": (0.5, -0.3, 0.2, 1.0, -2.0, 3.0)}
+START = {
+    "x0": (0.1, 0.2, 0.9, 0.3, -0.2, 0.4),
+    "v0": (0.5, -0.3, 0.2, 1.0, -2.0, 3.0),
+}
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -48,7 +48,9 @@ def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
     for _ in range(50):
         u = random.uniform(-1.5, 1.5, many.action_space.shape)
         o, r, terminated, truncated, _ = many.step(u)
-        expected = [e.step(one) for e, one in zip(singles, u, strict=True)]
+        expected = []
+        for e, one in zip(singles, u, strict=True):
+            expected.append(e.step(one))
         assert np.abs(o - [e[0] for e in expected]).max() < 1e-12
         assert np.abs(r - [e[1] for e in expected]).max() < 1e-12
         assert [*zip(terminated, truncated, strict=True)] == [e[2:4] for e in expected]
@@ -56,7 +58,12 @@ def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
 
 
 @pytest.mark.parametrize(
-    "drives", [(smc.DCMotor(),), (smc.Lag(0.01), smc.Lag(0.02))], ids=["motor", "two lags"]
+    "drives",
+    [
+        (smc.DCMotor(),),
+        (smc.Lag(0.01), smc.Lag(0.02)),
+    ],
+    ids=["motor", "two lags"],
 )
 def test_friction_and_drives_hold_in_a_batch_too(drives):
     changes = {
@@ -89,7 +96,11 @@ class Giving(Batch):
 
 
 def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypatch):
-    changes = {"actuator": (smc.Lag(0.01), smc.Lag(0.02)), "duration": 0.1, "control_period": 0.05}
+    changes = {
+        "actuator": (smc.Lag(0.01), smc.Lag(0.02)),
+        "duration": 0.1,
+        "control_period": 0.05,
+    }
     monkeypatch.setattr("smc_mujoco.envs.vector_env.Batch", Giving)
     many = BatchEnv("cart_pole", 2, changes=changes)
     single = PlantEnv("cart_pole", changes=changes)
@@ -195,7 +206,11 @@ def test_a_batch_resets_as_gymnasium_s_own_vector_does():
 
 
 def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space():
-    changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
+    changes = {
+        "x0": 9.9e5,
+        "v0": 9e5,
+        "control_period": 0.1,
+    }
     single = PlantEnv("inverted_pendulum", changes=changes)
     many = BatchEnv("inverted_pendulum", 2, changes=changes)
     single.reset(seed=0)
@@ -262,7 +277,10 @@ def test_an_arm_tracks_a_reference_of_each_joint():
 
 # what gymnasium has
 
-DRAWN = [("duffing", "regulate"), ("cart_pole", "swing_up")]  # drawing takes most of the time
+DRAWN = [
+    ("duffing", "regulate"),
+    ("cart_pole", "swing_up"),
+]  # drawing takes most of the time
 
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(2))

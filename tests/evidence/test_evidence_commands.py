@@ -20,7 +20,12 @@ from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.rig import Fall
 
 CHECKS = {
-    "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
+    "duffing: settling time, s": {
+        "value": 2.5,
+        "relation": "<",
+        "limit": 4.0,
+        "holds": True,
+    },
     "largest step of u in the period, over that of the classical law (TV rate)": {
         "value": 1.25,
         "relation": "<=",
@@ -83,7 +88,13 @@ def identified(count):
     that fit badly.
     """
     rig = EMPS.with_values(
-        {"mass": 120.5, "viscous": 0.0, "coulomb": 2.0, "offset": 6.0}, "identified"
+        {
+            "mass": 120.5,
+            "viscous": 0.0,
+            "coulomb": 2.0,
+            "offset": 6.0,
+        },
+        "identified",
     )
     correlations = np.eye(4)
     correlations[0, 2] = correlations[2, 0] = -0.999
@@ -94,7 +105,12 @@ def identified(count):
         rig=rig,
         before=EMPS,
         values={name: rig.values[name] for name in rig.free},
-        errors={"mass": 0.0213, "viscous": 1.0, "coulomb": 2.0, "offset": 7.0},
+        errors={
+            "mass": 0.0213,
+            "viscous": 1.0,
+            "coulomb": 2.0,
+            "offset": 7.0,
+        },
         correlations=correlations,
         fits=fits[:count],
         fits_before=({"x": 99.0, "u": 81.5}, *fits[1:count]),
@@ -136,7 +152,11 @@ def audited(about, ids, sets, quick, threads, report):
 def repeated(name):
     """A twin whose replays are texts."""
     twin = SimpleNamespace(
-        name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated
+        name=name,
+        label=f"the rig {name}",
+        units={"x": "m"},
+        start=2.0,
+        set=repeated,
     )
     twin.columns = SimpleNamespace(time="t")
     twin.fit = lambda _: {"x": 99.04, "u": 1.25}
@@ -374,5 +394,8 @@ def called(tmp_path, monkeypatch, capsys):
 def test_a_command_hands_on_what_it_is_given_and_prints_what_comes_back(line, called, tmp_path):
     code, notes, out, _ = called(line)
     text = " ".join("\n".join([*notes, out]).replace(str(tmp_path), ".").split())
-    missing = [part for part in GIVEN[line][1] if part not in text]
+    missing = []
+    for part in GIVEN[line][1]:
+        if part not in text:
+            missing.append(part)
     assert (code, missing) == (GIVEN[line][0], []), text

@@ -52,7 +52,12 @@ def test_a_law_is_scored_in_the_half_of_the_runs_that_did_not_choose_it():
 
 def test_the_lead_is_the_ratio_to_the_next_family_and_sure_where_its_interval_is_above_1():
     noise = np.exp(np.linspace(-0.2, 0.2, RUNS))
-    found = lead(classical=3.0 * noise, observer_free=9.0, adrc=2.0, pid=5.0)
+    found = lead(
+        classical=3.0 * noise,
+        observer_free=9.0,
+        adrc=2.0,
+        pid=5.0,
+    )
     assert found.first == "rivals"
     assert found.second == "switching"
     assert found.laws == ("adrc",)
@@ -80,15 +85,30 @@ def test_a_sentence_stands_is_open_or_is_contradicted_by_its_interval():
     axis, _, highest, score, kind, _ = next(
         one for one in families.SENTENCES if one[-1] == "is level at best"
     )
-    cell = {"plant": "duffing", "axis": axis, "level": highest, "score": score, "kind": kind}
+    cell = {
+        "plant": "duffing",
+        "axis": axis,
+        "level": highest,
+        "score": score,
+        "kind": kind,
+    }
     ends = [(0.9, 1.1), (0.9, 1.2), (1.01, 1.05), (1.2, 1.3)]
-    cells = [cell | {"low": low, "high": high} for low, high in ends]
+    cells = []
+    for low, high in ends:
+        cells.append(cell | {"low": low, "high": high})
     cells += [cells[0] | {"level": 2 * highest}, cells[0] | {"kind": "another"}]
     assert [*families.judged(cells)][-1] == "in all: 2 of 4 stand, 1 contradicted"
     axis, _, level, score, kind, does = families.SENTENCES[0]
     assert does == "leads"
     cells = [
-        cells[0] | {"axis": axis, "level": level, "score": score, "kind": kind, "low": low}
+        cells[0]
+        | {
+            "axis": axis,
+            "level": level,
+            "score": score,
+            "kind": kind,
+            "low": low,
+        }
         for low in (0.9, 1.01)
     ]
     assert [*families.judged(cells)][-1] == "in all: 1 of 2 stand, 0 contradicted"
@@ -141,7 +161,9 @@ def test_a_load_and_friction_are_in_proportion_to_the_bound():
     its searches.
     """
     plant = smc.plant_from(MODEL, channels={"slide": smc.Channel(x0=0.3)})
-    laws = [smc.law("adrc", wc=float(i + 1)) for i in range(RUNS)]
+    laws = []
+    for i in range(RUNS):
+        laws.append(smc.law("adrc", wc=float(i + 1)))
     found = families.Subject(plant, {"adrc": Candidate(laws[1], tuple(laws))}, "heavy")
     assert found.load(families.FORCE, 0.5) == (5.0, 1.0)
     assert found.load("load, omega / wc", 0.25) == (10.0, 0.5)

@@ -42,7 +42,14 @@ def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
     K = control.lqr(A, B, np.eye(2), np.eye(1))[0]
     law = smc.law_from(K)
     trace = smc.run(
-        smc.Scenario(plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=1.0, u_max=np.inf)
+        smc.Scenario(
+            plant=LINEAR,
+            law=law,
+            x0=0.3,
+            v0=-0.4,
+            duration=1.0,
+            u_max=np.inf,
+        )
     )
     np.testing.assert_allclose(
         trace.u[:, 0], -(K[0, 0] * trace.x[:, 0] + K[0, 1] * trace.v[:, 0]), rtol=1e-12
@@ -112,7 +119,13 @@ def test_many_inputs_are_read_by_name():
     law = smc.exchange.law_from_control(K, ["r", "x", "v", "ddr"])
     assert "w3 = y.ddr" in text(law)
     trace = smc.run(
-        smc.Scenario(plant=LINEAR, law=law, duration=0.1, reference=smc.Constant(0.5), u_max=np.inf)
+        smc.Scenario(
+            plant=LINEAR,
+            law=law,
+            duration=0.1,
+            reference=smc.Constant(0.5),
+            u_max=np.inf,
+        )
     )
     assert np.allclose(trace.u[:, 0], 2.5 - 30.0 * trace.x[:, 0] - 6.0 * trace.v[:, 0], rtol=1e-12)
 
@@ -124,7 +137,14 @@ def test_its_c_gives_the_same_bits(tmp_path):
     in_c = smc.exchange.law_from_c(tmp_path / "law.c")
     runs = []
     for one in (law, in_c(), law.template(scale=0.5)):
-        runs.append(smc.Scenario(plant="duffing", law=one, duration=1.0, u_max=np.inf))
+        runs.append(
+            smc.Scenario(
+                plant="duffing",
+                law=one,
+                duration=1.0,
+                u_max=np.inf,
+            )
+        )
     first, second, half = smc.run(runs)
     assert np.array_equal(first.u, second.u)
     assert half.u[0, 0] == first.u[0, 0] / 2
@@ -192,7 +212,9 @@ def test_a_and_b_are_the_derivatives_of_the_nominal_model(name):
     plant = smc.plant(name)
     G = smc.design.state_space(plant)
     n = plant.n
-    assert (G.nstates, G.ninputs, G.noutputs) == (2 * n, plant.driven, n)
+    assert G.nstates == 2 * n
+    assert G.ninputs == plant.driven
+    assert G.noutputs == n
     assert np.array_equal(G.A[:n], np.eye(n, 2 * n, n))
     assert not G.B[:n].any()
     rest = np.array(plant.rest or (0.0,) * n)

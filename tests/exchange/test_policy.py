@@ -30,7 +30,14 @@ def proportional(observation):
 def briefly(law, **fields):
     """A run of three samples, and the start of it in parts of u_max, at x = 0.5, v = 0."""
     return smc.run(
-        smc.Scenario(plant="duffing", law=law, duration=0.002, x0=0.5, u_max=6.0, **fields)
+        smc.Scenario(
+            plant="duffing",
+            law=law,
+            duration=0.002,
+            x0=0.5,
+            u_max=6.0,
+            **fields,
+        )
     )
 
 
@@ -153,7 +160,12 @@ def onnx(monkeypatch, kind="tensor(float)", shape=("batch", 2), more=()):
 
 
 @pytest.mark.parametrize(
-    ("kind", "dtype"), [("float", np.float32), ("double", np.float64), ("float16", np.float16)]
+    ("kind", "dtype"),
+    [
+        ("float", np.float32),
+        ("double", np.float64),
+        ("float16", np.float16),
+    ],
 )
 def test_a_file_of_onnx_is_asked_for_a_batch_of_one_in_its_own_type(
     kind, dtype, tmp_path, monkeypatch
@@ -162,7 +174,8 @@ def test_a_file_of_onnx_is_asked_for_a_batch_of_one_in_its_own_type(
     (tmp_path / f"{kind}.onnx").write_bytes(kind.encode())
     trace = briefly(smc.policy(tmp_path / f"{kind}.onnx"))
     assert trace.u[0, 0] == pytest.approx(-1.5, rel=1e-3)
-    assert (seen[0].shape, seen[0].dtype) == ((1, 2), dtype)
+    assert seen[0].shape == (1, 2)
+    assert seen[0].dtype == dtype
 
 
 def test_a_file_that_changed_is_another_law_to_a_study(tmp_path, monkeypatch):
@@ -217,7 +230,8 @@ class Module:
         return [types.SimpleNamespace(dtype=self.dtype, is_floating_point=lambda: True)]
 
     def __call__(self, batch):
-        assert (batch.shape, batch.dtype) == ((1, 2), self.dtype)
+        assert batch.shape == (1, 2)
+        assert batch.dtype == self.dtype
         if self.training:
             return np.inf * batch
         return self.gain * batch[:, :1]
@@ -313,10 +327,17 @@ class Pair(Module):
 
 
 def test_what_is_no_action_ends_the_run_with_a_sentence(torch):
-    wrong = {"two": lambda o: [1.0, 2.0], "none": lambda o: [np.nan], "pair": Pair(np.float64)}
+    wrong = {
+        "two": lambda o: [1.0, 2.0],
+        "none": lambda o: [np.nan],
+        "pair": Pair(np.float64),
+    }
     ends = {name: briefly(smc.policy(act)).failure for name, act in wrong.items()}
     free = smc.Scenario(
-        plant="duffing", law=smc.policy(lambda o: o[:1]), duration=0.002, u_max=math.inf
+        plant="duffing",
+        law=smc.policy(lambda o: o[:1]),
+        duration=0.002,
+        u_max=math.inf,
     )
     ends["no bound"] = smc.run(free).failure
     for name, said in {

@@ -35,7 +35,10 @@ def told_scenario(scenario: Scenario) -> str:
     """Return plant, law and what differs from the default."""
     plain = Scenario(plant=scenario.plant, law=scenario.law)
     given = {one.name: getattr(scenario, one.name) for one in dataclasses.fields(scenario)}
-    changed = [f"{name}={told(one)}" for name, one in given.items() if one != getattr(plain, name)]
+    changed = []
+    for name, one in given.items():
+        if one != getattr(plain, name):
+            changed.append(f"{name}={told(one)}")
     return f"Scenario({', '.join([told(scenario.plant), told(scenario.law), *changed])})"
 
 

@@ -16,7 +16,9 @@ LEVELS = {
 
 def part(theorem, margins, **data):
     """Return a theorem's data; `margins`: condition -> margin."""
-    conditions = [{"name": name, "margin": margin} for name, margin in margins.items()]
+    conditions = []
+    for name, margin in margins.items():
+        conditions.append({"name": name, "margin": margin})
     return {
         "theorem": theorem,
         "holds": min(margins.values()) >= 0.0,

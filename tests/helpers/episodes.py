@@ -89,7 +89,9 @@ def columns(trace):
 
 def run_of(found, law, fields=None):
     """The scenario of a setting under a law."""
-    own = {name: getattr(found.scenario, name) for name in (*FIELDS, "plant")}
+    own = {}
+    for name in (*FIELDS, "plant"):
+        own[name] = getattr(found.scenario, name)
     own |= {"x0": found.low}  # the tests fix it
     return smc.Scenario(**own, law=law, **(fields or {}))
 

@@ -15,8 +15,22 @@ from numba import njit
 from scipy.linalg import expm
 
 NAMES = ("classical", "twisting", "super_twisting", "quasi_continuous", "suboptimal", "power_rate")
-GAINS = (("k", "c"), ("r1", "r2"), ("k1", "k2", "c"), ("a", "b"), ("r1", "r2"), ("k", "c", "a"))
-USUAL = ((4.0, 2.5), (3.7, 2.3), (3.0, 4.4, 2.5), (6.0, 1.0), (4.0, 1.5), (4.0, 2.5, 0.5))
+GAINS = (
+    ("k", "c"),
+    ("r1", "r2"),
+    ("k1", "k2", "c"),
+    ("a", "b"),
+    ("r1", "r2"),
+    ("k", "c", "a"),
+)
+USUAL = (
+    (4.0, 2.5),
+    (3.7, 2.3),
+    (3.0, 4.4, 2.5),
+    (6.0, 1.0),
+    (4.0, 1.5),
+    (4.0, 2.5, 0.5),
+)
 PERIODS = (1e-4, 2e-4, 2.5e-4, 5e-4, 1e-3)  # s
 LATE = 0.4  # share of a run in which the cycle is measured
 STEADY = 0.02  # relative difference of both halves of that share, above which there is no cycle
@@ -130,7 +144,9 @@ def measured(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
     if len(up) < 5 or not np.isfinite(s).all():
         return math.nan, math.nan
     at = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
-    ranges = [np.ptp(s[a : b + 1]) for a, b in itertools.pairwise(up)]
+    ranges = []
+    for a, b in itertools.pairwise(up):
+        ranges.append(np.ptp(s[a : b + 1]))
     return float(np.median(ranges)) / 2.0, float((len(at) - 1) / (at[-1] - at[0]))
 
 
@@ -139,7 +155,9 @@ def random_loop(rng: np.random.Generator) -> ExactLoop:
     a plant.
     """
     kind = int(rng.integers(len(NAMES)))
-    scaled = [gain * 2.0 ** rng.uniform(-1.0, 1.0) for gain in USUAL[kind]]
+    scaled = []
+    for gain in USUAL[kind]:
+        scaled.append(gain * 2.0 ** rng.uniform(-1.0, 1.0))
     if kind == 5:
         scaled[2] = rng.uniform(0.3, 0.7)  # an exponent
     if kind in (1, 4):

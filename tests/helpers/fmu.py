@@ -51,7 +51,9 @@ class Importer:
 
     def set(self, **values: float) -> None:
         """Set variables; a name's dots are written as two underscores."""
-        named = {name.replace("__", "."): value for name, value in values.items()}
+        named = {}
+        for name, value in values.items():
+            named[name.replace("__", ".")] = value
         self.fmu.setFloat64([self.at[name] for name in named], list(named.values()))
 
     def get(self, *names: str) -> list[float]:

@@ -366,7 +366,10 @@ class Loop:
 
     def apply_pushes(self, data: mujoco.MjData, t: float) -> None:
         """Apply the disturbances that push one body each, at time t, s."""
-        pushes = [signal for signal in self.scenario.disturbance if isinstance(signal, Push)]
+        pushes = []
+        for signal in self.scenario.disturbance:
+            if isinstance(signal, Push):
+                pushes.append(signal)
         bodies = [self.model.body(push.body).id for push in pushes]
         data.xfrc_applied[bodies, :3] = 0.0
         for body, push in zip(bodies, pushes, strict=True):

@@ -47,7 +47,8 @@ def same(a, b) -> bool:
 
 def assert_same(a, b):
     """Fail unless two traces hold the same bits and ended the same way."""
-    assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
+    assert a.failure == b.failure
+    assert a.diverged_at == b.diverged_at
     for name in ARRAYS:
         np.testing.assert_array_equal(
             getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}"

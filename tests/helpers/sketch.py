@@ -41,7 +41,9 @@ def made(scenario: smc.Scenario) -> smc.Trace:
 def failed(trace: smc.Trace, at: int, failure: str = "") -> smc.Trace:
     """Return the trace as if it had failed at sample `at`; by default the plant diverged."""
     failure = failure or f"{PLANT_DIVERGED}, at t = {trace.t[at]:g} s"
-    arrays = {name: getattr(trace, name).copy() for name in ARRAYS[1:]}
+    arrays = {}
+    for name in ARRAYS[1:]:
+        arrays[name] = getattr(trace, name).copy()
     for array in arrays.values():
         array[at:] = np.nan
     return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure=failure)
@@ -63,7 +65,9 @@ def _noted(name: str) -> Callable:
     def method(self, *given, **options):
         first, Pen.busy = not Pen.busy, True
         if first:
-            named = [f"{key}={_plain(value)}" for key, value in options.items()]
+            named = []
+            for key, value in options.items():
+                named.append(f"{key}={_plain(value)}")
             many = name == "polygon" or (name == "line" and len(given[0]) > 4)
             if many:
                 shape = [_outline(given[0]), *given[1:]]

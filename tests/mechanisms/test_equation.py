@@ -76,11 +76,15 @@ def oracle(scenarios, factor=1.0):
     multiplies the true mass.
     """
     s = scenarios[0].resolved
-    assert all(dataclasses.replace(other, law=s.law) == scenarios[0] for other in scenarios)
+    for other in scenarios:
+        assert dataclasses.replace(other, law=s.law) == scenarios[0]
     equation = EQUATION[s.plant.name]
     h = s.physics_step
     delay = round(s.input_delay / h)
-    jump = math.inf if s.jump is None else round(s.jump.time / h)
+    if s.jump is None:
+        jump = math.inf
+    else:
+        jump = round(s.jump.time / h)
     y = np.array([[s.x0, s.v0]] * len(scenarios)).swapaxes(0, 1)
     commands = []
     states = []
@@ -152,7 +156,8 @@ def test_seconds_of_the_closed_loop_follow_the_equation(plant, law):
     scenario, states = long(plant)[law]
     assert scenario.jump is not None
     assert scenario.jump.time == scenario.duration / 2
-    assert (scenario.resolved.physics_step, scenario.resolved.integrator) == (1e-3, "RK4")
+    assert scenario.resolved.physics_step == 1e-3
+    assert scenario.resolved.integrator == "RK4"
     x, v = error(smc.run(scenario), states)
     assert x < 1e-10  # the requirement is 1e-7
     assert v < 1e-9
@@ -285,7 +290,10 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     for trace in smc.run(scenarios):
         s = trace.scenario
         states = np.stack([trace.x, trace.v])
-        for first, last in ((0, s.samples // 2), (s.samples // 2, s.samples)):
+        for first, last in (
+            (0, s.samples // 2),
+            (s.samples // 2, s.samples),
+        ):
             p = s.plant.values(s.factors(first))
             part = slice(first, last)
 

@@ -35,7 +35,15 @@ def pull(model, data, x, v=0.0):
     return data.qacc.copy()
 
 
-DUFFINGS = [{}, {"alpha": -2.0, "beta": 0.5, "M": 3.0}, {"alpha": -0.3, "beta": 4.0}]
+DUFFINGS = [
+    {},
+    {
+        "alpha": -2.0,
+        "beta": 0.5,
+        "M": 3.0,
+    },
+    {"alpha": -0.3, "beta": 4.0},
+]
 
 
 @pytest.mark.parametrize("parameters", DUFFINGS)
@@ -61,7 +69,17 @@ def test_the_hill_between_duffings_wells_is_nineteen_percent_too_high():
     assert data.energy[0] == pytest.approx(0.25 * 1.19, rel=0.005)
 
 
-@pytest.mark.parametrize("parameters", [{}, {"mu": 2.5, "k": 3.0, "M": 0.5}])
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {},
+        {
+            "mu": 2.5,
+            "k": 3.0,
+            "M": 0.5,
+        },
+    ],
+)
 def test_the_active_and_the_transverse_damper_change_sign_where_van_der_pols_does(parameters):
     p = plant("van_der_pol", **parameters)
     model, data = built(p)

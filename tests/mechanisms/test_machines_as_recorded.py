@@ -46,7 +46,9 @@ def moved(value):
 
 def said(one):
     """What the rest of the package reads of a plant, except its functions."""
-    fields = {field.name: getattr(one, field.name) for field in dataclasses.fields(one)}
+    fields = {}
+    for field in dataclasses.fields(one):
+        fields[field.name] = getattr(one, field.name)
     plain = {}
     for name, value in fields.items():
         if not callable(value) and name not in NOT_READ:

@@ -108,8 +108,12 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
         bodies.append([(m, np.array(c), np.array([[A, D, E], [D, B, F], [E, F, C]]))])
     radius = (3 * payload / (4 * math.pi * steel)) ** (1 / 3)
     bodies[6].append((payload, np.array([0, 0, 0.107 + lp]), 0.4 * payload * radius**2 * np.eye(3)))
-    turns = [rotation(alpha, angle) for (_, alpha, _), angle in zip(FRAMES, q, strict=True)]
-    offsets = [np.array([a_, -math.sin(al) * d, math.cos(al) * d]) for a_, al, d in FRAMES]
+    turns = []
+    for (_, alpha, _), angle in zip(FRAMES, q, strict=True):
+        turns.append(rotation(alpha, angle))
+    offsets = []
+    for a_, al, d in FRAMES:
+        offsets.append(np.array([a_, -math.sin(al) * d, math.cos(al) * d]))
     w = np.zeros(3)
     dw = np.zeros(3)
     acc = np.array([0.0, 0.0, GRAV])
@@ -250,7 +254,10 @@ def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
         "control_period": 2e-3,
     }
     unknown = smc.Scenario(
-        plant="panda", mismatch={"payload": 0.5}, jump=smc.Jump(0.05, {"payload": 1.5}), **known
+        plant="panda",
+        mismatch={"payload": 0.5},
+        jump=smc.Jump(0.05, {"payload": 1.5}),
+        **known,
     )
     assert unknown.factors(0) == {"payload": 0.5}
     late = unknown.factors(unknown.jump_step)

@@ -18,7 +18,10 @@ from smc_mujoco.mechanisms.plant import Field
 QUADROTOR = smc.plant("quadrotor")
 P = dict(QUADROTOR.parameters)
 G = P["grav"]
-FREE_BODY = {"joint": True, "plants": ("a free body",)}
+FREE_BODY = {
+    "joint": True,
+    "plants": ("a free body",),
+}
 
 
 @smc.law_function(**FREE_BODY)
@@ -192,9 +195,22 @@ def speed(p, thrust):
 
 
 @pytest.mark.parametrize(
-    "numbers", [(7.0, 0.0, 5.0, 2e-3), (4.0, 1e-3, 0.0, 3e-3), (0.0, 2e-3, 9.0, 0.0)], ids=str
+    "numbers",
+    [
+        (7.0, 0.0, 5.0, 2e-3),
+        (4.0, 1e-3, 0.0, 3e-3),
+        (0.0, 2e-3, 9.0, 0.0),
+    ],
+    ids=str,
 )
-@pytest.mark.parametrize(("first", "told"), [(500.0, 2000.0), (2000.0, 300.0), (900.0, 900.0)])
+@pytest.mark.parametrize(
+    ("first", "told"),
+    [
+        (500.0, 2000.0),
+        (2000.0, 300.0),
+        (900.0, 900.0),
+    ],
+)
 def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
     rise, rise2, fall, fall2 = numbers
     rotor = np.zeros((), ROTOR).view(np.recarray)
@@ -381,7 +397,11 @@ LIFTS = {  # set -> thrust over weight, as its source or what was derived of it 
     "hummingbird": 10.2,
 }
 # rpm at which a set hovers, of the same sources
-HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}
+HOVERS = {
+    "crazyflow": 18_968,
+    "gym": 14_480,
+    "rotorpy": 17_079,
+}
 
 
 @pytest.mark.parametrize("name", list(QUADROTOR.sets))

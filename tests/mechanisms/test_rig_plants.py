@@ -162,7 +162,11 @@ def test_nominal_is_the_equation_without_dry_friction(name):
 
 
 # the Furuta pendulum about hanging
-START = {"furuta": (0.0, 2.6), "servo_axis": 0.1, "acrobot": (0.5, 1.0)}
+START = {
+    "furuta": (0.0, 2.6),
+    "servo_axis": 0.1,
+    "acrobot": (0.5, 1.0),
+}
 
 
 @pytest.mark.slow
@@ -238,7 +242,13 @@ def played(times, torque):
     return table()
 
 
-@pytest.mark.parametrize(("name", "driven"), [("pendubot", False), ("acrobot", True)])
+@pytest.mark.parametrize(
+    ("name", "driven"),
+    [
+        ("pendubot", False),
+        ("acrobot", True),
+    ],
+)
 def test_model_1_1_equals_an_independent_rk4(name, driven):
     profile = np.sin(np.arange(500) * 2e-3 * 7.0) * 2.0 * driven
     trace = smc.run(

@@ -234,7 +234,9 @@ def test_the_law_settles_both_joints_also_on_the_realistic_mechanism(name):
     parts = list(PARTS.values())[NAMES.index(name) :: len(NAMES)]
     for trace in smc.run([scenario(name, **part) for part in parts]):
         assert bound(trace) <= 0.05, trace.scenario
-    brief = [scenario(name, duration=0.25, **part) for part in parts]
+    brief = []
+    for part in parts:
+        brief.append(scenario(name, duration=0.25, **part))
     for start in smc.run(brief):
         assert_same(start, reference.run(start.scenario))
 
@@ -246,14 +248,17 @@ def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_pr
     S is 0 the while.
     """
     levels = np.array([0.001, 0.002, 0.004])
-    runs = [
-        scenario(
-            "cart_pole",
-            friction=smc.Coulomb(level),
-            duration=20.0,
+    runs = []
+    for level in levels:
+        runs.append(
+            (
+                scenario(
+                    "cart_pole",
+                    friction=smc.Coulomb(level),
+                    duration=20.0,
+                )
+            )
         )
-        for level in levels
-    ]
     traces = smc.run(runs)
     cycles = np.array([np.abs(trace.x[-6000:, 0]).max() for trace in traces])
     assert max(np.abs(surface(trace)[-6000:]).max() for trace in traces) <= 2e-3 * LAW.k

@@ -53,20 +53,41 @@ def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=Fa
     Without units all channels are in m; `free` if the second half of them has no actuators.
     """
     t = np.asarray(t, float)
-    columns = [np.asarray(a, float) for a in (x, r, u, s, v, reaction)]
+    columns = []
+    for a in (x, r, u, s, v, reaction):
+        columns.append(np.asarray(a, float))
     columns = [a[:, None] if a.ndim == 1 else a for a in columns]
     n = max(a.shape[1] if a.ndim else 1 for a in columns)
     x, r, u, s, v, reaction = (np.broadcast_to(a, (t.size, n)) for a in columns)
     zero = np.zeros((t.size, n))
     units = units or ("m",) * n
     mixed = dataclasses.replace(
-        plant("cart_pole"), name="duffing", unit=units[0], mixed=units, n=n, underactuated=free
+        plant("cart_pole"),
+        name="duffing",
+        unit=units[0],
+        mixed=units,
+        n=n,
+        underactuated=free,
     )
     scenario = SimpleNamespace(
         plant=mixed, efforts=mixed.efforts, law=SimpleNamespace(name="classical")
     )
-    more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
-    return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, **more)
+    more = {
+        "force": u,
+        "reaction": reaction,
+        "scenario": scenario,
+    } | fields
+    return Run(
+        t=t,
+        x=x,
+        v=v,
+        u=u,
+        applied=u,
+        s=s,
+        d=zero,
+        r=r,
+        **more,
+    )
 
 
 def clock(duration, h):
@@ -81,10 +102,31 @@ def second_order(zeta, omega, t):
 
 # Runs of a few samples, by hand
 
-STEP, PULSE = [9, 9, 13, 13, 13], [0, 2, 2, 2, 0, 0, 0]  # of the reference
+STEP, PULSE = (
+    [9, 9, 13, 13, 13],
+    [
+        0,
+        2,
+        2,
+        2,
+        0,
+        0,
+        0,
+    ],
+)  # of the reference
 LAST = np.zeros((11, 2))
-LAST[8:] = [-1, 2], [-2, -2], [-3, 0]  # the last part is t = 8, 9, 10
-UNEVEN = {"t": [0, 1, 3], "x": [[3, -1], [1, 0], [0, 0]]}
+LAST[8:] = (
+    [-1, 2],
+    [-2, -2],
+    [
+        -3,
+        0,
+    ],
+)  # the last part is t = 8, 9, 10
+UNEVEN = {
+    "t": [0, 1, 3],
+    "x": [[3, -1], [1, 0], [0, 0]],
+}
 STOPS = np.array([1, 0, 1, 0, 0, 1, 0, 0])  # a speed: at rest from sample 3 to 4, and from 6 to 7
 BOTH = np.column_stack([STOPS, np.ones(8)])
 LONG = clock(10, 1e-2)
@@ -190,18 +232,44 @@ BY_HAND = [
         {("v"): STOPS, ("reaction"): [0, 0, 0, 0, 0, 0, 0, 5]},
         ("of the step that ends at the sample"),
     ),
-    (m.stick_time, 10.0, {"t": LONG, "v": 0.9e-5, "reaction": 1.0}, "it never moved: |v| <= 1e-5"),
-    (m.stick_time, 0.0, {"t": LONG, "v": 1.1e-5, "reaction": 1.0}, "it crept for long"),
+    (
+        m.stick_time,
+        10.0,
+        {
+            "t": LONG,
+            "v": 0.9e-5,
+            "reaction": 1.0,
+        },
+        "it never moved: |v| <= 1e-5",
+    ),
+    (
+        m.stick_time,
+        0.0,
+        {
+            "t": LONG,
+            "v": 1.1e-5,
+            "reaction": 1.0,
+        },
+        "it crept for long",
+    ),
     (
         m.stick_time,
         8.0,
-        {("t"): LONG, ("v"): STOPPED, ("reaction"): 1.0},
+        {
+            ("t"): LONG,
+            ("v"): STOPPED,
+            ("reaction"): 1.0,
+        },
         ("0.1 % of the largest speed is rest"),
     ),
     (
         m.stick_time,
         0.0,
-        {("t"): LONG, ("v"): np.where(LONG < 2, 1.0, 1.01e-3), ("reaction"): 1.0},
+        {
+            ("t"): LONG,
+            ("v"): np.where(LONG < 2, 1.0, 1.01e-3),
+            ("reaction"): 1.0,
+        },
         ("more is not"),
     ),
     (
@@ -375,7 +443,15 @@ def test_reversals_are_those_of_the_channel_that_hunts_fastest():
 
 
 @pytest.mark.parametrize(
-    ("zeta", "omega"), [(0.1, 5.0), (0.3, 1.0), (0.7, 5.0), (0.9, 5.0), (1.0, 5.0), (1.5, 5.0)]
+    ("zeta", "omega"),
+    [
+        (0.1, 5.0),
+        (0.3, 1.0),
+        (0.7, 5.0),
+        (0.9, 5.0),
+        (1.0, 5.0),
+        (1.5, 5.0),
+    ],
 )
 def test_step_response_agrees_with_python_control(zeta, omega):
     h = 1e-3
@@ -434,7 +510,10 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
     found = m.scores(trace)
     assert list(found) == ["driven", "free"]
     assert found["driven"] == alone[0]
-    commanded = [metric.name for metric in m.metrics() if metric.command]
+    commanded = []
+    for metric in m.metrics():
+        if metric.command:
+            commanded.append(metric.name)
     assert found["free"] == {
         name: value for name, value in alone[1].items() if name not in commanded
     }
@@ -446,7 +525,11 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
 
 def test_what_u_or_s_changes_is_of_the_command():
     t = clock(1, 1e-3)
-    still = {"t": t, "x": np.cos(t), "force": np.zeros((t.size, 1))}
+    still = {
+        "t": t,
+        "x": np.cos(t),
+        "force": np.zeros((t.size, 1)),
+    }
     scores = m.score(
         run(**still, u=np.sin(600 * t) * (2 - t), s=np.exp(-9 * t) + 0.01 * np.sin(60 * t))
     )
@@ -464,7 +547,13 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
     x = np.exp(-t)[:, None] * [1.0, 2.0]
     more = early[:, None]
     u = 0.01 * np.sin(9 * t)[:, None] * [1.0, 2.0]
-    plain = {"x": x, "u": u, "s": np.exp(-t), "v": 0.0, "reaction": 1.0 - early}
+    plain = {
+        "x": x,
+        "u": u,
+        "s": np.exp(-t),
+        "v": 0.0,
+        "reaction": 1.0 - early,
+    }
     felt = plain | {
         ("x"): x + more * [-3.0, 4.0],
         ("u"): u + more * alternating(t)[:, None],
@@ -473,7 +562,10 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
     felt |= {"s": np.exp(-t) + early, "reaction": 1.0 + early}
     one, other = (m.score(run(t, **signals)) for signals in (plain, felt))
     same = {name for name in one if one[name] == other[name]}
-    late = {metric.name for metric in m.metrics() if metric.late}
+    late = set()
+    for metric in m.metrics():
+        if metric.late:
+            late.add(metric.name)
     assert late == same - {"reversal_rate"}
     rho = m.trends(run(t, **plain))
     assert rho.keys() == late
@@ -541,7 +633,13 @@ def test_driven_channels_in_two_units_have_the_worst_time_and_no_number_in_eithe
 def test_rest_is_measured_beside_the_largest_speed_of_the_group():
     """A pole at 100 rad/s does not put its cart at 0.05 m/s to rest."""
     v = np.array([[0.05, 100.0]] * 3)
-    slow = run(np.arange(3.0), v=v, reaction=1.0, units=("m", "rad"), free=True)
+    slow = run(
+        np.arange(3.0),
+        v=v,
+        reaction=1.0,
+        units=("m", "rad"),
+        free=True,
+    )
     assert m.stick_time(slow) == 0.0
 
 
@@ -657,7 +755,14 @@ def random_runs(draw):
     if draw(st.booleans()):
         x[-max(1, samples // 2) :] = r[-1]  # settles
     more = {"v": draw(block), "reaction": draw(block)}
-    return run(np.arange(samples) * 0.25, x, r=np.broadcast_to(r, x.shape), u=u, s=s, **more)
+    return run(
+        np.arange(samples) * 0.25,
+        x,
+        r=np.broadcast_to(r, x.shape),
+        u=u,
+        s=s,
+        **more,
+    )
 
 
 @pytest.mark.slow

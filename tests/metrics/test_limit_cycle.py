@@ -48,7 +48,16 @@ SHAPES = {
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_first_harmonic_counts_where_a_higher_one_is_larger_in_the_rate(shape):
     # 7.25: between bins
-    for frequency, noise in (3.1, 0.01), (7.25, 0.0), (7.25, 0.01), (19.37, 0.01), (81.4, 0.01):
+    for frequency, noise in (
+        (3.1, 0.01),
+        (7.25, 0.0),
+        (7.25, 0.01),
+        (19.37, 0.01),
+        (
+            81.4,
+            0.01,
+        ),
+    ):
         wave = SHAPES[shape](math.tau * frequency * T + 0.3)
         amplitude, found = limit_cycle(
             T, wave + noise * np.random.default_rng(0).normal(size=len(T))
@@ -122,7 +131,13 @@ CARTS = """<mujoco><option gravity="0 0 0"/><default><geom size=".1" mass="1" co
  <body pos="0 1 0"><joint name="B" type="slide" axis="0 0 1"/><geom/></body></worldbody></mujoco>"""
 
 
-@pytest.mark.parametrize("laws", [("pid", "classical"), ("classical", "pid")])
+@pytest.mark.parametrize(
+    "laws",
+    [
+        ("pid", "classical"),
+        ("classical", "pid"),
+    ],
+)
 def test_a_group_without_a_limit_cycle_hides_no_other_and_units_do_not_mix(laws, tmp_path):
     (tmp_path / "two.xml").write_text(CARTS)
     motors = {name: smc.Channel(motor=True) for name in "AB"}
@@ -138,7 +153,9 @@ def test_a_group_without_a_limit_cycle_hides_no_other_and_units_do_not_mix(laws,
     trace = smc.run(scenario)
     of_group = smc.scores(trace)
     whole = smc.score(trace)
-    frequencies = [its["chattering_frequency"] for its in of_group.values()]
+    frequencies = []
+    for its in of_group.values():
+        frequencies.append(its["chattering_frequency"])
     assert sum(map(math.isnan, frequencies)) == 1  # pid has none
     assert whole["chattering_frequency"] == max(f for f in frequencies if not math.isnan(f))
     assert "chattering_amplitude" not in whole  # m/s and rad/s

@@ -17,19 +17,38 @@ from smc_mujoco.metrics import tip
 def trace():
     law = smc.law("computed_torque_sliding", c=8.0)
     return smc.run(
-        smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, duration=0.5)
+        smc.Scenario(
+            plant=arms.arm(),
+            law=law,
+            reference=smc.Sine(0.3, 4.0),
+            x0=0.2,
+            duration=0.5,
+        )
     )
 
 
 @pytest.fixture(scope="module")
 def pressed():
     """The panda presses on a slippery wall with 20 N, without friction in its joints."""
-    law = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2)
+    law = smc.law(
+        "hybrid_sliding",
+        force=20.0,
+        c=15.0,
+        k=40.0,
+        width=0.2,
+    )
     path = tasks.wall_path()
     start = tuple(signal.values[0] for signal in path)
     wall = smc.Contact("wall", friction=0.0)
     return smc.run(
-        smc.Scenario(plant="panda", law=law, reference=path, x0=start, contact=wall, duration=0.9)
+        smc.Scenario(
+            plant="panda",
+            law=law,
+            reference=path,
+            x0=start,
+            contact=wall,
+            duration=0.9,
+        )
     )
 
 
@@ -117,7 +136,13 @@ def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
     pushed = {"feedforward": smc.Constant(4.0), "disturbance": (smc.Constant(4.0), push)}
     motor = smc.DCMotor(inductance=0.0)
     cart = smc.Scenario(
-        plant="duffing", law="none", contact="stops", x0=0.5, duration=2.0, actuator=motor, **pushed
+        plant="duffing",
+        law="none",
+        contact="stops",
+        x0=0.5,
+        duration=2.0,
+        actuator=motor,
+        **pushed,
     )
     trace = smc.run(cart)
     assert tip.contacts(trace).force[-1] == pytest.approx(-trace.reaction[-1, 0], rel=0.01)
@@ -186,7 +211,13 @@ LIFTED = """
 
 def test_joints_without_a_channel_are_where_they_start():
     """A lift holds the arm 0.7 m higher than the model's qpos0, also for inverse kinematics."""
-    plant = smc.plant_from(LIFTED, channels=["turn"], keyframe="up", name="lifted", tip="tip")
+    plant = smc.plant_from(
+        LIFTED,
+        channels=["turn"],
+        keyframe="up",
+        name="lifted",
+        tip="tip",
+    )
     np.testing.assert_allclose(tip.tip_path(plant, np.zeros((1, 1))), [[0.5, 0.0, 1.0]])
     (turn,) = smc.signals.cartesian_path(
         plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5]

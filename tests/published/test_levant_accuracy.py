@@ -37,7 +37,13 @@ LATE = 3000
 
 def mass():
     """A block that nothing but u and d moves."""
-    return smc.plant("duffing", M=1.0, delta=0.0, alpha=0.0, beta=0.0)
+    return smc.plant(
+        "duffing",
+        M=1.0,
+        delta=0.0,
+        alpha=0.0,
+        beta=0.0,
+    )
 
 
 def exponents(sizes, errors):
@@ -107,7 +113,9 @@ def sliding(r, noise):
                         **({"u_max": 20.0} | fields),
                     )
                 )
-    errors = [late(t.x, t.v, t.force + t.d)[:r] for t in smc.run(scenarios)]
+    errors = []
+    for t in smc.run(scenarios):
+        errors.append(late(t.x, t.v, t.force + t.d)[:r])
     return np.reshape(errors, (len(laws), len(PERIODS), -1, r))
 
 

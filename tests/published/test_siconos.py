@@ -42,12 +42,23 @@ EXPLICIT = {
     0.69: (-0.01996971565849693, 1.0),
 }
 # t -> (x1, x2) of twisting
-TWISTING = {0.1: (10.93425, 8.685), 0.5: (13.35625, 3.425), 9.9: (0.0, 0.0), 19.8: (0.0, 0.0)}
+TWISTING = {
+    0.1: (10.93425, 8.685),
+    0.5: (13.35625, 3.425),
+    9.9: (0.0, 0.0),
+    19.8: (0.0, 0.0),
+}
 
 
 def mass(m=1.0):
     """A block that nothing but u and d moves."""
-    return smc.plant("duffing", M=m, delta=0.0, alpha=0.0, beta=0.0)
+    return smc.plant(
+        "duffing",
+        M=m,
+        delta=0.0,
+        alpha=0.0,
+        beta=0.0,
+    )
 
 
 def published(name):
@@ -81,13 +92,22 @@ def first_example():
             )
         )
     x1 = smc.Scenario(
-        plant=mass(), law="none", v0=1.0, disturbance=smc.Sine(1.0, 50.0, lead), **common
+        plant=mass(),
+        law="none",
+        v0=1.0,
+        disturbance=smc.Sine(1.0, 50.0, lead),
+        **common,
     )
     return smc.run([*x2, x1])
 
 
 @pytest.mark.parametrize(
-    ("which", "rows"), [(0, IMPLICIT), (1, EXPLICIT)], ids=["implicit", "explicit"]
+    ("which", "rows"),
+    [
+        (0, IMPLICIT),
+        (1, EXPLICIT),
+    ],
+    ids=["implicit", "explicit"],
 )
 def test_rows_of_siconos_are_reproduced(which, rows):
     trace = first_example()[which]
@@ -97,7 +117,13 @@ def test_rows_of_siconos_are_reproduced(which, rows):
 
 
 @files
-@pytest.mark.parametrize(("which", "name"), [(0, "smc-implicit"), (1, "smc-explicit")])
+@pytest.mark.parametrize(
+    ("which", "name"),
+    [
+        (0, "smc-implicit"),
+        (1, "smc-explicit"),
+    ],
+)
 def test_trajectories_of_siconos_are_reproduced(which, name):
     data = published(name)
     trace = first_example()[which]

@@ -18,8 +18,19 @@ L, BOUND = 1.0, 2.0  # of |d'| and of |u|, in N/s and N
 
 def run(laws, **fields):
     """Runs of laws on a block that nothing but u and d moves, c = 0 so that s is its velocity."""
-    mass = smc.plant("duffing", M=1.0, delta=0.0, alpha=0.0, beta=0.0)
-    common = {"plant": mass, "x0": 0.0, "u_max": math.inf, "duration": 20.0}
+    mass = smc.plant(
+        "duffing",
+        M=1.0,
+        delta=0.0,
+        alpha=0.0,
+        beta=0.0,
+    )
+    common = {
+        "plant": mass,
+        "x0": 0.0,
+        "u_max": math.inf,
+        "duration": 20.0,
+    }
     return smc.run([smc.Scenario(law=law, **(common | fields)) for law in laws])
 
 
@@ -55,7 +66,13 @@ def test_conditioned_super_twisting_does_not_wind_up_as_the_plain_law_does():
     assert f"overshoots by {-plain.v.min():.1f} m/s in place of {-ours.v.min():.2f}." in PAGE
 
 
-@pytest.mark.parametrize(("slope", "kept"), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize(
+    ("slope", "kept"),
+    [
+        (0.95, True),
+        (1.05, False),
+    ],
+)
 def test_conditioned_super_twisting_follows_slopes_up_to_k2_and_no_steeper_ones(slope, kept):
     """d = -U/2 + slope t: the theorem asks for L < k2 = 1.
 
@@ -68,10 +85,20 @@ def test_conditioned_super_twisting_follows_slopes_up_to_k2_and_no_steeper_ones(
     assert kept or late == pytest.approx(((slope - 1.0) * 5.0 / 3.0) ** 2, rel=0.5)
 
 
-@pytest.mark.parametrize(("force", "kept"), [(0.95 * BOUND, True), (1.05 * BOUND, False)])
+@pytest.mark.parametrize(
+    ("force", "kept"),
+    [
+        (0.95 * BOUND, True),
+        (1.05 * BOUND, False),
+    ],
+)
 def test_conditioned_super_twisting_tolerates_disturbances_up_to_its_bound(force, kept):
     (trace,) = run(
-        [conditioned(1.05)], u_max=BOUND, disturbance=smc.Constant(force), v0=0.1, duration=40.0
+        [conditioned(1.05)],
+        u_max=BOUND,
+        disturbance=smc.Constant(force),
+        v0=0.1,
+        duration=40.0,
     )
     assert (residual(trace) < 1e-5) == kept
 
@@ -90,7 +117,13 @@ def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, 
     else:
         bound = math.inf
     law = smc.law(name, k1=1.5, k2=1.1, c=0.0)
-    (trace,) = run([law], disturbance=d, control_period=period, u_max=bound, v0=5.0)
+    (trace,) = run(
+        [law],
+        disturbance=d,
+        control_period=period,
+        u_max=bound,
+        v0=5.0,
+    )
     assert residual(trace) == pytest.approx(L * period**2, rel=0.01)
 
 
@@ -105,7 +138,13 @@ def test_proper_conditioned_super_twisting_is_proper_until_saturated_and_does_no
     d = smc.Sine(1.5, 0.6)
     ours, plain = run(laws, v0=0.1, disturbance=d, duration=2.0)
     np.testing.assert_allclose(ours.v, plain.v, atol=1e-12)
-    ours, plain = run(laws, v0=20.0, u_max=BOUND, disturbance=d, duration=60.0)
+    ours, plain = run(
+        laws,
+        v0=20.0,
+        u_max=BOUND,
+        disturbance=d,
+        duration=60.0,
+    )
     assert -ours.v.min() < 0.2
     assert -plain.v.min() > 5.0
     assert residual(ours) <= 0.9 * 1e-3**2 * (1 + 1e-4)
@@ -122,12 +161,26 @@ def test_fixed_time_reaching_is_bounded_by_the_least_bound_and_not_by_polyakov_s
     time" and gives "the smallest constant that uniformly upper bounds the settling time". With s =
     z^2 the integral is elementary.
     """
-    law = smc.law("fixed_time", k1=2.0, k2=2.0, a=0.5, b=1.5, k=0.0, c=0.0)
+    law = smc.law(
+        "fixed_time",
+        k1=2.0,
+        k2=2.0,
+        a=0.5,
+        b=1.5,
+        k=0.0,
+        c=0.0,
+    )
     least = math.pi / 2
     classical = 2.0
     times = []
     for start in (1.0, 100.0, 1e4):
-        (trace,) = run([law], v0=start, control_period=2.5e-4, duration=2.0, integrator="Euler")
+        (trace,) = run(
+            [law],
+            v0=start,
+            control_period=2.5e-4,
+            duration=2.0,
+            integrator="Euler",
+        )
         times.append(trace.t[np.flatnonzero(np.abs(trace.v[:, 0]) > 1e-6)[-1] + 1])
         assert times[-1] == pytest.approx(math.atan(math.sqrt(start)), abs=0.01)
     assert times == sorted(times)

@@ -84,7 +84,8 @@ def test_a_function_of_arrays_is_compiled_once_for_all_processes(cache):
     assert ratio(2.0, 1.0) == 2.0
     (kept,) = cache.rglob("*.code")
     code = kept.read_bytes()  # has numbers that no compilation gives again
-    assert (ratio(2.0, 0.0), kept.read_bytes()) == (np.inf, code)
+    assert ratio(2.0, 0.0) == np.inf
+    assert kept.read_bytes() == code
     assert ratio(3.0, 1.0) == 3.0
 
 
@@ -143,7 +144,9 @@ def test_laws_of_one_name_are_all_kept_and_of_very_many_the_last(monkeypatch):
     """Laws that are written from numbers have one name, such as linear controllers, and so have the
     laws of scripts.
     """
-    laws = [mine(f"{factor} * gains.k") for factor in (1.0, 2.0, 3.0)]
+    laws = []
+    for factor in (1.0, 2.0, 3.0):
+        laws.append(mine(f"{factor} * gains.k"))
     assert [hits(law) for law in laws + laws] == [0, 0, 0, 1, 1, 1]
     monkeypatch.setattr(jit, "MAX_FILES_OF_A_NAME", 2)
     assert [hits(mine(f"{factor} * gains.k")) for factor in (4.0, 3.0, 4.0, 1.0)] == [0, 1, 1, 0]

@@ -23,7 +23,10 @@ PENDULUM = """
     <geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/></body>
 </body></worldbody></mujoco>
 """
-COMMON = {"duration": 0.05, "noise": smc.Noise(1e-3, 1e-2)}
+COMMON = {
+    "duration": 0.05,
+    "noise": smc.Noise(1e-3, 1e-2),
+}
 BOTH = {"plant": "double_pendulum"} | COMMON
 
 

@@ -88,7 +88,9 @@ def test_a_pause_makes_all_later_samples_later_and_covers_some():
     )  # of one step: covers few samples
     assert_same(compiled := smc.run(short), reference.run(short))
     assert 3 <= (late(compiled) < -0.5).sum() <= 8
-    seeds = [dataclasses.replace(scenario(clock, duration=0.1), seed=i) for i in range(20)]
+    seeds = []
+    for i in range(20):
+        seeds.append(dataclasses.replace(scenario(clock, duration=0.1), seed=i))
     firsts = set()
     for trace in smc.run(seeds):
         firsts.add(int(np.argmax(np.diff(np.unique(trace.u[1:-1, 0])) > 0.02)))
@@ -142,7 +144,11 @@ FIELDS = {
 
 @pytest.mark.parametrize(
     ("plant", "name"),
-    [("pendulum_network", "jitter"), ("cart_pole", "missed"), ("double_pendulum", "all")],
+    [
+        ("pendulum_network", "jitter"),
+        ("cart_pole", "missed"),
+        ("double_pendulum", "all"),
+    ],
 )
 def test_callback_equals_plain_loop(plant, name):
     if plant == "cart_pole":

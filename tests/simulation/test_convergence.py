@@ -82,7 +82,9 @@ def cases(n=None):
         for mechanism in plant.mechanisms:
             found[name, mechanism] = {"plant": plant, "mechanism": mechanism}
         for contact, start in HITS[name].items():
-            first = {key: (value, *[0.0] * (plant.n - 1)) for key, value in start.items()}
+            first = {}
+            for key, value in start.items():
+                first[key] = (value, *[0.0] * (plant.n - 1))
             found[name, contact] = {"plant": plant, "contact": contact} | first
     return found
 

@@ -151,7 +151,12 @@ SERVO = '<position tendon="t" kp="4" kv="0.5"/>'
 
 @pytest.mark.parametrize(
     "parts",
-    [{}, {"tendon": PULL}, {"tendon": PULL, "actuator": SERVO}, {"own": "true"}],
+    [
+        {},
+        {"tendon": PULL},
+        {"tendon": PULL, "actuator": SERVO},
+        {"own": "true"},
+    ],
     ids=["bodies", "tendon", "another actuator", "gravity compensated by the actuator"],
 )
 def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):

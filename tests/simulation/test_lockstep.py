@@ -59,7 +59,10 @@ def test_callback_equals_plain_loop_under_every_law():
     ways = itertools.cycle(itertools.product(("none", "nominal"), ("measured", "levant")))
     scenarios = []
     for i, law in enumerate(smc.laws()):
-        plants = [name for name in smc.plants() if law in smc.laws(name)]
+        plants = []
+        for name in smc.plants():
+            if law in smc.laws(name):
+                plants.append(name)
         model, velocity = next(ways)
         scenarios.append(noisy(plants[i % len(plants)], law, model, velocity))
     assert_loops_agree(scenarios, 1e-9)
@@ -170,8 +173,13 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
         "disturbance": smc.Sine(0.2, omega=5.0),
     }
     scenarios = []
-    for time, off in ((0.0, 0.1), (0.013, -0.1)):
-        factors = {key: 1.0 + off * (1 + i % 3) / 3 for i, key in enumerate(keys)}
+    for time, off in (
+        (0.0, 0.1),
+        (0.013, -0.1),
+    ):
+        factors = {}
+        for i, key in enumerate(keys):
+            factors[key] = 1.0 + off * (1 + i % 3) / 3
         # a share, 0 to 1, to which this is added
         if "delta" in keys:
             factors |= {"delta": 0.3}
@@ -202,7 +210,14 @@ def test_a_jump_at_the_last_step_is_in_the_last_sample():
     assert trace.d[-1, 0] > 1.4 * trace.d[-2, 0]
 
 
-@pytest.mark.parametrize(("period", "steps"), [(0.0225, 23), (0.0305, 31), (0.05, 19)])
+@pytest.mark.parametrize(
+    ("period", "steps"),
+    [
+        (0.0225, 23),
+        (0.0305, 31),
+        (0.05, 19),
+    ],
+)
 def test_a_disturbance_that_begins_at_a_sample_is_in_that_sample(period, steps):
     step = smc.Step(1.0, time=2 * period)
     scenario = smc.Scenario(
@@ -341,7 +356,14 @@ def test_company_changes_no_bit(together):
         assert_same(smc.run(scenario), trace)
 
 
-@pytest.mark.parametrize(("batch_bytes", "slice_steps"), [(1, 10**9), (300_000, 777), (10**9, 1)])
+@pytest.mark.parametrize(
+    ("batch_bytes", "slice_steps"),
+    [
+        (1, 10**9),
+        (300_000, 777),
+        (10**9, 1),
+    ],
+)
 def test_batches_and_slices_change_no_bit(together, monkeypatch, batch_bytes, slice_steps):
     monkeypatch.setattr(runner, "BATCH_BYTES", batch_bytes)
     monkeypatch.setattr(runner, "SLICE_STEPS", slice_steps)
@@ -401,7 +423,8 @@ def test_a_failure_leaves_its_neighbours_alone(together):
         law = doomed(at=0.013 * (i % 3) + 0.011, how=i % 4)
         scenarios += [dataclasses.replace(scenario, law=law, u_max=math.inf), scenario]
     traces = smc.run(scenarios, threads=2)
-    assert all(trace.failure for trace in traces[::2])
+    for trace in traces[::2]:
+        assert trace.failure
     assert digest(traces[1::2]) == digest(together)
 
 

@@ -70,7 +70,13 @@ def test_a_scenario_shows_what_it_was_given():
 # tables of other packages
 
 
-@pytest.mark.parametrize(("method", "name"), [("to_pandas", "pandas"), ("to_xarray", "xarray")])
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [
+        ("to_pandas", "pandas"),
+        ("to_xarray", "xarray"),
+    ],
+)
 def test_a_package_that_is_missing_is_named_with_its_cure(trace, monkeypatch, method, name):
     monkeypatch.setitem(__import__("sys").modules, name, None)
     with pytest.raises(
@@ -88,7 +94,8 @@ def test_pandas_has_every_column_bit_for_bit_with_units(trace, cart):
         assert frame.index.name == "t"
         assert np.array_equal(frame.index, one.t)
         assert list(frame.columns) == [name for name in columns if name != "t"]
-        assert all(np.array_equal(frame[name], columns[name]) for name in frame.columns)
+        for name in frame.columns:
+            assert np.array_equal(frame[name], columns[name])
         assert frame.attrs["units"] == one.units()
         assert json.loads(frame.attrs["scenario"])["plant"]["name"] == one.scenario.plant.name
 
@@ -97,14 +104,16 @@ def test_arrow_has_every_column_bit_for_bit(cart):
     columns = cart.columns()
     table = pyarrow.table(cart)
     assert table.column_names == list(columns)
-    assert all(np.array_equal(table[name].to_numpy(), columns[name]) for name in columns)
+    for name in columns:
+        assert np.array_equal(table[name].to_numpy(), columns[name])
 
 
 def test_xarray_has_every_array_bit_for_bit_with_units(trace, cart):
     pytest.importorskip("xarray")
     data = trace.to_xarray()
     assert set(data.data_vars) == set(ARRAYS) - {"t"}
-    assert all(np.array_equal(data[name].values, getattr(trace, name)) for name in data.data_vars)
+    for name in data.data_vars:
+        assert np.array_equal(data[name].values, getattr(trace, name))
     assert np.array_equal(data["t"].values, trace.t)
     units = {name: data[name].attrs["units"] for name in ("t", "x", "v", "u", "s")}
     assert units == {

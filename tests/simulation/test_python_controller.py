@@ -48,7 +48,9 @@ SCENARIOS = {
 def test_it_gives_the_u_and_s_of_the_run_from_the_positions_and_velocities_of_the_run(name):
     trace = smc.run(dataclasses.replace(SCENARIOS[name], duration=0.05))
     controller = Controller(trace.scenario)
-    found = [controller(k, t, trace.x[k], trace.v[k]) for k, t in enumerate(trace.t.tolist())]
+    found = []
+    for k, t in enumerate(trace.t.tolist()):
+        found.append(controller(k, t, trace.x[k], trace.v[k]))
     np.testing.assert_allclose([u for u, _ in found], trace.u, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose([s for _, s in found], trace.s, rtol=1e-12, atol=1e-12)
 
@@ -57,7 +59,8 @@ def test_what_the_sensors_read_is_not_written_to():
     x = np.array([0.3])
     v = np.array([-0.1])
     Controller(smc.Scenario(plant="duffing", law="classical", noise=NOISE))(1, 1e-3, x, v)
-    assert (x[0], v[0]) == (0.3, -0.1)
+    assert x[0] == 0.3
+    assert v[0] == -0.1
 
 
 def test_a_law_without_a_number_fails_the_call():

@@ -257,6 +257,8 @@ def test_a_run_under_python_does_not_depend_on_those_beside_it():
         seen.append(y.t)
         return 0.0, 0.0
 
-    scenarios = [network(law=shared(), plant="duffing", seed=seed) for seed in range(2)]
+    scenarios = []
+    for seed in range(2):
+        scenarios.append(network(law=shared(), plant="duffing", seed=seed))
     plainly(scenarios)
     assert seen == sorted(seen[: len(seen) // 2]) * 2

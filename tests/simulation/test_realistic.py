@@ -341,7 +341,9 @@ def test_scenarios_that_differ_in_numbers_are_one_batch(name, part):
         step = {"physics_step": 2.5e-4}
     else:
         step = {}
-    scenarios = [scenario(name, **fields, **step) for fields in NUMBERS[part]]
+    scenarios = []
+    for fields in NUMBERS[part]:
+        scenarios.append(scenario(name, **fields, **step))
     traces = one_batch([scenarios[i] for i in (0, 1, 2, *range(3, len(scenarios)), 0)])
     assert len({trace.u.tobytes() for trace in traces}) == len(scenarios)  # and the numbers arrive
     assert_same(traces[0], traces[-1])
@@ -395,7 +397,9 @@ def test_without_realism_the_realistic_path_is_the_ideal_one_to_first_order(name
         )
     )
     for zero, law in cases:
-        errors = [np.abs(next(traces).x - ideals[law].x).max() for _ in steps]
+        errors = []
+        for _ in steps:
+            errors.append(np.abs(next(traces).x - ideals[law].x).max())
         assert errors[0] < 4e-3, zero
         np.testing.assert_allclose(
             np.log2(np.array(errors[:-1]) / errors[1:]), 1.0, atol=0.1, err_msg=zero
@@ -484,7 +488,9 @@ def balance(trace, end=-1):
         u = -gains["lam"] * np.tanh(gains["k1"] * x)
     else:
         u = -gains["k"] * np.clip(gains["c"] * x / gains["phi"], -1.0, 1.0)
-    own = [s.plant.nominal(x, 0.0 * x, i, values) for i in range(s.plant.n)]
+    own = []
+    for i in range(s.plant.n):
+        own.append(s.plant.nominal(x, 0.0 * x, i, values))
     return np.clip(u, -s.resolved.u_max, s.resolved.u_max) + np.array([f / g for f, g in own])
 
 
@@ -850,7 +856,11 @@ def test_a_voltage_that_mujoco_would_drop_ends_the_run():
 
 
 @pytest.mark.parametrize(
-    "fields", [{"mismatch": {"alpha": -5.0}}, {"jump": smc.Jump(0.05, {"alpha": -5.0})}]
+    "fields",
+    [
+        {"mismatch": {"alpha": -5.0}},
+        {"jump": smc.Jump(0.05, {"alpha": -5.0})},
+    ],
 )
 def test_parameters_that_no_springs_have_are_refused_before_anything_runs(fields):
     """alpha = +5 has no wells to snap into; a jump to it may not end the runs beside it in the
@@ -894,12 +904,14 @@ EVERYTHING = {
 def test_defaults_follow_the_fields_that_are_given():
     ideal = scenario()
     realistic = scenario(friction=smc.Viscous(0.1))
-    assert (ideal.resolved.integrator, ideal.resolved.physics_step) == ("RK4", 1e-3)
-    assert (realistic.resolved.integrator, realistic.resolved.physics_step) == (
-        "implicitfast",
-        REALISTIC_STEP,
-    )
-    for a, b in ((ideal, realistic), (realistic, ideal)):
+    assert ideal.resolved.integrator == "RK4"
+    assert ideal.resolved.physics_step == 1e-3
+    assert realistic.resolved.integrator == "implicitfast"
+    assert realistic.resolved.physics_step == REALISTIC_STEP
+    for a, b in (
+        (ideal, realistic),
+        (realistic, ideal),
+    ):
         there = dataclasses.replace(a, friction=b.friction)
         back = dataclasses.replace(there, friction=a.friction)
         assert there == b
@@ -923,10 +935,8 @@ def test_drives_keep_the_plain_integrator():
         (smc.DCMotor(inductance=0.0), 1e-3),
     ):
         made = scenario(actuator=actuator)
-        assert (made.resolved.integrator, made.resolved.physics_step) == (
-            "RK4",
-            pytest.approx(step),
-        )
+        assert made.resolved.integrator == "RK4"
+        assert made.resolved.physics_step == pytest.approx(step)
 
 
 @PLANTS

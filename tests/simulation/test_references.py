@@ -111,7 +111,10 @@ def test_the_reference_s_acceleration_is_fed_forward_with_the_model_and_only_wit
         "duration": 1e-3,
         "u_max": math.inf,
     }
-    for model, expected in (("nominal", -0.2 * (5.0**2 - 1.0) * 0.625), ("none", 0.0)):
+    for model, expected in (
+        ("nominal", -0.2 * (5.0**2 - 1.0) * 0.625),
+        ("none", 0.0),
+    ):
         slow, quick = (
             smc.run(
                 [
@@ -148,7 +151,10 @@ def followed():
     }  # a third of the time of Runge and Kutta's rule
     scenarios = []
     for name, plant in zip(FOLLOWING, itertools.cycle(PLANTS)):
-        for r, T in ((sine, 6.0), (move, 2.5)):
+        for r, T in (
+            (sine, 6.0),
+            (move, 2.5),
+        ):
             scenarios.append(
                 smc.Scenario(
                     plant=plant,

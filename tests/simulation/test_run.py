@@ -79,7 +79,11 @@ def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
         runs.prepare(smc.Scenario(**common, friction=smc.Coulomb(force))) for force in (0.0, 0.3)
     )
     with callback.installed():
-        for prepared, may in (([none, none], False), ([none, some], True), ([some, none], True)):
+        for prepared, may in (
+            ([none, none], False),
+            ([none, some], True),
+            ([some, none], True),
+        ):
             batch = runs.ScenarioBatch(prepared, 1)
             assert bool(batch.model.opt.disableflags & NO_ROWS) is not may
 
@@ -123,7 +127,8 @@ def test_plants_sizes_and_durations_mix_in_one_call():
         (11, 1),
         (21, 1),
     ]
-    assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
+    for trace, one in zip(traces, many, strict=True):
+        assert same(trace, smc.run(one))
 
 
 # failures

@@ -217,7 +217,13 @@ def late_none(y, gains, memory):
     return u, 0.0
 
 
-@pytest.mark.parametrize(("function", "at"), [(late_number, 0.0), (late_none, 0.005)])
+@pytest.mark.parametrize(
+    ("function", "at"),
+    [
+        (late_number, 0.0),
+        (late_none, 0.005),
+    ],
+)
 def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(function, at):
     with pytest.warns(
         smc.errors.PlainLoopWarning,
@@ -262,7 +268,9 @@ def test_a_law_is_zero_on_its_surface_and_opposes_s_off_it(name):
     template = catalogue()[name]
     rng = np.random.default_rng(0)
     for _ in range(200):
-        gains = {gain: abs(rng.normal()) * 5.0 + 1e-3 for gain in template.defaults}
+        gains = {}
+        for gain in template.defaults:
+            gains[gain] = abs(rng.normal()) * 5.0 + 1e-3
         assert template.function(seen(0.0, 0.0), record(gains), np.zeros(template.memory)) == (
             0.0,
             0.0,
@@ -278,7 +286,14 @@ def test_a_law_is_zero_on_its_surface_and_opposes_s_off_it(name):
         assert second[0] * second[1] < 0.0
 
 
-@pytest.mark.parametrize(("leak_dt", "k0"), [(0.5, 0.0), (1.5, 2.0), (100.0, 2.0)])
+@pytest.mark.parametrize(
+    ("leak_dt", "k0"),
+    [
+        (0.5, 0.0),
+        (1.5, 2.0),
+        (100.0, 2.0),
+    ],
+)
 def test_the_gain_of_adaptive_leak_never_falls_below_0(leak_dt, k0):
     template = catalogue()["adaptive_leak"]
     memory = np.zeros(8)
@@ -337,7 +352,8 @@ print("done")
 
 def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
     done = python("-c", FIRST, folder=tmp_path)
-    assert (done.stdout, done.stderr) == ("done\n", "")
+    assert done.stdout == "done\n"
+    assert done.stderr == ""
 
 
 # (g) batches
@@ -554,7 +570,9 @@ def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
             raise ValueError("sour")
         return (-y.f - 3.0 * y.de - 2.0 * y.e) / y.g, math.sin(y.f) * y.g
 
-    many = [scenario(made(cancels), plant=THREE, duration=0.4, v0=v0) for v0 in (1.0, 2.0, 3.0)]
+    many = []
+    for v0 in (1.0, 2.0, 3.0):
+        many.append(scenario(made(cancels), plant=THREE, duration=0.4, v0=v0))
     assert all(map(same, smc.run(many), [smc.run(one) for one in many]))
 
 
@@ -617,7 +635,10 @@ def test_a_pulse_lasts_width_over_dt_samples_wherever_decimal_times_put_it(dt):
         pulse = smc.signals.Pulse(
             1.0, time=float(f"{start * dt:.6g}"), width=float(f"{width * dt:.6g}")
         )
-        on = [k for k in range(start - 2, start + width + 3) if pulse.value(k * dt, pulse)[0]]
+        on = []
+        for k in range(start - 2, start + width + 3):
+            if pulse.value(k * dt, pulse)[0]:
+                on.append(k)
         if on != list(range(start, start + width)):
             wrong.append((pulse, on))
     assert wrong == []
@@ -627,7 +648,11 @@ NOISE = smc.signals.OrnsteinUhlenbeck(0.2, 0.1)
 
 
 @pytest.mark.parametrize(
-    "before", [[smc.Constant(0.0)], [smc.Step(0.0), smc.signals.Pulse(0.0, 0.1, 0.1)]]
+    "before",
+    [
+        [smc.Constant(0.0)],
+        [smc.Step(0.0), smc.signals.Pulse(0.0, 0.1, 0.1)],
+    ],
 )
 def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(before):
     alone = smc.run(scenario("none", plant=THREE, disturbance=NOISE, seed=3))
@@ -917,7 +942,9 @@ def test_many_runs_leave_no_memory_behind():
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
 
-    many = [scenario(seed=seed, duration=0.002) for seed in range(600)]
+    many = []
+    for seed in range(600):
+        many.append(scenario(seed=seed, duration=0.002))
     for _ in smc.stream(many[:64]):
         pass
     before = resident()

@@ -156,7 +156,12 @@ def test_a_delay_that_is_no_whole_number_of_steps_is_refused(refused):
 def test_a_state_of_the_wrong_length_is_refused(refused):
     plant = smc.plant("pendulum_network", n=3)
     for field in ("x0", "v0"):
-        for value in ([], [1.0, 2.0], np.zeros(4), np.zeros((10, 10))):
+        for value in (
+            [],
+            [1.0, 2.0],
+            np.zeros(4),
+            np.zeros((10, 10)),
+        ):
             words = f"{len(value)} values", "3 channels"
             refused(
                 lambda value=value, field=field: scenario(plant=plant, **{field: value}),
@@ -235,7 +240,10 @@ def test_a_push_is_on_a_body_that_has_a_name(refused):
 
 
 def test_a_plant_keeps_a_positive_mass(refused):
-    for name, value in [("mass", 0.0), ("M", -1.0)]:
+    for name, value in [
+        ("mass", 0.0),
+        ("M", -1.0),
+    ]:
         refused(lambda name=name, value=value: scenario(mismatch={name: value}), name, f"{value:g}")
         refused(
             lambda name=name, value=value: scenario(jump=smc.Jump(0.5, {name: value})),
@@ -268,7 +276,20 @@ def test_a_jump_after_the_end_is_refused(refused):
 
 
 def test_a_network_s_size_is_a_whole_number_in_its_range(refused):
-    for n in (1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])):
+    for n in (
+        1,
+        0,
+        -3,
+        1001,
+        2.5,
+        NAN,
+        INF,
+        None,
+        "3",
+        "many",
+        [3],
+        np.array([2, 3]),
+    ):
         refused(lambda n=n: smc.plant("pendulum_network", n=n), "pendulum_network", "n")
 
 
@@ -346,7 +367,10 @@ def test_what_belongs_elsewhere_is_sent_there(tmp_path, refused):
 
 
 def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(refused):
-    for field in [{"control_period": 1e306}, {"clock": smc.Clock(1e-310)}]:
+    for field in [
+        {"control_period": 1e306},
+        {"clock": smc.Clock(1e-310)},
+    ]:
         refused(
             lambda field=field: smc.run(
                 smc.Scenario(

@@ -103,7 +103,9 @@ def test_cartesian_path_moves_the_tip_through_its_points():
     points = [tip((0.1, 0.2, 0.3)), tip((0.0, 1.0, 0.5)), tip((0.2, 0.6, -0.2))]
     times = (0.0, 1.0, 1.8)
     path = smc.signals.cartesian_path(arms.arm(), times, points, site="tip", x0=(0.1, 0.2, 0.3))
-    lines = [smc.signals.Waypoints(times, [point[i] for point in points]) for i in range(3)]
+    lines = []
+    for i in range(3):
+        lines.append(smc.signals.Waypoints(times, [point[i] for point in points]))
     t = np.linspace(0.0, 1.8, 41) + 0.003  # between the knots
     found = np.array([tip(x) for x in np.array([of(one, t)[0] for one in path]).T])
     np.testing.assert_allclose(found, np.array([of(one, t)[0] for one in lines]).T, atol=2e-6)

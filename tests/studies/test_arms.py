@@ -27,7 +27,13 @@ def test_seeds_move_the_start_except_at_the_wall():
     assert arms.scenario("wall", LAW, 3).seed == 3
 
 
-@pytest.mark.parametrize(("task", "behind"), [("wall", -5e-4), ("behind", 4e-3)])
+@pytest.mark.parametrize(
+    ("task", "behind"),
+    [
+        ("wall", -5e-4),
+        ("behind", 4e-3),
+    ],
+)
 def test_the_walls_path_is_as_far_from_its_face_as_it_says(task, behind):
     scenario = arms.scenario(task, LAW)
     joints = np.array([signal.values for signal in scenario.references]).T
@@ -38,7 +44,13 @@ def test_the_walls_path_is_as_far_from_its_face_as_it_says(task, behind):
 def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     start = smc.plant("panda").rest
     trace = smc.run(
-        smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05)
+        smc.Scenario(
+            plant="panda",
+            law=LAW,
+            reference=arms.sway(),
+            x0=start,
+            duration=0.05,
+        )
     )
     rms = smc.metrics.tip_scores(trace)["rms_error"]
     rate = smc.score(trace)["tv_rate"]
@@ -49,14 +61,30 @@ def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
 def test_a_run_that_fails_does_not_come_back_to_its_path():
     n = 7
     t = np.array([0.0, 1.0, 2.0, 3.0])
-    scenario = smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), duration=3.0)
+    scenario = smc.Scenario(
+        plant="panda",
+        law=LAW,
+        reference=arms.sway(),
+        duration=3.0,
+    )
     rest = np.tile(arms.arm().rest, (4, 1))
     zero = np.zeros((4, n))
     moved = rest + np.array([[0.0], [0.0], [1.0], [0.0]])
     failed = moved + np.array([[0.0], [0.0], [0.0], [np.nan]])
-    for x, back in ((rest, 0.0), (moved, 2.0), (failed, np.inf), (rest + np.nan, np.inf)):
+    for x, back in (
+        (rest, 0.0),
+        (moved, 2.0),
+        (failed, np.inf),
+        (rest + np.nan, np.inf),
+    ):
         names = ("v", "u", "applied", "s", "d", "force", "reaction")
-        trace = smc.Trace(t=t, x=x, r=rest, scenario=scenario, **dict.fromkeys(names, zero))
+        trace = smc.Trace(
+            t=t,
+            x=x,
+            r=rest,
+            scenario=scenario,
+            **dict.fromkeys(names, zero),
+        )
         assert arms.back_within(trace, 1e-3, after=1.0) == back
 
 
@@ -64,7 +92,10 @@ def test_a_law_whose_error_depends_on_the_physics_step_is_called_unstable():
     """Time-delay control in the pick and place, 100, 177 or 129 mm by the step; computed torque is
     not.
     """
-    for name, expected in (("time_delay_sliding", True), ("computed_torque_sliding", False)):
+    for name, expected in (
+        ("time_delay_sliding", True),
+        ("computed_torque_sliding", False),
+    ):
         runs = [arms.scenario("payload", arms.gained(name), seed=1)]
         assert arm_study.unstable(runs, smc.run(runs)) is expected
 
@@ -89,7 +120,13 @@ def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("task", "payload", "column"), [("sway", 2.0, 0), ("payload", 0.0, 2)])
+@pytest.mark.parametrize(
+    ("task", "payload", "column"),
+    [
+        ("sway", 2.0, 0),
+        ("payload", 0.0, 2),
+    ],
+)
 def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
     """Each law's tip error and variation of u over 12 seeds, as `benchmarks/arm_study.py` prints
     them.
@@ -103,7 +140,9 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
     }
     assert [*told] == [*arms.GAINS]
     for name in arms.GAINS:
-        runs = [arms.scenario(task, arms.gained(name), seed, payload) for seed in range(1, 13)]
+        runs = []
+        for seed in range(1, 13):
+            runs.append(arms.scenario(task, arms.gained(name), seed, payload))
         traces = smc.run(runs)
         if arm_study.unstable(runs, traces):
             assert told[name][column : column + 2] == ["unstable"] * 2, name

@@ -21,7 +21,11 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import compare, executors, fair_gains, worst_case
 from smc_mujoco.studies.leaderboard import METRICS
 
-SHORT = {"duration": 0.5, "budget": 16, "progress": False}
+SHORT = {
+    "duration": 0.5,
+    "budget": 16,
+    "progress": False,
+}
 PLANTS = ["duffing", "inverted_pendulum"]
 
 
@@ -63,7 +67,11 @@ def kinds(found, plant="duffing"):
 
 
 def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
-    wanted = {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
+    wanted = {
+        "my_law": "tuned here",
+        "classical": "shipped",
+        "pid": "yours",
+    }
     for plant in PLANTS:
         assert kinds(found, plant) == wanted
     mine = [found.gains[plant]["my_law"].gains for plant in PLANTS]
@@ -87,7 +95,10 @@ def test_runs_use_every_set_of_gains_in_turn(found):
 
 
 def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
-    boards = [board for board in found.leaderboard if board.about == "duffing, encoder"]
+    boards = []
+    for board in found.leaderboard:
+        if board.about == "duffing, encoder":
+            boards.append(board)
     assert [board.metric for board in boards] == [*METRICS]
     assert len(found.leaderboard) == len(METRICS) * 4 + 2  # and J on unseen runs on each plant
     frame = found.to_pandas()
@@ -112,7 +123,10 @@ def test_the_same_call_goes_on_from_its_folder(found, folder, monkeypatch):
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    files = [path for path in folder.rglob("*") if path.is_file()]
+    files = []
+    for path in folder.rglob("*"):
+        if path.is_file():
+            files.append(path)
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
@@ -121,11 +135,18 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
 ):
     written = []
     now = time.time
-    for name, threads, days in (("here", 1, 0), ("there", 2, 400)):
+    for name, threads, days in (
+        ("here", 1, 0),
+        ("there", 2, 400),
+    ):
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
         monkeypatch.setattr(time, "time", lambda days=days: now() + 86400 * days)
-        short = {"duration": 0.3, "seeds": 2, "threads": threads}
+        short = {
+            "duration": 0.3,
+            "seeds": 2,
+            "threads": threads,
+        }
         laws = [my_law, "classical"]
         made = smc.compare(
             laws,
@@ -150,12 +171,18 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
 def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
     tables = []
     for seed in (0, 1):
-        given = {"out": tmp_path, "seed": seed, **SHORT}
+        given = {
+            "out": tmp_path,
+            "seed": seed,
+            **SHORT,
+        }
         made = smc.compare(["classical", "pid"], "duffing", "noise", 3, **given)
         tables.append(made.table)
         (unseen, *_) = made.leaderboard
         tables.append(unseen.entries[0].interval.median)
-    seeds = [table.column("seed")[:3].tolist() for table in tables[::2]]
+    seeds = []
+    for table in tables[::2]:
+        seeds.append(table.column("seed")[:3].tolist())
     assert seeds == [[0, 1, 2], [1_000_000, 1_000_001, 1_000_002]]
     first, second = ([table.scenario(i) for i in range(3)] for table in tables[::2])
     for one, other in zip(first, second, strict=True):
@@ -169,7 +196,10 @@ def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path
     monkeypatch.setattr(compare, "MAX_BLOCKS", most)
     conditions = ["nominal", "noise", "sine", "constant"]
     made = smc.compare(["classical", "pid"], "duffing", conditions, 1, out=tmp_path, **SHORT)
-    blocks = [len(board.blocks) for board in made.leaderboard if board.metric == "itae"]
+    blocks = []
+    for board in made.leaderboard:
+        if board.metric == "itae":
+            blocks.append(len(board.blocks))
     assert blocks == ([4] if most == 3 else [1] * 4)
 
 
@@ -201,7 +231,8 @@ def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
         plant = smc.plant(name)
         laws = compare._usual(plant)
         assert set(gain_sets.LAWS) <= set(laws)
-        assert all(gain_sets.in_set(plant, law, "tuned") for law in laws)
+        for law in laws:
+            assert gain_sets.in_set(plant, law, "tuned")
 
 
 REFUSED = [
@@ -249,7 +280,11 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     monkeypatch.setattr(worst_case, "default_budget", lambda scenario, within: 8)
     within = smc.Uncertainty(disturbance=0.5)
     laws = [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
-    given = {"worst": within, "out": tmp_path, **SHORT}
+    given = {
+        "worst": within,
+        "out": tmp_path,
+        **SHORT,
+    }
     made = smc.compare(laws, "duffing", "nominal", 1, **given)
     for case in made.worst["duffing"].values():
         assert smc.score(smc.run(case.scenario))["rms_error"] == case.value >= case.median
@@ -269,6 +304,8 @@ def test_shells_complete_the_last_name():
 
 def test_conditions_are_names_with_commas_or_one_text(refused):
     texts = ["noise,sine", "worn: friction=Coulomb(0.05), x0=0.3", "encoder"]
-    names = [condition.name for condition in options.conditions(texts)]
+    names = []
+    for condition in options.conditions(texts):
+        names.append(condition.name)
     assert names == ["noise", "sine", "worn", "encoder"]
     refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]))

@@ -66,7 +66,8 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
         assert [dict(law.gains) for law in found.sets] == [
             dict(zip(("kp", "kd"), one.gains, strict=True)) for one in tuned[0].sets
         ]
-        assert (found.law.source.kind, found.remark) == ("tuned here", "")
+        assert found.law.source.kind == "tuned here"
+        assert found.remark == ""
     assert len(tuned) == 1
 
 
@@ -90,7 +91,12 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
     fixed = Gain(1.0, FORCE_PER_SPEED, held=True)
     held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": fixed})
     other = dataclasses.replace(DUFFING, build=build)
-    for plant, law in ((DUFFING, my_spring), (DUFFING, my_spring), (DUFFING, held), (other, held)):
+    for plant, law in (
+        (DUFFING, my_spring),
+        (DUFFING, my_spring),
+        (DUFFING, held),
+        (other, held),
+    ):
         trial(tmp_path).tuned(plant, law, None, 3, 16)
     assert asked[0] == asked[1]
     assert len(set(asked)) == 3
@@ -98,17 +104,28 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
 
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monkeypatch):
     sets = []
-    for gains in (tuple(FAST.gains.values()), (5.0, 2.5)):
+    for gains in (
+        tuple(FAST.gains.values()),
+        (5.0, 2.5),
+    ):
         sets.append(types.SimpleNamespace(gains=gains))
-    tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST, sets=sets, bounds=FAST.gains)
+    tuned = types.SimpleNamespace(
+        before=1.0,
+        objective=2.0,
+        law=FAST,
+        sets=sets,
+        bounds=FAST.gains,
+    )
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
     default = smc.law("observer_free")
     own = trial(tmp_path).tuned(DUFFING, default, None, 3, 16)
-    assert (own.law, own.remark) == (default, "its defaults, better than those tried")
+    assert own.law == default
+    assert own.remark == "its defaults, better than those tried"
     assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
     found = trial(tmp_path).tuned(DUFFING, default, None, 3, 16)
-    assert (found.law, found.remark) == (FAST, "")
+    assert found.law == FAST
+    assert found.remark == ""
     # also with another seed of the comparison run i has the gains of search i
     for first in (0, 1_000_000):
         assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]

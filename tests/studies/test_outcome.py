@@ -16,7 +16,12 @@ from smc_mujoco.studies.scene import Outcome, summary
 pytestmark = pytest.mark.quick
 
 FILES = sorted((Path(smc.__file__).parents[1] / "scenes").glob("*.py"))
-RUN = smc.Scenario(plant="duffing", law="classical", x0=1.0, duration=2.0)
+RUN = smc.Scenario(
+    plant="duffing",
+    law="classical",
+    x0=1.0,
+    duration=2.0,
+)
 NEVER = 2.0  # of the duration: after its end
 
 
@@ -37,8 +42,15 @@ def made(scenario: smc.Scenario, settled: float, size: float = 1.0, **fields: ob
         "force": np.broadcast_to((flip * size)[:, None], x.shape),
         "reaction": np.broadcast_to((flip * 10.0 * size * (size > 3.0))[:, None], x.shape),
     }
-    arrays = {name: np.ascontiguousarray(columns.get(name, np.zeros_like(x))) for name in LOGGED}
-    return smc.Trace(t=t, **arrays, scenario=scenario, **fields)
+    arrays = {}
+    for name in LOGGED:
+        arrays[name] = np.ascontiguousarray(columns.get(name, np.zeros_like(x)))
+    return smc.Trace(
+        t=t,
+        **arrays,
+        scenario=scenario,
+        **fields,
+    )
 
 
 def several(**settled: dict[str, float]) -> Outcome:
@@ -56,8 +68,24 @@ def single(**settled: float) -> Outcome:
 FAILED = made(RUN, 0.2, diverged_at=0.1, failure="a law raised")
 LEAST = [  # the shares at which runs settle, whose is least, and whose is most
     ({"a": 0.2, "b": 0.4}, "a (0.400 s)", "b (0.800 s)"),
-    ({"a": 0.50, "b": 0.51, "c": 0.8}, "a and b tied (1.00 to 1.02 s)", "c (1.60 s)"),  # 2 % apart
-    ({"a": 0.50, "b": 0.52, "c": 0.2}, "c (0.400 s)", "b (1.04 s)"),  # 4 % apart
+    (
+        {
+            "a": 0.50,
+            "b": 0.51,
+            "c": 0.8,
+        },
+        "a and b tied (1.00 to 1.02 s)",
+        "c (1.60 s)",
+    ),  # 2 % apart
+    (
+        {
+            "a": 0.50,
+            "b": 0.52,
+            "c": 0.2,
+        },
+        "c (0.400 s)",
+        "b (1.04 s)",
+    ),  # 4 % apart
     ({"a": NEVER, "b": 0.5}, "b (1.00 s)", "a (never)"),
     ({"a": NEVER, "b": NEVER}, "none", "a and b tied (never)"),
 ]
@@ -74,7 +102,11 @@ def test_positions_that_the_sensor_does_not_tell_apart_are_tied_as_on_leaderboar
     quiet = {}
     noisy = {}
     noise = dataclasses.replace(RUN, noise=smc.Noise(position=5e-3))
-    for label, size in (("a", 1.0), ("b", 4.0), ("c", 7.0)):  # 1.1e-3, 4.4e-3 and 7.7e-3 m
+    for label, size in (
+        ("a", 1.0),
+        ("b", 4.0),
+        ("c", 7.0),
+    ):  # 1.1e-3, 4.4e-3 and 7.7e-3 m
         quiet[label] = made(RUN, 0.2, size)
         noisy[label] = made(noise, 0.2, size)
     runs = Outcome(traces={"quiet": quiet, "noisy": noisy})
@@ -102,9 +134,24 @@ def test_those_are_the_runs_for_which_something_holds():
 
 def test_over_several_conditions_each_is_told():
     runs = several(
-        weak={"a": 0.2, "b": 0.4, "c": NEVER, "d": 0.2},
-        middle={"a": 0.2, "b": NEVER, "c": NEVER, "d": NEVER},
-        strong={"a": 0.3, "b": NEVER, "c": NEVER, "d": 0.2},
+        weak={
+            "a": 0.2,
+            "b": 0.4,
+            "c": NEVER,
+            "d": 0.2,
+        },
+        middle={
+            "a": 0.2,
+            "b": NEVER,
+            "c": NEVER,
+            "d": NEVER,
+        },
+        strong={
+            "a": 0.3,
+            "b": NEVER,
+            "c": NEVER,
+            "d": 0.2,
+        },
     )
     assert runs.up_to() == "a strong, b and d weak, c none"
     told = "3 of 4 settle under weak (not c), 1 of 4 under middle (not b, c and d), 2 of 4 under "
@@ -156,7 +203,10 @@ def declared(path: Path) -> tuple[smc.Scene, dict[str, dict[str, smc.Trace]]]:
     for k, (condition, runs) in enumerate(found.conditions.items()):
         traces[condition] = {}
         for i, (label, scenario) in enumerate(runs.items()):
-            settled = 0.1 + 0.11 * i + 0.2 * k if i < 2 + k else NEVER
+            if i < 2 + k:
+                settled = 0.1 + 0.11 * i + 0.2 * k
+            else:
+                settled = NEVER
             traces[condition][label] = made(scenario, settled, 0.5 + 2.5 * i + k)
     return found, traces
 

@@ -109,7 +109,12 @@ def written(
 ) -> str:
     """The key of a run under a law of the user's."""
     space: dict = {"__name__": "written"}
-    text = before + LAW.format(law=law, helper=helper, constant=constant, signal=signal)
+    text = before + LAW.format(
+        law=law,
+        helper=helper,
+        constant=constant,
+        signal=signal,
+    )
     exec(compile(text, "written", "exec"), space)
     return key(scenario(space["mine"](), disturbance=space["Push"]()))
 
@@ -179,7 +184,15 @@ def test_a_global_changes_a_run_until_its_law_is_compiled():
     space = {"__name__": "users", "G": 3.0}
     exec("def late(y, gains, memory):\n    return -G * y.e, y.e", space)
     law = smc.law_function(space["late"])()
-    one, other = (smc.Scenario(plant="duffing", law=law, duration=0.01, x0=x) for x in (0.5, 0.6))
+    one, other = (
+        smc.Scenario(
+            plant="duffing",
+            law=law,
+            duration=0.01,
+            x0=x,
+        )
+        for x in (0.5, 0.6)
+    )
     before = key(one)
     space["G"] = 5.0
     assert key(one) != before
@@ -221,7 +234,11 @@ class Weighted:
 
 def reaching(value: object, text: str = "THING(y.e)", before: str = "") -> Callable:
     """A law that calls something global."""
-    space: dict = {"__name__": "written", "THING": value, "functools": functools}
+    space: dict = {
+        "__name__": "written",
+        "THING": value,
+        "functools": functools,
+    }
     exec(f"{before}\ndef law(y, gains, memory): return {text}, y.e", space)
     return space["law"]
 
@@ -318,7 +335,9 @@ def test_replaced_functions_of_a_plant_change_the_key():
         {"mechanisms": {**mechanisms, "other": Variant(nothing, nothing)}},
         {"contacts": {**contacts}, "mechanisms": {**mechanisms}},
     )
-    plants = [dataclasses.replace(own.plant, **change) for change in changes]
+    plants = []
+    for change in changes:
+        plants.append(dataclasses.replace(own.plant, **change))
     *others, same = [key(dataclasses.replace(own, plant=plant)) for plant in plants]
     assert len({key(own), *others}) == 6
     assert same == key(own)
@@ -335,7 +354,11 @@ def test_metrics_are_the_same_after_a_score():
 
 
 def test_a_global_with_the_name_of_an_attribute_does_not_count():
-    space = {"__name__": "users", "t": 3.0, "G": 2.0}
+    space = {
+        "__name__": "users",
+        "t": 3.0,
+        "G": 2.0,
+    }
     exec("def timed(y, gains, memory):\n    return -G * y.e + 0.0 * y.t, y.e", space)
     before = fingerprint.now(space["timed"])
     space["t"] = open  # neither read by the law nor comparable

@@ -46,7 +46,8 @@ def shortened(scenario: smc.Scenario, duration: float = 0.1) -> smc.Scenario:
 def test_the_ten_scenes_of_the_study_are_there_and_are_found_by_name():
     assert set(scenes.scenes()) >= TEN
     assert set(scenes.scenes()) == {path.stem for path in FILES}
-    assert all(scenes.find(name).samefile(FOLDER / f"{name}.py") for name in TEN)
+    for name in TEN:
+        assert scenes.find(name).samefile(FOLDER / f"{name}.py")
 
 
 def declared_shortly(path: Path) -> smc.Scene:
@@ -183,15 +184,50 @@ COMMON = {
     "jump": None,
 }
 PLANTS = {
-    "inverted_pendulum": ({"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81}, (0.5,)),
-    "van_der_pol": ({"M": 1.0, "mu": 1.0, "k": 1.0}, (2.0,)),
-    "duffing": ({"M": 1.0, "delta": 0.2, "alpha": -1.0, "beta": 1.0}, (1.5,)),
+    "inverted_pendulum": (
+        {
+            "m": 0.5,
+            "l": 0.5,
+            "b": 0.02,
+            "grav": 9.81,
+        },
+        (0.5,),
+    ),
+    "van_der_pol": (
+        {
+            "M": 1.0,
+            "mu": 1.0,
+            "k": 1.0,
+        },
+        (2.0,),
+    ),
+    "duffing": (
+        {
+            "M": 1.0,
+            "delta": 0.2,
+            "alpha": -1.0,
+            "beta": 1.0,
+        },
+        (1.5,),
+    ),
     "pendulum_network": (
-        {"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},
+        {
+            "m": 0.5,
+            "l": 0.5,
+            "b": 0.02,
+            "grav": 9.81,
+            "kc": 0.5,
+        },
         (0.8, -0.4, 0.6, -0.2, 0.5),
     ),
     "inverted_pendulum_network": (
-        {"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},
+        {
+            "m": 0.5,
+            "l": 0.5,
+            "b": 0.02,
+            "grav": 9.81,
+            "kc": 0.5,
+        },
         (0.8, -0.4, 0.6, -0.2, 0.5),
     ),
 }
@@ -199,16 +235,43 @@ GAINS = {
     "inverted_pendulum": {
         "observer_free": {"lam": 4.364, "k1": 9.708},
         "classical": {"k": 1.945, "c": 12.0},
-        "boundary_layer": {"k": 6.0, "c": 9.06, "phi": 2.096},
-        "adaptive": {"gamma": 104.7, "c": 12.0, "k0": 0.0},
-        "adaptive_leak": {"gamma": 20.31, "c": 12.0, "leak": 8.865, "deadzone": 0.2114, "k0": 0.0},
-        "super_twisting": {"k1": 2.489, "k2": 16.92, "c": 10.04, "w_max": 6.0},
+        "boundary_layer": {
+            "k": 6.0,
+            "c": 9.06,
+            "phi": 2.096,
+        },
+        "adaptive": {
+            "gamma": 104.7,
+            "c": 12.0,
+            "k0": 0.0,
+        },
+        "adaptive_leak": {
+            "gamma": 20.31,
+            "c": 12.0,
+            "leak": 8.865,
+            "deadzone": 0.2114,
+            "k0": 0.0,
+        },
+        "super_twisting": {
+            "k1": 2.489,
+            "k2": 16.92,
+            "c": 10.04,
+            "w_max": 6.0,
+        },
     },
     "van_der_pol": {
         "observer_free": {"lam": 6.0, "k1": 1.976},
         "classical": {"k": 6.0, "c": 2.849},
-        "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
-        "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
+        "boundary_layer": {
+            "k": 5.763,
+            "c": 2.768,
+            "phi": 0.01578,
+        },
+        "adaptive": {
+            "gamma": 66.11,
+            "c": 2.853,
+            "k0": 0.0,
+        },
         "adaptive_leak": {
             "gamma": 7.738,
             "c": 2.821,
@@ -216,13 +279,26 @@ GAINS = {
             "deadzone": 0.03367,
             "k0": 0.0,
         },
-        "super_twisting": {"k1": 4.567, "k2": 45.47, "c": 2.16, "w_max": 6.0},
+        "super_twisting": {
+            "k1": 4.567,
+            "k2": 45.47,
+            "c": 2.16,
+            "w_max": 6.0,
+        },
     },
     "duffing": {
         "observer_free": {"lam": 6.0, "k1": 3.076},
         "classical": {"k": 3.91, "c": 3.576},
-        "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
-        "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
+        "boundary_layer": {
+            "k": 6.0,
+            "c": 3.975,
+            "phi": 0.5429,
+        },
+        "adaptive": {
+            "gamma": 600.0,
+            "c": 4.371,
+            "k0": 0.0,
+        },
         "adaptive_leak": {
             "gamma": 13.87,
             "c": 4.256,
@@ -230,23 +306,66 @@ GAINS = {
             "deadzone": 0.009447,
             "k0": 0.0,
         },
-        "super_twisting": {"k1": 8.073, "k2": 0.3443, "c": 4.061, "w_max": 6.0},
+        "super_twisting": {
+            "k1": 8.073,
+            "k2": 0.3443,
+            "c": 4.061,
+            "w_max": 6.0,
+        },
     },
     "pendulum_network": {
         "observer_free": {"lam": 2.922, "k1": 6.19},
         "classical": {"k": 0.9747, "c": 5.944},
-        "boundary_layer": {"k": 6.0, "c": 6.705, "phi": 2.577},
-        "adaptive": {"gamma": 1.294, "c": 6.718, "k0": 0.0},
-        "adaptive_leak": {"gamma": 24.32, "c": 9.468, "leak": 9.259, "deadzone": 0.3184, "k0": 0.0},
-        "super_twisting": {"k1": 1.87, "k2": 1.145, "c": 6.256, "w_max": 6.0},
+        "boundary_layer": {
+            "k": 6.0,
+            "c": 6.705,
+            "phi": 2.577,
+        },
+        "adaptive": {
+            "gamma": 1.294,
+            "c": 6.718,
+            "k0": 0.0,
+        },
+        "adaptive_leak": {
+            "gamma": 24.32,
+            "c": 9.468,
+            "leak": 9.259,
+            "deadzone": 0.3184,
+            "k0": 0.0,
+        },
+        "super_twisting": {
+            "k1": 1.87,
+            "k2": 1.145,
+            "c": 6.256,
+            "w_max": 6.0,
+        },
     },
     "inverted_pendulum_network": {
         "observer_free": {"lam": 3.961, "k1": 9.362},
         "classical": {"k": 1.73, "c": 11.11},
-        "boundary_layer": {"k": 6.0, "c": 8.705, "phi": 2.328},
-        "adaptive": {"gamma": 2.189, "c": 9.408, "k0": 0.0},
-        "adaptive_leak": {"gamma": 28.47, "c": 11.36, "leak": 11.46, "deadzone": 0.153, "k0": 0.0},
-        "super_twisting": {"k1": 1.95, "k2": 1.057, "c": 9.086, "w_max": 6.0},
+        "boundary_layer": {
+            "k": 6.0,
+            "c": 8.705,
+            "phi": 2.328,
+        },
+        "adaptive": {
+            "gamma": 2.189,
+            "c": 9.408,
+            "k0": 0.0,
+        },
+        "adaptive_leak": {
+            "gamma": 28.47,
+            "c": 11.36,
+            "leak": 11.46,
+            "deadzone": 0.153,
+            "k0": 0.0,
+        },
+        "super_twisting": {
+            "k1": 1.95,
+            "k2": 1.057,
+            "c": 9.086,
+            "w_max": 6.0,
+        },
     },
 }
 
@@ -276,12 +395,17 @@ def test_a_condition_of_the_study_has_its_numbers_and_changes_nothing_else(plant
     comparison = smc.paper.comparison(plant, condition)
     assert list(comparison) == LAWS
     for name, scenario in comparison.items():
-        fields = {field: getattr(scenario.resolved, field) for field in COMMON}
+        fields = {}
+        for field in COMMON:
+            fields[field] = getattr(scenario.resolved, field)
         assert fields == stated(plant, condition)
-        assert (scenario.law.name, dict(scenario.law.gains)) == (name, GAINS[plant][name])
+        assert scenario.law.name == name
+        assert dict(scenario.law.gains) == GAINS[plant][name]
         parameters, x0 = PLANTS[plant]
-        assert (scenario.plant.name, dict(scenario.plant.parameters)) == (plant, parameters)
-        assert (scenario.resolved.x0, set(scenario.resolved.v0)) == (x0, {0.0})
+        assert scenario.plant.name == plant
+        assert dict(scenario.plant.parameters) == parameters
+        assert scenario.resolved.x0 == x0
+        assert set(scenario.resolved.v0) == {0.0}
 
 
 @pytest.mark.parametrize("plant", PLANTS)
@@ -313,7 +437,14 @@ def test_a_name_that_the_study_does_not_have_is_answered_with_the_nearest(names,
         ("vdp_nominal", {"nominal": "nominal"}),
         ("vdp_noise", {"nominal": "nominal", "noise": "noise"}),
         ("vdp_disturbance", {"nominal": "nominal", "sine": "sine"}),
-        ("control_signals", {"nominal": "nominal", "noise": "noise", "sine": "sine"}),
+        (
+            "control_signals",
+            {
+                "nominal": "nominal",
+                "noise": "noise",
+                "sine": "sine",
+            },
+        ),
     ],
 )
 def test_the_van_der_pol_scenes_are_the_study_s_conditions(scene, conditions):
@@ -332,7 +463,11 @@ def ends_of(name):
 
 def test_a_drone_upside_down_loses_the_height_of_another_coding():
     traces, names = ends_of("quadrotor_flip")
-    published = {"geometric": 6.30, "quaternion_sliding": 3.64, "adaptive_quaternion_sliding": 3.69}
+    published = {
+        "geometric": 6.30,
+        "quaternion_sliding": 3.64,
+        "adaptive_quaternion_sliding": 3.69,
+    }
     assert {law: names["lost"](traces[law]) for law in published} == pytest.approx(
         published, rel=0.1
     )

@@ -16,7 +16,14 @@ from smc_mujoco.studies.sensitivity import default_over, default_points
 
 
 def scenario(**fields) -> smc.Scenario:
-    return smc.Scenario(**{"plant": "duffing", "law": "pid", "duration": 0.5} | fields)
+    return smc.Scenario(
+        **{
+            "plant": "duffing",
+            "law": "pid",
+            "duration": 0.5,
+        }
+        | fields
+    )
 
 
 def space(*names: str) -> SimpleNamespace:
@@ -76,11 +83,9 @@ def test_no_axis_explains_more_alone_than_with_others(seed):
     designs = module.designs(n, k, seed)
     scores = designs[:, 0] + 0.1 * designs[:, 1:].sum(axis=1) - 1.0
     axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], seed)
-    assert all(
-        one <= more
-        for axis in axes
-        for one, more in zip(axis.first[:3], axis.total[:3], strict=True)
-    )
+    for axis in axes:
+        for one, more in zip(axis.first[:3], axis.total[:3], strict=True):
+            assert one <= more
     assert axes[0].first.median > 0.8
 
 
@@ -129,7 +134,12 @@ def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
         scores = 10.0 * designs[:, 0] + 0.3 * designs[:, 1:].sum(axis=1)
         a, b, *mixed = scores.reshape(-1, 1, n)
         theirs = sobol_indices(
-            func={"f_A": a.copy(), "f_B": b.copy(), "f_AB": np.array(mixed)}, n=n
+            func={
+                "f_A": a.copy(),
+                "f_B": b.copy(),
+                "f_AB": np.array(mixed),
+            },
+            n=n,
         )
         first, total = module.estimates(a, b, np.array(mixed))
         np.testing.assert_allclose(total[0], np.ravel(theirs.total_order), atol=1e-12)
@@ -144,7 +154,12 @@ def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
 def test_indices_of_scores_that_one_sample_alone_tells_apart_are_numbers():
     a = np.zeros((1, 8))
     b = np.arange(8.0)[None]
-    for pair in ((a, b), (b, a), (b, b), (b, -b)):
+    for pair in (
+        (a, b),
+        (b, a),
+        (b, b),
+        (b, -b),
+    ):
         first, total = module.estimates(*pair, np.array([pair[1], pair[0]]))
         assert np.isfinite([first, total]).all()
 
@@ -170,7 +185,8 @@ def test_a_planted_region_is_found_and_told_by_the_other_half(seed):
     assert region.rate.n == inside[told].sum()
     assert region.rate.median * region.rate.n == pytest.approx(failed[told].sum())
     assert region.rate.low < 0.5 < region.rate.high
-    assert (region.outside.median, region.outside.n) == (0.0, 256 - region.rate.n)
+    assert region.outside.median == 0.0
+    assert region.outside.n == 256 - region.rate.n
 
 
 def test_failures_by_chance_have_no_region():
@@ -240,7 +256,9 @@ def test_levels_and_chance_are_axes():
     low, high, other = (found.scenario_at(np.array(row)) for row in rows)
     assert [one.input_delay for one in (low, high, other)] == [0.01, 0.0, 0.0]
     forces = [np.array(one.disturbance[0].values) for one in (low, high, other)]
-    errors = [np.array(vars(one.noise.position_error)["values"]) for one in (low, high, other)]
+    errors = []
+    for one in (low, high, other):
+        errors.append(np.array(vars(one.noise.position_error)["values"]))
     for half, whole, others in (forces, errors):
         np.testing.assert_allclose(2.0 * half, whole, atol=1e-15)
         assert np.abs(whole - others).max() > 0.1 * np.abs(whole).max()

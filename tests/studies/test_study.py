@@ -76,7 +76,9 @@ def test_the_grid_is_every_combination_in_order():
         "study",
         duration=1.0,
     )
-    names = [(s.plant.name, condition(s), s.law.name, s.seed) for s in made]
+    names = []
+    for s in made:
+        names.append((s.plant.name, condition(s), s.law.name, s.seed))
     assert names == [
         (plant, name, law, seed)
         for plant in ("duffing", "van_der_pol")
@@ -95,11 +97,16 @@ def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
     made = grid(
         ["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study"
     )
-    starts = {s.seed: {t.resolved.x0 for t in made if t.seed == s.seed} for s in made}
-    assert all(len(found) == 1 for found in starts.values())
+    starts = {}
+    for s in made:
+        starts[s.seed] = {t.resolved.x0 for t in made if t.seed == s.seed}
+    for found in starts.values():
+        assert len(found) == 1
     nominal = np.array(made[0].plant.x0)
     for seed, (x0,) in starts.items():
-        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(nominal.size)]
+        z = []
+        for i in range(nominal.size):
+            z.append(np.random.default_rng([seed, i]).uniform(-1.0, 1.0))
         assert np.allclose(x0, nominal * (1.0 + 0.2 * np.array(z)))
     assert starts[3] != starts[4]
 
@@ -108,7 +115,8 @@ def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
 def test_no_start_lies_beyond_a_stop():
     made = grid(paper.PLANTS, ["none"], ["contact"], 3, "study", duration=10.0)
     single = [s for s in made if s.plant.n == 1]
-    assert all(0.8 <= s.resolved.x0[0] / s.plant.x0[0] <= 1.0 for s in single)
+    for s in single:
+        assert 0.8 <= s.resolved.x0[0] / s.plant.x0[0] <= 1.0
     assert len({(s.plant.name, s.resolved.x0) for s in made}) == len(paper.PLANTS) * 3
     for scenario in made:
         prepare(scenario)  # checks the start
@@ -281,7 +289,9 @@ def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkey
     study(scenarios, tmp_path / "one")
     monkeypatch.setattr(executors, "MAX_WORK", 1)
     monkeypatch.setattr(store, "MAX_OPEN_PARTS", 1)
-    shuffled = [scenarios[i] for i in np.random.default_rng(0).permutation(len(scenarios))]
+    shuffled = []
+    for i in np.random.default_rng(0).permutation(len(scenarios)):
+        shuffled.append(scenarios[i])
     study(shuffled, tmp_path / "two")
     study(scenarios, tmp_path / "two")
     assert bytes_of(tmp_path / "one") == bytes_of(tmp_path / "two")
@@ -295,7 +305,9 @@ def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkey
 def test_the_worst_trace_of_each_plant_and_condition_is_saved(tmp_path):
     scenarios = [*small(), scenario(fails_late())]
     table = study(scenarios, tmp_path, traces="worst")
-    traces = [smc.load(path) for path in sorted((tmp_path / "traces").iterdir())]
+    traces = []
+    for path in sorted((tmp_path / "traces").iterdir()):
+        traces.append(smc.load(path))
     assert [trace.failure is not None for trace in traces] == [False, True]  # noise, nominal
     noisy = table.select(condition="noise")
     assert smc.score(traces[0])["ultimate_bound"] == noisy.column("ultimate_bound").max()
@@ -317,7 +329,9 @@ def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
     study(small(), tmp_path / "a", traces="all")
     assert len(list((tmp_path / "a" / "traces").iterdir())) == len(small())
     none_runs()
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()}
+    before = {}
+    for path in (tmp_path / "a" / "traces").iterdir():
+        before[path] = path.stat().st_mtime_ns
     study(small(), tmp_path / "a", traces="all")
     assert {
         path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()

@@ -68,7 +68,12 @@ def test_in_friction_the_boundary_layer_answers_as_it_always_has(step_response, 
     narrow = smc.law("boundary_layer", k=6.0, c=6.0, phi=0.3)
     r = step_response(plant, narrow, STEP, friction=smc.Coulomb(0.05), duration=4.0)
     smc_golden(
-        r, settling_time=0.002, rise_time=0.002, overshoot=0.05, steady_error=1e-5, max_u=1e-3
+        r,
+        settling_time=0.002,
+        rise_time=0.002,
+        overshoot=0.05,
+        steady_error=1e-5,
+        max_u=1e-3,
     )
 
 

@@ -122,7 +122,11 @@ def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_e
 @pytest.mark.parametrize("by_equation", [True, False], ids=[EQUATION, MUJOCO])
 @pytest.mark.parametrize(
     ("law", "failure"),
-    [(raises(), "raised ValueError"), (pumps(), "the plant diverged"), (MINE, "")],
+    [
+        (raises(), "raised ValueError"),
+        (pumps(), "the plant diverged"),
+        (MINE, ""),
+    ],
     ids=["raising", "diverging", "with memory"],
 )
 def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_equation):

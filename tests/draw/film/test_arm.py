@@ -30,7 +30,12 @@ def trace():
     law = smc.law("computed_torque_sliding", c=8.0)
     bounds = [4.0, 2.0, 9.0]
     scenario = smc.Scenario(
-        plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, u_max=bounds, duration=0.5
+        plant=arms.arm(),
+        law=law,
+        reference=smc.Sine(0.3, 4.0),
+        x0=0.2,
+        u_max=bounds,
+        duration=0.5,
     )
     return smc.run(scenario)
 
@@ -43,7 +48,11 @@ def overlay(trace, edges=EDGES, body=(9.0, 0.0, 9.0)):
     """What is drawn over an arm at the origin, of which every body is at one place, m."""
     find = lambda k, name: np.array(body)  # noqa: E731
     stage = SimpleNamespace(
-        where=np.zeros((1, 3)), project=project, size=SIZE, scale=1.0, find=find
+        where=np.zeros((1, 3)),
+        project=project,
+        size=SIZE,
+        scale=1.0,
+        find=find,
     )
     return arm.Overlay([trace], [COLOUR], stage, edges, np.array([[100.0, 150.0, 300.0, 210.0]]))
 
@@ -140,7 +149,9 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     edges = np.array(
         [0.0, 0.02, 0.03, 0.14, 0.16, 0.18]
     )  # s, of frames; it is seen until 0.12 s after its end
-    frames = [overlay(hit, edges, body).over(paper(), frame) for frame in range(5)]
+    frames = []
+    for frame in range(5):
+        frames.append(overlay(hit, edges, body).over(paper(), frame))
     assert [(each[y, x] == hue).all() for each in frames] == [False, True, True, True, False]
 
 

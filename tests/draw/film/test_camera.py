@@ -34,7 +34,12 @@ def trace(request, tmp_path_factory) -> smc.Trace:
     path = tmp_path_factory.mktemp("arm") / "arm.xml"
     path.write_text(MODEL.format(lights=request.param))
     return smc.run(
-        smc.Scenario(plant=smc.plant_from(path, ["j"]), law="none", x0=0.3, duration=0.4)
+        smc.Scenario(
+            plant=smc.plant_from(path, ["j"]),
+            law="none",
+            x0=0.3,
+            duration=0.4,
+        )
     )
 
 
@@ -95,7 +100,12 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
 
 @pytest.mark.parametrize(
     ("place", "half", "seen"),
-    [(3.9, 0.01, True), (4.1, 0.01, False), (0, 1.9, True), (0, 2.1, False)],
+    [
+        (3.9, 0.01, True),
+        (4.1, 0.01, False),
+        (0, 1.9, True),
+        (0, 2.1, False),
+    ],
 )
 def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_leave_the_picture(
     place, half, seen
@@ -109,7 +119,14 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
         <actuator><motor joint="j"/></actuator></mujoco>""",
         ["j"],
     )
-    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, x0=0.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant,
+            law="none",
+            duration=0.01,
+            x0=0.0,
+        )
+    )
     reach = puppet.Puppet(trace.scenario, np.array([0.0, -1.0, 0.0])).reach(
         *tracks([trace], ["#0072B2"])
     )

@@ -88,7 +88,14 @@ def test_arrows_are_to_scale_and_a_bar_shows_switching():
 
 @renders
 def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
-    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, x0=0.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant="inverted_pendulum",
+            law="none",
+            duration=0.01,
+            x0=0.0,
+        )
+    )
 
     def column(picture):
         """Return the mean column of what differs from the pendulum upright, from the middle."""
@@ -184,10 +191,19 @@ def stuck() -> smc.Trace:
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
 def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
-    scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
+    scenario = smc.Scenario(
+        plant=plant,
+        law="none",
+        x0=start,
+        duration=0.1,
+        **{field: name},
+    )
     model = scene.compose([scenario] * 2, np.array([[0.0, 0, 0], [0, 9, 0]]), SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
-    wanted = [geom.name for geom in models.spec(scenario).geoms if geom.name not in ("", "floor")]
+    wanted = []
+    for geom in models.spec(scenario).geoms:
+        if geom.name not in ("", "floor"):
+            wanted.append(geom.name)
     assert [
         f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown
     ] == []
@@ -197,7 +213,9 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
 def stood(scenarios) -> np.ndarray:
     """Where machines stand."""
     turn = scene.turn(scenarios[0])
-    found = [puppet.Puppet(scenario, turn[:, 2]) for scenario in scenarios]
+    found = []
+    for scenario in scenarios:
+        found.append(puppet.Puppet(scenario, turn[:, 2]))
     (track,) = tracks([smc.run(scenarios[0])], ["#0072B2"])
     reaches = [found[0].reach(track)] * len(found)
     return stage.placed(found, reaches, turn, SIZE, ROOM, 0.0)[0]
@@ -206,7 +224,13 @@ def stood(scenarios) -> np.ndarray:
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::6], ids=str)
 def test_machines_side_by_side_keep_apart(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
-    scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
+    scenario = smc.Scenario(
+        plant=plant,
+        law="none",
+        x0=start,
+        duration=0.1,
+        **{field: name},
+    )
     corners = scene.fixed_boxes(models.compile_model(scenario))[..., :2]
     low = corners.min(axis=1)
     high = corners.max(axis=1)
@@ -232,9 +256,13 @@ def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
     touching = hit.t[states.in_contact(hit)[:, 0]]
     assert 0.0 < np.ptp(touching) < 0.05
     (before, _), (blow, frames), (after, _) = moods(hit)
-    assert (before, blow, after) == (None, "contact", None)
+    assert before is None
+    assert blow == "contact"
+    assert after is None
     assert frames / 30 >= states.MIN_STATE_TIME
-    words = [now.words if now else None for now in states.timeline(hit, seconds(hit))]
+    words = []
+    for now in states.timeline(hit, seconds(hit)):
+        words.append(now.words if now else None)
     assert words.index("contact") == np.ceil(touching[0] * 30)  # at once, and not before
 
 
@@ -262,11 +290,16 @@ def test_words_never_flicker():
         states.State("b", states.STUCK),
         states.State("hit", states.STRUCK),
     ]
-    found = [names[i] for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04))]
+    found = []
+    for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04)):
+        found.append(names[i])
     shown = states.debounced(found, times, states.MIN_STATE_TIME)
     runs = [(now, len(list(run))) for now, run in itertools.groupby(shown)]
-    assert all(frames >= 5 or now == names[2] for now, frames in runs[1:-1])
-    assert all(after == now for after, now in zip(shown, found, strict=True) if now == names[2])
+    for now, frames in runs[1:-1]:
+        assert frames >= 5 or now == names[2]
+    for after, now in zip(shown, found, strict=True):
+        if now == names[2]:
+            assert after == now
     assert shown.index(names[2]) == found.index(names[2])  # nothing is told to hit before it does
 
 
@@ -329,7 +362,8 @@ def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples,
     force[:, 1] = np.where(np.arange(1001) < samples, -peak, 2.0)
     found = scales([dataclasses.replace(trace, applied=force, d=force)])
     scale = found[driven([trace])]
-    assert (scale.control, scale.disturbance) == (longest, longest)
+    assert scale.control == longest
+    assert scale.disturbance == longest
     said = key([trace], found)
     assert {
         f"arrow: mean control, longest {words}",
@@ -344,14 +378,15 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     both = arrows(loads(slow, np.array([0.05, 0.06])), 0, 0, found[driven([slow])], "#0072B2")
     solid, pale = (arrow for arrow in both if arrow.head)
     assert abs(solid.high) < 0.5 * abs(pale.high)  # a quarter of the lag's time constant
-    assert (solid.rgba[3], pale.rgba[3]) == (1.0, 0.45)
-    assert (solid.layer, pale.layer) == (0, 1)
+    assert solid.rgba[3] == 1.0
+    assert pale.rgba[3] == 0.45
+    assert solid.layer == 0
+    assert pale.layer == 1
     assert "pale arrow: command" in key([slow], found)
     strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
-    assert not any(
-        "pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1])))
-    )
+    for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):
+        assert "pale" not in words
 
 
 def test_touch_is_where_the_stop_pushes_and_there_only(hit):

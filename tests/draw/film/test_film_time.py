@@ -19,16 +19,29 @@ SIZE = (1280, 260)
 
 def resting(law, rate):
     """A run of 4 s whose x decays from 0.5."""
-    trace = made(smc.Scenario(plant="inverted_pendulum", law=law, duration=4.0, x0=0.5))
+    trace = made(
+        smc.Scenario(
+            plant="inverted_pendulum",
+            law=law,
+            duration=4.0,
+            x0=0.5,
+        )
+    )
     zero = np.zeros_like(trace.x)
     return dataclasses.replace(
-        trace, x=0.5 * np.exp(-rate * trace.t)[:, None], r=zero, d=zero, u=zero
+        trace,
+        x=0.5 * np.exp(-rate * trace.t)[:, None],
+        r=zero,
+        d=zero,
+        u=zero,
     )
 
 
 @pytest.fixture(scope="module")
 def charts():
-    traces = [resting(law, rate) for law, rate in zip(LAWS, (8.0, 16.0), strict=True)]
+    traces = []
+    for law, rate in zip(LAWS, (8.0, 16.0), strict=True):
+        traces.append(resting(law, rate))
     return Charts(
         traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0
     ), traces
@@ -43,7 +56,10 @@ def test_the_time_until_all_rest_has_most_of_the_width_and_the_rest_is_grey(char
     )
     left, top, right, _ = drawn.frames[0]
     picture = drawn.at(0.0)
-    for share, colour in ((0.75, style.PAPER), (0.95, style.BAND)):
+    for share, colour in (
+        (0.75, style.PAPER),
+        (0.95, style.BAND),
+    ):
         column = picture[top + 2 : top + 60, round(left + share * (right - left))]
         assert (np.abs(column.astype(int) - style.rgb(colour)).max(axis=1) < 3).mean() > 0.8
     now = drawn.at(window / 2)

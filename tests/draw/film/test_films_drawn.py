@@ -108,7 +108,8 @@ def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_thei
     ):
         assert clock in picture
         assert (pace_words in picture) != (pace_words == "real time")
-        assert all(words in picture for words in ("'one'", other, fill, "'sticks'", f"'{state}'"))
+        for words in ("'one'", other, fill, "'sticks'", f"'{state}'"):
+            assert words in picture
         assert ("mass × 2 since 0.2 s" in picture) is changed
 
 
@@ -142,13 +143,25 @@ def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_a
     )
 
 
-@pytest.mark.parametrize("limits", [[0.4, 0.2, 0.9], math.inf])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        [0.4, 0.2, 0.9],
+        math.inf,
+    ],
+)
 def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares_of_limits(
     limits, pen, monkeypatch
 ):
     monkeypatch.setattr(tip, "knows_contacts", lambda scenario: True)
     monkeypatch.setattr(tip, "contacts", lambda trace: SimpleNamespace(push=20.0 * trace.x))
-    push = smc.signals.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
+    push = smc.signals.Push(
+        "hand",
+        y=30.0,
+        z=40.0,
+        time=0.1,
+        width=0.02,
+    )
     trace = machine(arms.arm(), "none", u_max=limits, reference=smc.Sine(0.3, 4.0), duration=0.3)
     trace = dataclasses.replace(
         trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)
@@ -160,10 +173,17 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
     place = np.array([[0.1, 0.0, 0.2]])
-    stage = SimpleNamespace(where=place, project=project, size=SIZE, scale=0.8)
+    stage = SimpleNamespace(
+        where=place,
+        project=project,
+        size=SIZE,
+        scale=0.8,
+    )
     stage.find = lambda k, name: np.array([0.4, 0.0, 0.9])
     over = arm.Overlay([trace], COLOURS[:1], stage, edges, low)
-    within = [(trace.t >= a) & (trace.t < b) for a, b in itertools.pairwise(edges)]
+    within = []
+    for a, b in itertools.pairwise(edges):
+        within.append((trace.t >= a) & (trace.t < b))
     forces = [np.linalg.norm(20.0 * trace.x[frame].mean(axis=0)) for frame in within]
     for frame, force in enumerate(forces):
         pen.clear()
@@ -175,14 +195,18 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         ]
         assert touch == pytest.approx(force, abs=1.0)
         assert f"{1e3 * np.ravel(over.errors)[frame]:.0f} mm'" in said
-        boxes = [note for note in pen if note.startswith("rectangle") and style.RULE in note]
+        boxes = []
+        for note in pen:
+            if note.startswith("rectangle") and style.RULE in note:
+                boxes.append(note)
         assert len(boxes) == (0 if limits == math.inf else 3)
     assert np.ravel(over.errors) == pytest.approx(
         [tip.tip_error(trace)[frame].mean() for frame in within], rel=0.02
     )
     words = " ".join(arm.key([trace]))
     assert ("bars" in words) == (limits != math.inf)
-    assert all(part in words for part in ("path of the tip", "blow", "touches"))
+    for part in ("path of the tip", "blow", "touches"):
+        assert part in words
 
 
 def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
@@ -206,7 +230,9 @@ def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
                 assert time <= t[-1] or not len(dot)  # a run that failed has none
                 found += [(colour, time)] * bool(len(dot))
                 assert not len(dot) or dot.mean() == pytest.approx(np.interp(time, t, y), abs=3.0)
-    counts = [found.count(each) for each in itertools.product(COLOURS, (0.3, 0.8))]
+    counts = []
+    for each in itertools.product(COLOURS, (0.3, 0.8)):
+        counts.append(found.count(each))
     assert counts == [2, 3, 2, 0]  # where both are in one place there is one dot, in ink
     ends = [t[-1] for paths in shown.paths for t, _ in paths]
     assert ends == pytest.approx([1.0, 0.599] * 3)
@@ -237,7 +263,9 @@ KINDS = {
 @pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_machines_stand_apart_in_their_room_with_their_arrows(kind):
-    traces = [machine(law="none", **KINDS[kind]) for _ in range(2)]
+    traces = []
+    for _ in range(2):
+        traces.append(machine(law="none", **KINDS[kind]))
     room = camera.Room(30, 60, 610, 270)
     red = (1.0, 0.0, 0.0, 1.0)
     with staged(traces, COLOURS, SIZE, room) as stage:
@@ -295,17 +323,34 @@ def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
     parts, moving, resting, touching, dry, stops
 ):
     """It moves in even seconds, rests in odd ones, and touches a stop at the start of each."""
-    trace = made(smc.Scenario(plant="duffing", law="none", duration=4.0, **parts))
+    trace = made(
+        smc.Scenario(
+            plant="duffing",
+            law="none",
+            duration=4.0,
+            **parts,
+        )
+    )
     still = (trace.t % 2.0 > 1.0)[:, None]
     pushes = (np.sign(np.sin(3.0 * trace.t)) * ((trace.t % 1.0 > 0.2) | (trace.t % 1.0 < 0.01)))[
         :, None
     ]
     x = np.where(trace.t % 1.0 < 0.01, 2.0, 0.1)[:, None]
-    moved = {"x": x, "v": np.where(still, 0.0, 1.0), "reaction": pushes, "force": -pushes}
+    moved = {
+        "x": x,
+        "v": np.where(still, 0.0, 1.0),
+        "reaction": pushes,
+        "force": -pushes,
+    }
     times = np.arange(0.0, 4.0, 1 / 30)
     told = states.timeline(dataclasses.replace(trace, **moved), times)
     words = [now and now.words for now in told]
-    for second, expected in ((0, moving), (1, resting), (2, moving), (3, resting)):
+    for second, expected in (
+        (0, moving),
+        (1, resting),
+        (2, moving),
+        (3, resting),
+    ):
         assert {
             word for word, t in zip(words, times, strict=True) if second + 0.4 < t < second + 0.95
         } <= expected
@@ -319,7 +364,15 @@ def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
 
 
 def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
-    two = made(smc.Scenario(plant="cart_pole", law="none", duration=1.0, **RUB, **GEAR))
+    two = made(
+        smc.Scenario(
+            plant="cart_pole",
+            law="none",
+            duration=1.0,
+            **RUB,
+            **GEAR,
+        )
+    )
     v = np.column_stack([0.0 * two.t, 1.0 + two.t])
     force = np.column_stack([two.t, 0.0 * two.t])
     (told,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
@@ -359,11 +412,23 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     monkeypatch.setattr(progress.Bar, "advance", lambda bar, work: told.append(work))
     trace = machine("duffing", duration=5.0)
     size = (320, 180)
-    looks = {"labels": ["a"], "title": "b", "size": size, "camera": (10.0, -20.0)}
+    looks = {
+        "labels": ["a"],
+        "title": "b",
+        "size": size,
+        "camera": (10.0, -20.0),
+    }
     given = (["a"], "b", size, (10.0, -20.0))
     film.film(trace, tmp_path / "a.mp4", fps=10.0, speed=2.0, **looks)
     film.film(trace, tmp_path / "b.png", at=5.0, **looks)
-    film.film(trace, tmp_path / "b.webp", span=(1.0, 1.5), fps=10.0, speed=1.0, **looks)
+    film.film(
+        trace,
+        tmp_path / "b.webp",
+        span=(1.0, 1.5),
+        fps=10.0,
+        speed=1.0,
+        **looks,
+    )
     assert asked == [(0.0, 5.0, 26, *given), (5.0, 5.0, 1, *given), (1.0, 1.5, 6, *given)]
     asked.clear()
     film.film(trace, tmp_path / "first.mp4")
@@ -378,7 +443,9 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     assert wrote == [((180, 320), 10.0), ((720, 1280), 30.0)]
     assert set(told) == {1}
     with Image.open(tmp_path / "b.webp") as clip, Image.open(tmp_path / "b.png") as still:
-        assert (clip.n_frames, clip.size, still.size) == (6, size, size)
+        assert clip.n_frames == 6
+        assert clip.size == size
+        assert still.size == size
     assert {path.name for path in tmp_path.iterdir()} == {
         "a.mp4",
         "a.png",

@@ -119,7 +119,16 @@ def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
     traces = []
     for law in ("super_twisting", "pid"):
-        traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3, x0=0.1)))
+        traces.append(
+            smc.run(
+                smc.Scenario(
+                    plant=plant,
+                    law=law,
+                    duration=0.3,
+                    x0=0.1,
+                )
+            )
+        )
     with filmed(traces, monkeypatch) as (shown, words):
         for mount in [mount for its in shown.mounts for mount in its]:
             for part in (-1.0, 1.0):

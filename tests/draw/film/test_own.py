@@ -23,7 +23,10 @@ FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
 
 @pytest.mark.parametrize(
     ("group", "floor", "words"),
-    [(3, "", "shows no part that moves"), (0, '<geom type="box" size="9 9 .1"/>', None)],
+    [
+        (3, "", "shows no part that moves"),
+        (0, '<geom type="box" size="9 9 .1"/>', None),
+    ],
 )
 @without_charts
 def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
@@ -58,7 +61,10 @@ def test_arrows_of_a_foreign_cart_are_seen_and_its_rail_is_cut_to_what_moves():
             red = np.abs(scene.render([(0, 0, arrow)]) - empty).max(axis=2) > 60
             assert red.sum() > 50
         left, top, right, bottom = scene.boxes[0]
-        rails = [geom for geom in range(scene.model.ngeom) if "rail" in scene.model.geom(geom).name]
+        rails = []
+        for geom in range(scene.model.ngeom):
+            if "rail" in scene.model.geom(geom).name:
+                rails.append(geom)
         assert len(rails) == 2
         assert (scene.model.geom_size[rails, 1] < 0.5).all()  # not 2 m
         assert bottom - top == pytest.approx(320.0)  # the pole fills the height of the room
@@ -92,9 +98,18 @@ def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(
-        smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0))
+        smc.Scenario(
+            plant=plant,
+            law="none",
+            duration=0.3,
+            x0=(1.79, 0.0),
+            v0=(2.0, 0.0),
+        )
     )
     assert trace.reaction.any()  # the joint's limit
-    words = [word for word in key([trace], scales([trace])) if "violet" in word]
+    words = []
+    for word in key([trace], scales([trace])):
+        if "violet" in word:
+            words.append(word)
     assert len(words) == 1
     assert words[0].startswith("violet arrow: friction, limits and contact, longest ")

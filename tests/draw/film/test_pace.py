@@ -57,7 +57,15 @@ def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
     assert at(trace, (0.5, 1.8, 2.05, 2.3, 3.0)) == [4.0, 1.0, 0.125, 1.0, 4.0]
 
 
-@pytest.mark.parametrize(("seconds", "speed"), [(3.0, 1.0), (1.2, 0.5), (0.5, 0.25), (0.3, 0.125)])
+@pytest.mark.parametrize(
+    ("seconds", "speed"),
+    [
+        (3.0, 1.0),
+        (1.2, 0.5),
+        (0.5, 0.25),
+        (0.3, 0.125),
+    ],
+)
 def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, speed):
     trace = moving(base, lambda t: np.clip(t / seconds, 0.0, 1.0))
     assert at(trace, (0.1,)) == [speed]
@@ -77,7 +85,13 @@ def test_films_have_a_longest_duration(base, monkeypatch):
 
 def test_impacts_are_slowest(monkeypatch):
     trace = smc.run(
-        smc.Scenario(plant="duffing", law="observer_free", contact="stops", v0=3.0, duration=1.0)
+        smc.Scenario(
+            plant="duffing",
+            law="observer_free",
+            contact="stops",
+            v0=3.0,
+            duration=1.0,
+        )
     )
     touch = trace.t[states.in_contact(trace)[:, 0]]
     first = float(touch[0])

@@ -12,11 +12,21 @@ from smc_mujoco.evidence.accuracy import accuracy
 from smc_mujoco.evidence.accuracy.accuracy import load
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
-SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}
+SHORT = {
+    "periods": PERIODS,
+    "seeds": 1,
+    "duration": 8.0,
+}
 
 
 def double_integrator():
-    return smc.plant("duffing", M=1.0, delta=0.0, alpha=0.0, beta=0.0)
+    return smc.plant(
+        "duffing",
+        M=1.0,
+        delta=0.0,
+        alpha=0.0,
+        beta=0.0,
+    )
 
 
 def defaults(names, **options):
@@ -77,7 +87,9 @@ def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_t
 @pytest.mark.slow
 def test_relays_are_of_first_order_and_layers_of_none():
     table = defaults(["classical", "boundary_layer", my_relay])
-    orders = {row.law: (row.s.order, row.s.theory) for row in table}
+    orders = {}
+    for row in table:
+        orders[row.law] = (row.s.order, row.s.theory)
     assert orders["classical"] == pytest.approx((1.0, 1.0), abs=0.1)
     assert orders["boundary_layer"] == pytest.approx((0.0, 0.0), abs=0.01)
     assert orders["my_relay"] == pytest.approx(orders["classical"], abs=1e-6)

@@ -65,7 +65,12 @@ def test_a_check_holds_just_where_its_relation_does():
 @pytest.mark.parametrize("relation", ["<", "<=", ">", ">="])
 @pytest.mark.parametrize(
     ("value", "limit"),
-    [(math.nan, 1.0), (1.0, math.nan), (math.nan, math.nan), (math.inf, math.inf)],
+    [
+        (math.nan, 1.0),
+        (1.0, math.nan),
+        (math.nan, math.nan),
+        (math.inf, math.inf),
+    ],
 )
 def test_what_cannot_be_compared_never_holds(relation, value, limit):
     assert not check("x", value, relation, limit).holds
@@ -155,7 +160,13 @@ def test_universal_claims_are_those_of_the_list():
 
 
 def entry(id="900", found=(YES,), note=""):
-    told = {"text": "text", "where": "here", "measured": "this", "holds_if": "< 2", "note": note}
+    told = {
+        "text": "text",
+        "where": "here",
+        "measured": "this",
+        "holds_if": "< 2",
+        "note": note,
+    }
     return Entry(
         id=id, evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found, **told
     )
@@ -181,7 +192,13 @@ def test_a_claim_says_what_it_depends_on(only):
         {"study": SUPPORTED, "tuned": REFUTED},
     )
     assert one.numbers["study"] == {
-        "yes": {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True, "sentence": ""}
+        "yes": {
+            "value": 1.0,
+            "relation": "<",
+            "limit": 2.0,
+            "holds": True,
+            "sentence": "",
+        }
     }
     assert one.beside == {"study": {"theory": 7.0}, "tuned": {}}
     assert one.note.startswith("Mind the gap. The verdict depends on the gains")
@@ -282,8 +299,15 @@ def test_a_run_that_fails_is_infinitely_bad_in_everything(runs):
 
 def test_the_rows_of_a_table_stand_for_their_runs(runs):
     scenario = short(runs)
-    row = {m.name: None if m.network else 1.5 for m in metrics()}
-    row |= {"hash": key(scenario), "law": OURS, "gains": '{"lam": 6.0}', "failure": None}
+    row = {}
+    for m in metrics():
+        row[m.name] = None if m.network else 1.5
+    row |= {
+        "hash": key(scenario),
+        "law": OURS,
+        "gains": '{"lam": 6.0}',
+        "failure": None,
+    }
     table = Runs(GABER, "study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row])))
     assert table.scores([scenario])[0]["itae"] == 1.5
     assert [one.gains for one in table.results()] == [{"lam": 6.0}]
@@ -439,7 +463,13 @@ def test_a_law_without_effect_stabilises_what_hangs_alone():
 
 def test_the_same_audit_twice_gives_the_same():
     first, again = (
-        claims(only=["18"], gains="study", quick=True, threads=threads) for threads in (None, 1)
+        claims(
+            only=["18"],
+            gains="study",
+            quick=True,
+            threads=threads,
+        )
+        for threads in (None, 1)
     )
     assert again == first
 
@@ -455,7 +485,11 @@ def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
 
 
 @pytest.mark.parametrize(
-    ("quick", "told"), [(True, "; here, quickly, 51 x 51 points"), (False, "one pendulum")]
+    ("quick", "told"),
+    [
+        (True, "; here, quickly, 51 x 51 points"),
+        (False, "one pendulum"),
+    ],
 )
 def test_a_quick_audit_tells_what_it_measures_instead(quick, told):
     (claim,) = claims(only=["18"], gains="study", quick=quick)

@@ -112,7 +112,9 @@ def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(told):
     assert first["verdicts"] == {"slow": REFUTED, "tuned": REFUTED}
     assert set(first["numbers"]["slow"]) == {"pushed: TV rate", "noise: TV rate", "largest |x|"}
     assert [len(names) for names in first["runs"].values()] == [2, 2]
-    runs = [told["runs"][name] for name in first["runs"]["slow"]]
+    runs = []
+    for name in first["runs"]["slow"]:
+        runs.append(told["runs"][name])
     assert {run["condition"] for run in runs} == {"pushed", "noise"}
     assert [run["gains"] for run in runs] == [{"k": 3.0, "c": 2.0}] * 2
     for run in runs:

@@ -84,7 +84,13 @@ def test_mutants_reverse_the_command_drop_it_forget_or_switch():
     assert not without.u.any()
     assert set(np.unique(relay.u)) == {-6.0}
     ends = [
-        smc.Scenario(plant="duffing", law=laws[-1], x0=x, v0=0.0, duration=0.002)
+        smc.Scenario(
+            plant="duffing",
+            law=laws[-1],
+            x0=x,
+            v0=0.0,
+            duration=0.002,
+        )
         for x in (-0.5, 0.0)
     ]
     assert [trace.u[-1, 0] for trace in smc.run(ends)] == [6.0, 0.0]
@@ -121,7 +127,12 @@ def test_a_mutant_that_loses_one_sentence_and_gains_another_loses_the_claim(pape
 
 
 @pytest.mark.parametrize(
-    ("asked", "other", "kept"), [("< 2", "< 2", KEPT), ("< 4", "> 9", KEPT), ("< 1", "> 9", None)]
+    ("asked", "other", "kept"),
+    [
+        ("< 2", "< 2", KEPT),
+        ("< 4", "> 9", KEPT),
+        ("< 1", "> 9", None),
+    ],
 )
 def test_what_holds_under_one_set_of_gains_or_in_one_sentence_is_lost_by_it_not_by_a_number(
     paper, asked, other, kept

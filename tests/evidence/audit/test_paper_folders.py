@@ -43,7 +43,10 @@ def folder(tmp_path):
         home = tmp_path / "mine"
         shutil.rmtree(home, ignore_errors=True)
         home.mkdir()
-        for name, text in ((PAPER_FILE, data), (CODE_FILE, code)):
+        for name, text in (
+            (PAPER_FILE, data),
+            (CODE_FILE, code),
+        ):
             if text is not None:
                 (home / name).write_text(text)
         return home
@@ -83,12 +86,6 @@ def test_a_threshold_decides(text, value, holds):
     assert [one.value for one in beside] == (
         [] if text[0] in "<>" else [pytest.approx(value, nan_ok=True)]
     )
-
-
-@pytest.mark.parametrize("text", ["2", "== 2", "2 +- ", "15 to 2", "a to b", "", 2, None, "< 2 %"])
-def test_what_is_no_threshold_is_refused(text):
-    with pytest.raises(ScenarioError, match="the threshold of 'size' is"):
-        Threshold.read("size", text)
 
 
 def test_each_case_has_its_check():
@@ -213,38 +210,21 @@ BROKEN = [
 ]
 ADDED = [  # to the minimal paper.toml
     'over = "many"',
-    'over = "all"',
     'laws = ["pid"]\nover = "some"',
     'read = "some"',
-    "late = 1",
-    'values = "1"',
     'plants = ["dufing"]',
-    'laws = ["clasical"]',
-    'conditions = ["noisy"]',
     'plants = ["hevy"]\n[plants]\nheavy = { plant = "duffing" }',
     'conditions = ["farr"]\n[conditions]\nfar = "x0=2.0"',
     'conditions = ["friction=Coulom(1)+"]',
     'plants = "duffing"',
-    'plants = [["duffing"]]',
     'quantifier = "every"',
     'runs = "durations=1"',
-    'runs = "duration 1"',
-    'runs = "friction=Coulom(1)"',
     '[conditions]\nnoise = "seed=1"',
-    "[conditions]\nfar = 2.0",
-    '[conditions]\nworn = "friction=Coulom(1)"',
     '[plants]\nlight = { plant = "duffing", m = 1 }',
-    "[plants]\nlight = { delta = 1 }",
-    "[plants]\nlight = 3",
     '[plants]\narm = { plant = "arm.xml:elbow" }',
     "[gains.tuned]\npid = { kp = 1 }",
-    "[gains.mine]\npid = 3",
-    "[gains]\nmine = 3",
     'plants = ["duffing"]\nlaws = ["twisting"]\n[gains.paper]\ntwisting = { r1 = 5 }',
-    'plants = ["duffing"]\nlaws = ["pid"]\n[gains.paper]\npid = { kq = 1 }',
-    "[allowed]\npid = 3",
     "[allowed.pdi]\nkp = [1.0, 2.0]",
-    "[allowed.pid]\nkq = [1.0, 2.0]",
     '[allowed.pid]\nmargins = "larg"',
 ]
 WRONG = [  # of paper.toml
@@ -284,26 +264,6 @@ def test_a_broken_folder_is_one_sentence(folder, refused):
         refused(lambda data=data, code=code: paper(folder(data, code)))
 
 
-def test_a_function_that_fails_is_one_sentence(folder, refused):
-    returned = (
-        "1 / 0",
-        "None",
-        "[1.0]",
-        "{}",
-        "{'sizes': 1.0, 3: 2.0}",
-        "{'size': {}}",
-        "{'size': 'large'}",
-    )
-    returned += (
-        "{'size': {'arm': None}}",
-        "runs.scenario('dufing', 'pid')",
-        "runs.law('duffing', 'pid', kq=1)",
-    )
-    returned += ("runs.check('sise', 'it', 1)",)
-    for one in returned:
-        refused(lambda one=one: claims(paper=folder(code=f"def small(runs):\n    return {one}\n")))
-
-
 def test_a_text_as_threshold_needs_checks(folder):
     data = MINIMAL.replace('{ size = "< 2" }', '"small"')
     with pytest.raises(ScenarioError, match="it returns numbers, and holds_if is a text"):
@@ -335,10 +295,3 @@ def test_an_edited_folder_is_read_again(folder):
     (one,) = claims(paper=folder(code=SMALL.replace("1.0", "7.0, 'also': {'a': 3}")))
     assert one.verdict == REFUTED
     assert one.beside == {"default": {"a: also": 3.0}}
-
-
-def test_a_paper_that_is_none_is_refused():
-    with pytest.raises(ScenarioError, match="unknown paper 'levannt'"):
-        paper("levannt")
-    with pytest.raises(ScenarioError, match=r"no folder './levant' with a paper.toml"):
-        paper("./levant")

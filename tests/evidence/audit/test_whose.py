@@ -54,7 +54,12 @@ def decided(folder):
 
 def test_all_gains_are_refuted_by_one_that_the_theorem_allows_with_its_margin(written):
     folder = written(
-        DATA.format(over="all", limit="< 4", plants='["duffing"]', margins='margins = "margins"')
+        DATA.format(
+            over="all",
+            limit="< 4",
+            plants='["duffing"]',
+            margins='margins = "margins"',
+        )
     )
     verdict, beside = decided(folder)
     assert verdict == "refuted"
@@ -67,12 +72,28 @@ def test_gains_outside_the_conditions_are_no_counter_example(written):
     conditions = 'margins = "margins"'
     assert (
         decided(
-            written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins=conditions))
+            written(
+                DATA.format(
+                    over="all",
+                    limit="< 5",
+                    plants='["duffing"]',
+                    margins=conditions,
+                )
+            )
         )[0]
         == "supported"
     )
     assert (
-        decided(written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins="")))[0]
+        decided(
+            written(
+                DATA.format(
+                    over="all",
+                    limit="< 5",
+                    plants='["duffing"]',
+                    margins="",
+                )
+            )
+        )[0]
         == "refuted"
     )
 
@@ -80,15 +101,40 @@ def test_gains_outside_the_conditions_are_no_counter_example(written):
 def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(written):
     both = '["duffing", "van_der_pol"]'
     verdict, beside = decided(
-        written(DATA.format(over="some", limit="> 3", plants=both, margins=""))
+        written(
+            DATA.format(
+                over="some",
+                limit="> 3",
+                plants=both,
+                margins="",
+            )
+        )
     )
     assert verdict == "supported"
     assert min(beside["duffing: decided at k"], beside["van_der_pol: decided at k"]) > 3.0
-    first = decided(written(DATA.format(over="some", limit="> 1", plants=both, margins="")))[1]
+    first = decided(
+        written(
+            DATA.format(
+                over="some",
+                limit="> 1",
+                plants=both,
+                margins="",
+            )
+        )
+    )[1]
     assert first["duffing: decided at k"] == 2.0
     assert first["duffing: sets of gains tried"] == 1
     assert (
-        decided(written(DATA.format(over="some", limit="> 9", plants=both, margins="")))[0]
+        decided(
+            written(
+                DATA.format(
+                    over="some",
+                    limit="> 9",
+                    plants=both,
+                    margins="",
+                )
+            )
+        )[0]
         == "not shown"
     )
 
@@ -110,7 +156,12 @@ classical = {{ k = 8.0, c = 1.0 }}
 def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_beside_it(
     written, rivals, limit, verdict
 ):
-    data = DATA.format(over="some", limit=limit, plants='["duffing"]', margins="tried = [40, 10]")
+    data = DATA.format(
+        over="some",
+        limit=limit,
+        plants='["duffing"]',
+        margins="tried = [40, 10]",
+    )
     data = data.replace("[allowed", TWO_SETS.format() + "[allowed").replace(
         "over =", f'rivals = "{rivals}"\nover ='
     )
@@ -123,7 +174,12 @@ def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_besid
 
 
 def test_a_search_may_be_over_the_gains_of_another_law_than_the_first(written):
-    data = DATA.format(over="some", limit="> 3", plants='["duffing"]', margins="")
+    data = DATA.format(
+        over="some",
+        limit="> 3",
+        plants='["duffing"]',
+        margins="",
+    )
     data = data.replace(
         'laws = ["classical"]', 'laws = ["none", "classical"]\nsearched = "classical"'
     )
@@ -144,9 +200,18 @@ def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_
     said = []
     for over, limit, quick in cases:
         (found,) = audit(
-            written(DATA.format(over=over, limit=limit, plants='["duffing"]', margins=margins)),
+            written(
+                DATA.format(
+                    over=over,
+                    limit=limit,
+                    plants='["duffing"]',
+                    margins=margins,
+                )
+            ),
             quick=quick,
         ).claims
-        numbers = [f"{value:.9g}" for value in found.beside["paper"].values()]
+        numbers = []
+        for value in found.beside["paper"].values():
+            numbers.append(f"{value:.9g}")
         said += [f"{over} {limit} {'quick' * quick}: {found.verdict} {' '.join(numbers)}"]
     assert said == snapshot

@@ -9,7 +9,15 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.certificates.certificate import Certificate
 
 REACHED = part("reaching", {"reaching": 0.3, "actuator": 1.0}, X=1.25, S=0.5)
-GLOBAL = part("saturated PD", {"damping": 0.5, "restoring": 0.2, "actuator": 0.0, "local": 1.0})
+GLOBAL = part(
+    "saturated PD",
+    {
+        "damping": 0.5,
+        "restoring": 0.2,
+        "actuator": 0.0,
+        "local": 1.0,
+    },
+)
 TERMINAL = part("reaching", {"reaching": 0.3, "actuator": 1.0}, X=0.81, S=0.0)
 SAID = {
     "fails and falls": certificate(),
@@ -19,10 +27,22 @@ SAID = {
         parts=[
             part(
                 "saturated PD",
-                {"damping": -1.0, "restoring": -2.0, "actuator": -3.0, "coupling": -4.0},
+                {
+                    "damping": -1.0,
+                    "restoring": -2.0,
+                    "actuator": -3.0,
+                    "coupling": -4.0,
+                },
             ),
             part("reaching", {"reaching": -6.0, "actuator": 0.0}, X=0.0, S=0.0),
-            part("super-twisting", {"integral": -7.0, "slope": -8.0, "actuator": 9.0}),
+            part(
+                "super-twisting",
+                {
+                    "integral": -7.0,
+                    "slope": -8.0,
+                    "actuator": 9.0,
+                },
+            ),
         ],
     ),
     "a switching law": certificate(
@@ -37,15 +57,37 @@ SAID = {
     ),
     "nothing under a disturbance": certificate(parts=[part("saturated PD", {"damping": 0.5})]),
     "a terminal surface": certificate(
-        "duffing", "terminal", {"k": 3.0, "b": 2.0, "p": 0.75, "bound": 1.0}, [TERMINAL]
+        "duffing",
+        "terminal",
+        {
+            "k": 3.0,
+            "b": 2.0,
+            "p": 0.75,
+            "bound": 1.0,
+        },
+        [TERMINAL],
     ),
     "super-twisting": certificate(
         "van_der_pol",
         "super_twisting",
-        {"k1": 3.0, "k2": 2.0, "c": 1.5},
+        {
+            "k1": 3.0,
+            "k2": 2.0,
+            "c": 1.5,
+        },
         disturbance=0.5,
         slope=1.75,
-        parts=[part("super-twisting", {"integral": 0.25, "slope": 0.1, "actuator": 0.2}, X=0.3)],
+        parts=[
+            part(
+                "super-twisting",
+                {
+                    "integral": 0.25,
+                    "slope": 0.1,
+                    "actuator": 0.2,
+                },
+                X=0.3,
+            )
+        ],
     ),
 }
 
@@ -74,7 +116,9 @@ FACTS = {
 def test_a_certificate_says_what_its_theorems_say(name):
     made, (*facts, proven, ranges) = SAID[name], FACTS[name]
     assert [made.theorem, made.holds, made.stable, made.bound, made.surface] == facts
-    told = [sentence.startswith("proven by") for sentence in made.sentences]
+    told = []
+    for sentence in made.sentences:
+        told.append(sentence.startswith("proven by"))
     assert told[: len(proven)] == proven
     assert [value for _, _, value, _ in made.ranges] == pytest.approx(ranges, abs=1e-3)
     assert ("nothing is proven under |d| <= 2 N" in made.sentences) == name.startswith("nothing")

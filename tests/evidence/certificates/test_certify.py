@@ -27,8 +27,16 @@ from smc_mujoco.evidence.certificates import checker, loops, maker
 KEPT = {
     ("van_der_pol", "observer_free"): {"lam": 6.0, "k1": 1.992},
     ("inverted_pendulum", "classical"): {"k": 1.523, "c": 15.36},
-    ("duffing", "terminal"): {"k": 1.848, "b": 2.288, "bound": 0.02173},
-    ("inverted_pendulum", "super_twisting"): {"k1": 2.025, "k2": 8.678, "c": 9.658},
+    ("duffing", "terminal"): {
+        "k": 1.848,
+        "b": 2.288,
+        "bound": 0.02173,
+    },
+    ("inverted_pendulum", "super_twisting"): {
+        "k1": 2.025,
+        "k2": 8.678,
+        "c": 9.658,
+    },
 }
 
 
@@ -113,7 +121,10 @@ def test_hanging_pendulums_need_more_than_their_weight_to_be_stable_from_everywh
     """Not every lam > 0 does: with less than the weight they rest a turn away, too."""
     plant = smc.plant("pendulum_network")
     weight = math.prod(plant.parameters[name] for name in ("m", "grav", "l"))
-    for lam, stable in ((0.9 * weight, False), (1.1 * weight, True)):
+    for lam, stable in (
+        (0.9 * weight, False),
+        (1.1 * weight, True),
+    ):
         made = smc.audits.certify(
             smc.Scenario(plant=plant, law=smc.law("observer_free", lam=lam, k1=5.0))
         )
@@ -126,7 +137,12 @@ def test_the_equations_of_maker_and_checker_are_those_of_the_plant(plant):
     made = smc.plant(plant)
     rng = np.random.default_rng(1)
     e = checker.equation(
-        {"name": plant, "n": made.n, "parameters": dict(made.parameters), "mechanism": "equation"}
+        {
+            "name": plant,
+            "n": made.n,
+            "parameters": dict(made.parameters),
+            "mechanism": "equation",
+        }
     )
     M, A, B, C, E, F = loops.ONE_JOINT_TERMS[plant](made.values({}))
     for x, v in rng.uniform(-3.0, 3.0, (20, 2)):
@@ -201,7 +217,10 @@ def test_the_bound_is_that_of_the_inner_level_to_its_last_digit():
 
 
 def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
-    for slope, why in ((None, "bound of d'"), (9.0, "no quadratic form")):
+    for slope, why in (
+        (None, "bound of d'"),
+        (9.0, "no quadratic form"),
+    ):
         with pytest.raises(smc.ScenarioError, match=why):
             certificate("inverted_pendulum", "super_twisting", 0.5, slope)
     made = certificate("inverted_pendulum", "super_twisting", 0.5, 1.0)
@@ -356,7 +375,11 @@ def scaled(data, factor):
 
 @pytest.mark.parametrize("wrong", [math.inf, -math.inf, math.nan, 10**400, True, "1.0"])
 @pytest.mark.parametrize(
-    ("plant", "law"), [("duffing", "observer_free"), ("duffing", "super_twisting")]
+    ("plant", "law"),
+    [
+        ("duffing", "observer_free"),
+        ("duffing", "super_twisting"),
+    ],
 )
 def test_the_checker_refuses_what_is_no_finite_number_wherever_it_stands(plant, law, wrong):
     whole = copy.deepcopy(certificate(plant, law, disturbance=0.1, slope=0.1).data)
@@ -522,7 +545,11 @@ def test_the_checker_stands_alone(tmp_path):
     file = made.save(tmp_path / "duffing.json")
     assert Certificate.load(file).data == made.data
     run = functools.partial(
-        subprocess.run, capture_output=True, text=True, check=False, cwd=tmp_path
+        subprocess.run,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
     )
     done = run([sys.executable, "-I", "apart.py", "duffing.json"])
     assert done.returncode == 0
@@ -537,7 +564,13 @@ def test_the_checker_stands_alone(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("plant", "d0"), [("duffing", 2.0), ("inverted_pendulum", 1.0)])
+@pytest.mark.parametrize(
+    ("plant", "d0"),
+    [
+        ("duffing", 2.0),
+        ("inverted_pendulum", 1.0),
+    ],
+)
 def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d0):
     """The worst found by the adversary, on the machine that MuJoCo samples."""
     made = certificate(plant, disturbance=d0)
@@ -579,11 +612,27 @@ def test_without_damping_no_bound_holds_from_everywhere():
 
 GAINS = {  # law -> the ends of its random gains
     "observer_free": {"lam": (5.5, 30.0), "k1": (0.5, 8.0)},
-    "boundary_layer": {"k": (5.5, 30.0), "c": (0.5, 8.0), "phi": (0.05, 2.0)},
-    "lqr": {"q1": (1.0, 500.0), "q2": (0.1, 50.0), "r": (0.1, 2.0)},
+    "boundary_layer": {
+        "k": (5.5, 30.0),
+        "c": (0.5, 8.0),
+        "phi": (0.05, 2.0),
+    },
+    "lqr": {
+        "q1": (1.0, 500.0),
+        "q2": (0.1, 50.0),
+        "r": (0.1, 2.0),
+    },
     "classical": {"k": (2.0, 30.0), "c": (0.5, 8.0)},
-    "terminal": {"k": (1.0, 5.0), "b": (0.5, 2.0), "bound": (0.02, 0.9)},
-    "super_twisting": {"k1": (3.0, 9.0), "k2": (4.0, 20.0), "c": (0.5, 3.0)},
+    "terminal": {
+        "k": (1.0, 5.0),
+        "b": (0.5, 2.0),
+        "bound": (0.02, 0.9),
+    },
+    "super_twisting": {
+        "k1": (3.0, 9.0),
+        "k2": (4.0, 20.0),
+        "c": (0.5, 3.0),
+    },
 }
 
 
@@ -625,7 +674,12 @@ def test_no_run_contradicts_a_certificate(law):
         for name, (low, high) in GAINS[law].items():
             gains[name] = round(float(low * (high / low) ** rng.random()), 3)
         d0 = round(float(rng.uniform(0.01, 0.5)), 3)
-        one = smc.Scenario(plant=plant, law=smc.law(law, **gains), duration=40.0, x0=0.05)
+        one = smc.Scenario(
+            plant=plant,
+            law=smc.law(law, **gains),
+            duration=40.0,
+            x0=0.05,
+        )
         try:
             made = smc.audits.certify(one, smc.Uncertainty(disturbance=d0, slope=3.0 * d0))
         except smc.ScenarioError:  # the gains are too small
@@ -646,7 +700,10 @@ def test_an_unknown_gain_of_the_input_needs_only_its_share_of_the_force():
     made = certificate("inverted_pendulum")
     loop, _, _ = loops.loop_of(made.data)
     share = 1.0 - margins(made)["restoring"]
-    for low, rests in ((1.02 * share, True), (0.9 * share, False)):
+    for low, rests in (
+        (1.02 * share, True),
+        (0.9 * share, False),
+    ):
         weak = dataclasses.replace(loop, sigma=lambda s, low=low: low * loop.sigma(s))
         x = np.array([1.5, 0.8, 3.0])
         v = np.zeros(3)

@@ -16,9 +16,20 @@ from smc_mujoco.evidence.certificates.checker import arb
 
 LAWS = {
     "observer_free": {"lam": 2.3, "k1": 1.7},
-    "boundary_layer": {"k": 2.3, "c": 1.7, "phi": 0.4},
+    "boundary_layer": {
+        "k": 2.3,
+        "c": 1.7,
+        "phi": 0.4,
+    },
     "classical": {"k": 2.3, "c": 1.7},
-    "lqr": {"a1": 0.7, "a2": -0.3, "b": 1.9, "q1": 12.0, "q2": 1.3, "r": 0.6},
+    "lqr": {
+        "a1": 0.7,
+        "a2": -0.3,
+        "b": 1.9,
+        "q1": 12.0,
+        "q2": 1.3,
+        "r": 0.6,
+    },
 }
 
 
@@ -69,7 +80,19 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
     B = 0.3
     C = -0.2
     e, feeds = (
-        Space(**vars(plant(A=A, B=B, C=cubic, E=0.9, kc=0.5)) | {"n": 2}) for cubic in (C, -C)
+        Space(
+            **vars(
+                plant(
+                    A=A,
+                    B=B,
+                    C=cubic,
+                    E=0.9,
+                    kc=0.5,
+                )
+            )
+            | {"n": 2}
+        )
+        for cubic in (C, -C)
     )
     f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)
     V = {
@@ -87,7 +110,12 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
         "margin": 1.0 - (A * math.sin(9.0) + 9.0 * B - 729.0 * C) / (2.3 * math.tanh(15.3)),
         "at": 9.0,
     }
-    expected = {"damping": 0.9, "restoring": None, "actuator": 1.7, "local": 2.3 * 1.7 - A - B}
+    expected = {
+        "damping": 0.9,
+        "restoring": None,
+        "actuator": 1.7,
+        "local": 2.3 * 1.7 - A - B,
+    }
 
     def margins(told, e=e, mechanism="equation", **changes):
         data = {"V": V | changes, "conditions": [None, told]}
@@ -115,7 +143,16 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
 
 @pytest.mark.parametrize(
     "terms",
-    [{"A": 0.8}, {"B": -0.7, "E": 0.3}, {"C": -0.9, "F": -0.4}, {"C": 0.5, "E": 2.9, "F": 0.8}],
+    [
+        {"A": 0.8},
+        {"B": -0.7, "E": 0.3},
+        {"C": -0.9, "F": -0.4},
+        {
+            "C": 0.5,
+            "E": 2.9,
+            "F": 0.8,
+        },
+    ],
 )
 def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
     e = plant(**terms)
@@ -146,10 +183,19 @@ def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
 
 
 def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_strong_as_the_law():
-    terms = {"B": -0.3, "E": 0.4, "F": 0.2}
+    terms = {
+        "B": -0.3,
+        "E": 0.4,
+        "F": 0.2,
+    }
     e = plant(**terms)
     made = loop("classical", terms)
-    gains = {"k": 2.3, "b": 0.9, "p": 0.7, "bound": 0.55}
+    gains = {
+        "k": 2.3,
+        "b": 0.9,
+        "p": 0.7,
+        "bound": 0.55,
+    }
     f = checker.feedback({"name": "terminal", "gains": gains}, 4.0)
     doc = {"disturbance": 0.2, "law": {"name": "terminal"}}
 
@@ -191,7 +237,11 @@ def test_margins_of_super_twisting_are_those_of_its_form():
     p = 4.5
     w = -1.0
     r = 0.97
-    gains = {"k1": 3.0, "k2": 2.6, "c": c}
+    gains = {
+        "k1": 3.0,
+        "k2": 2.6,
+        "c": c,
+    }
     f = checker.feedback({"name": "super_twisting", "gains": gains}, 4.0)
     det = p * r - w * w
     z1 = math.sqrt(q * r / det)
@@ -209,9 +259,23 @@ def test_margins_of_super_twisting_are_those_of_its_form():
         "slope": L - fastest - slope,
         "actuator": 4.0 - held - 3.0 * z1,
     }
-    doc = {"disturbance": d0, "slope": slope, "u_max": 4.0}
-    part = {"P": [p, w, r], "L": L, "q": q, "X": X}
-    e = plant(B=B, C=C, E=E, F=F)
+    doc = {
+        "disturbance": d0,
+        "slope": slope,
+        "u_max": 4.0,
+    }
+    part = {
+        "P": [p, w, r],
+        "L": L,
+        "q": q,
+        "X": X,
+    }
+    e = plant(
+        B=B,
+        C=C,
+        E=E,
+        F=F,
+    )
     margins = checker.super_twisting(doc, part, e, f)
     assert {name: float(value) for name, (value, _) in margins.items()} == pytest.approx(expected)
     clamped = checker.feedback({"name": "super_twisting", "gains": gains | {"w_max": 1.9}}, 4.0)
@@ -238,7 +302,13 @@ def test_margins_of_super_twisting_are_those_of_its_form():
 
 @pytest.mark.parametrize("law", ["observer_free", "boundary_layer", "classical"])
 def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(law):
-    terms = {"A": 0.4, "B": -0.3, "C": -0.2, "E": 0.6, "F": 0.3}
+    terms = {
+        "A": 0.4,
+        "B": -0.3,
+        "C": -0.2,
+        "E": 0.6,
+        "F": 0.3,
+    }
     d0 = 0.25
     e = plant(**terms)
     made = loop(law, terms, d0)
@@ -261,7 +331,9 @@ def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(l
         w00, w10, w01, w11 = corners
         Wx = ((1 - b) * (w10 - w00) + b * (w11 - w01)) / np.diff(x)
         Ws = ((1 - a) * (w01 - w00) + a * (w11 - w10)) / 0.1
-        rates = [Wx * (S - 1.7 * X) + Ws * made.fall(X, S, d) for d in (-d0, d0)]
+        rates = []
+        for d in (-d0, d0):
+            rates.append(Wx * (S - 1.7 * X) + Ws * made.fall(X, S, d))
         worst = np.maximum(*rates)
         assert least[0, 0] == pytest.approx(worst.min())
         assert most[0, 0] == pytest.approx(worst.max())
@@ -273,7 +345,13 @@ def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(l
 
 
 def test_a_form_attracts_where_it_falls_on_a_dense_grid():
-    terms = {"A": 0.7, "B": 0.2, "C": -0.3, "E": -0.4, "F": 0.5}
+    terms = {
+        "A": 0.7,
+        "B": 0.2,
+        "C": -0.3,
+        "E": -0.4,
+        "F": 0.5,
+    }
     e = plant(**terms)
     made = loop("observer_free", terms)
     f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)

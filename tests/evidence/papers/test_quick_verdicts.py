@@ -54,7 +54,10 @@ def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record
         found = audit(name, only, GAINS.get(name), quick=True)
     for id, sets in found.used.items():
         check_runs(name, id, [one.scenario for used in sets.values() for one in used.values()])
-    kept = [one for one in found.claims if (name, one.id) not in TIMINGS]
+    kept = []
+    for one in found.claims:
+        if (name, one.id) not in TIMINGS:
+            kept.append(one)
     return {one.id: record(one, paper(name).claims[one.id].late) for one in kept}
 
 
@@ -74,7 +77,11 @@ def record(claim: Claim, late: bool) -> Record:
         numbers |= {
             f"{gains}: {what}": value for what, value in claim.beside[gains].items() if not late
         }
-    return {"whose": claim.whose, "verdict": claim.verdict, "numbers": numbers}
+    return {
+        "whose": claim.whose,
+        "verdict": claim.verdict,
+        "numbers": numbers,
+    }
 
 
 def agrees(value: float, known: float | list[float]) -> bool:

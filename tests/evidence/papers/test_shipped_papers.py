@@ -94,8 +94,18 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
 
     from smc_mujoco.control.law import law
 
-    for k1, k2, a, b in ((2.0, 2.0, 0.5, 1.5), (1.0, 2.0, 0.5, 2.0), (3.0, 1.0, 0.3, 1.5)):
-        made = law("fixed_time", k1=k1, k2=k2, a=a, b=b)
+    for k1, k2, a, b in (
+        (2.0, 2.0, 0.5, 1.5),
+        (1.0, 2.0, 0.5, 2.0),
+        (3.0, 1.0, 0.3, 1.5),
+    ):
+        made = law(
+            "fixed_time",
+            k1=k1,
+            k2=k2,
+            a=a,
+            b=b,
+        )
         integral, _ = quad(  # over s = e^z
             lambda z, k1=k1, k2=k2, a=a, b=b: (
                 1.0 / (k1 * math.exp((a - 1.0) * z) + k2 * math.exp((b - 1.0) * z))
@@ -107,7 +117,13 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
         assert least_bound(made) == pytest.approx(integral, rel=1e-6)
         assert classical_bound(made) > integral
     # at the end of what the general formula is for
-    without = {"A": 1.0, "B": 1.0, "p": 0.5, "q": 2.0, "k": 0.5}
+    without = {
+        "A": 1.0,
+        "B": 1.0,
+        "p": 0.5,
+        "q": 2.0,
+        "k": 0.5,
+    }
     assert general_margins(without) == {"k p < 1": 0.75, "k q > 1": 0.0}
 
 
@@ -140,16 +156,31 @@ def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
 
 # laws
 
-FREE = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a mass of 1 kg
+FREE = {
+    "alpha": 0.0,
+    "beta": 0.0,
+    "delta": 0.0,
+}  # of a Duffing oscillator: a mass of 1 kg
 
 
 def test_implicit_twisting_has_both_signs_at_the_end_of_the_period():
     h = 0.05
     rng = np.random.default_rng(1)
     starts = rng.uniform((-0.2, -1.0), (0.2, 1.0), (40, 2))
-    fields = {"plant": smc.plant("duffing", **FREE), "law": implicit_twisting, "u_max": math.inf}
+    fields = {
+        "plant": smc.plant("duffing", **FREE),
+        "law": implicit_twisting,
+        "u_max": math.inf,
+    }
     runs = [
-        smc.Scenario(x0=x, v0=v, duration=h, control_period=h, physics_step=h, **fields)
+        smc.Scenario(
+            x0=x,
+            v0=v,
+            duration=h,
+            control_period=h,
+            physics_step=h,
+            **fields,
+        )
         for x, v in starts
     ]
     G, beta = (implicit_twisting.defaults[name] for name in ("G", "beta"))

@@ -83,7 +83,10 @@ class Reader(html.parser.HTMLParser):
 def check_page(text):
     """Refuse a page that needs another file, or has a link without target."""
     found = Reader(text)
-    outside = [at for at in found.targets if not at.startswith(("#", "data:"))]
+    outside = []
+    for at in found.targets:
+        if not at.startswith(("#", "data:")):
+            outside.append(at)
     assert outside == []
     assert "default-src 'none'" in text.split("<title>")[0]
     assert sorted(found.ids) == sorted(set(found.ids))
@@ -108,7 +111,10 @@ def test_a_second_call_computes_nothing(made, folder, monkeypatch):
     before = made.read_bytes()
     for name in ("audit", "accuracy"):
         monkeypatch.delattr(sections, name)
-    for module, name in ((sections.margin_search, "margins"), (sections.maps, "basin")):
+    for module, name in (
+        (sections.margin_search, "margins"),
+        (sections.maps, "basin"),
+    ):
         monkeypatch.delattr(module, name)
     monkeypatch.setattr(sections, "FILM_SIZE", (320, 180))
     monkeypatch.setattr(sections.video, "film", None)
@@ -120,7 +126,10 @@ def block(condition="nominal", plant="duffing", winner=None, **unbeaten):
     boards = []
     for metric, best in ({"settles": "a b c"} | unbeaten).items():
         its = SimpleNamespace(
-            plant=plant, condition=condition, best=best.split(), winner=winner if best else None
+            plant=plant,
+            condition=condition,
+            best=best.split(),
+            winner=winner if best else None,
         )
         boards.append(SimpleNamespace(metric=metric, blocks=[its]))
     return boards
@@ -160,7 +169,14 @@ def test_the_first_screen_names_the_laws_that_are_unbeaten_in_the_most_condition
 def test_what_comes_from_outside_is_escaped():
     evil = "<script>alert(1)</script>"
     texts = dict.fromkeys(("text", "where", "measured", "holds_if", "note", "how"), evil)
-    checks = {evil: {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True}}
+    checks = {
+        evil: {
+            "value": 1.0,
+            "relation": "<",
+            "limit": 2.0,
+            "holds": True,
+        }
+    }
     claim = Claim(
         id="1",
         **texts,
@@ -211,7 +227,10 @@ def seen(made):
 
 
 def test_the_page_has_no_error_asks_for_nothing_and_fits_a_phone(seen, made):
-    outside = [url for url in seen.asked if not url.startswith("data:")]
+    outside = []
+    for url in seen.asked:
+        if not url.startswith("data:"):
+            outside.append(url)
     assert outside == [made.as_uri()]
     assert seen.errors == []
     assert seen.page.evaluate("document.documentElement.scrollWidth") == 420
@@ -224,7 +243,9 @@ def test_claims_are_filtered_by_verdict_and_open_to_their_numbers(seen):
     for pick in tab.locator("input.only").all():
         pick.check()
         shown = tab.locator(".claim:visible")
-        verdicts = {row.get_attribute("data-verdict") for row in shown.all()}
+        verdicts = set()
+        for row in shown.all():
+            verdicts.add(row.get_attribute("data-verdict"))
         assert verdicts == {pick.get_attribute("data-of")}
     first = tab.locator(".claim:visible").first
     assert not first.locator("table").first.is_visible()

@@ -40,11 +40,19 @@ def swung():
     rig = RIG.set("model_1_1")
     trace = smc.run(
         rig.scenario(
-            "none", feedforward=smc.Sine(1.0, 6.0), duration=4.0, sensor=None, x0=(0.3, 0.2)
+            "none",
+            feedforward=smc.Sine(1.0, 6.0),
+            duration=4.0,
+            sensor=None,
+            x0=(0.3, 0.2),
         )
     )
     x, v = trace.x[:, ::-1], trace.v[:, ::-1]  # shoulder, elbow
-    record = {"time": trace.t, "tau_meas1": np.zeros(len(trace.t)), "tau_meas2": trace.u[:, 0]}
+    record = {
+        "time": trace.t,
+        "tau_meas1": np.zeros(len(trace.t)),
+        "tau_meas2": trace.u[:, 0],
+    }
     for i in range(2):
         record |= {f"pos_meas{i + 1}": x[:, i], f"vel_meas{i + 1}": v[:, i]}
     return rig, record
@@ -71,7 +79,11 @@ def test_noise_of_the_encoders_does_not_make_a_link_lighter(swung):
 
 def test_the_published_dry_friction_is_what_its_arctangent_reaches():
     reached = np.arctan(100.0 * 20.0)  # at 20 rad/s
-    published = {"1_0": (0.16, 0.12), "2_0": (0.1747, 0.11), "3_0": (0.033, 0.035)}
+    published = {
+        "1_0": (0.16, 0.12),
+        "2_0": (0.1747, 0.11),
+        "3_0": (0.033, 0.035),
+    }
     for model, frictions in published.items():
         values = RIG.set(f"model_{model}").values
         for name, cf in zip(("cf1", "cf2"), frictions, strict=True):

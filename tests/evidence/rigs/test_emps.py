@@ -42,7 +42,12 @@ def test_the_error_at_constant_speed_is_that_of_the_formula():
     q = RIG.values
     gains = RIG.scenario().law.gains
     trace = smc.run(
-        RIG.scenario(reference=PROGRAM, duration=2.4, x0=programs.START[0], v0=programs.START[1])
+        RIG.scenario(
+            reference=PROGRAM,
+            duration=2.4,
+            x0=programs.START[0],
+            v0=programs.START[1],
+        )
     )
     k = 2000
     v = trace.v[k, 0]

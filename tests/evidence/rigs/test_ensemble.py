@@ -28,8 +28,16 @@ def boards(tmp_path_factory):
 def test_every_set_is_a_condition_with_its_own_numbers():
     runs = ensemble.runs(PENDULUM, LAWS, seeds=2, duration=1.0, starts=smc.starts(0.3))
     assert len(runs) == 2 * 2 * (1 + len(PENDULUM.ensemble))
-    levels = {run.condition: run.friction[0].level for run in runs}
-    assert levels == {"set 1": 0.21, "set 2": 0.18, "set 3": 0.24, "set 4": 0.18, "set 5": 0.24}
+    levels = {}
+    for run in runs:
+        levels[run.condition] = run.friction[0].level
+    assert levels == {
+        "set 1": 0.21,
+        "set 2": 0.18,
+        "set 3": 0.24,
+        "set 4": 0.18,
+        "set 5": 0.24,
+    }
     assert {run.resolved.u_max for run in runs} == {12.0}
     assert len({run.resolved.x0 for run in runs}) == 2
 

@@ -18,7 +18,12 @@ from smc_mujoco.evidence.rigs.rig import Fall
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
-WRONG = {"mass": 80.0, "viscous": 150.0, "coulomb": 30.0, "offset": 0.0}
+WRONG = {
+    "mass": 80.0,
+    "viscous": 150.0,
+    "coulomb": 30.0,
+    "offset": 0.0,
+}
 
 
 def carriage(x, v, force, time, m, b, dry, constant):
@@ -62,7 +67,12 @@ def axis_record(seconds, begin=0.0, speed=4.0):
             x, v, AXIS.values["force_per_volt"] * u[k], 1e-3, *map(AXIS.values.get, AXIS.free)
         )
     first = round(begin / 1e-3)
-    return {"t": t[first:] - begin, "x": y[first:], "u": u[first:], "r": r[first:]}
+    return {
+        "t": t[first:] - begin,
+        "x": y[first:],
+        "u": u[first:],
+        "r": r[first:],
+    }
 
 
 @pytest.mark.parametrize(
@@ -132,7 +142,13 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
     """
     noise = smc.Noise(2e-7)
     trace = smc.run(
-        AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=8, noise=noise)
+        AXIS.scenario(
+            reference=smc.Sine(0.05, 3.0),
+            x0=0.0,
+            duration=1.0,
+            seed=8,
+            noise=noise,
+        )
     )
     result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
     for name, value in result.values.items():
@@ -172,7 +188,10 @@ def test_what_cannot_be_found_is_named(rig, names, words):
 
 
 def test_records_of_two_kinds_and_none_are_refused(moved):
-    for records_given in ([], [moved, {"t": [0]}]):
+    for records_given in (
+        [],
+        [moved, {"t": [0]}],
+    ):
         with pytest.raises(smc.ScenarioError, match="records"):
             smc.identify("emps", records_given)
 
@@ -186,7 +205,12 @@ def test_a_search_stays_within_its_ranges_to_the_last_bit():
     assert made.rig(Point(made.low, made.start.states)).values["back_emf"] == 1e-4
 
 
-CARRIAGE = {"M": 3.2, "b": 4.1, "cf": 1.7, "offset": 0.6}
+CARRIAGE = {
+    "M": 3.2,
+    "b": 4.1,
+    "cf": 1.7,
+    "offset": 0.6,
+}
 # m, of the positions of `pushed`, with their rounding to counts
 NOISE = math.hypot(1e-5, 2e-5 / math.sqrt(12.0))
 
@@ -211,7 +235,11 @@ def pushed(seed, seconds=1.5):
     )
     u = sum(size * np.sin(speed * t + phase) for size, speed, phase in sines)
     exact = positions(u, CARRIAGE.values())
-    return {"t": t, "x": 2e-5 * np.round((exact + rng.normal(0.0, 1e-5, len(t))) / 2e-5), "u": u}
+    return {
+        "t": t,
+        "x": 2e-5 * np.round((exact + rng.normal(0.0, 1e-5, len(t))) / 2e-5),
+        "u": u,
+    }
 
 
 def least_errors(u):
@@ -232,11 +260,23 @@ def least_errors(u):
     return NOISE * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))[:4]
 
 
-FAR = {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}
+FAR = {
+    "M": 95.0,
+    "b": 203.0,
+    "cf": 20.4,
+    "offset": -3.2,
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("start", "seconds"), [({}, 0.4), (FAR, 1.5)], ids=["near", "95 kg"])
+@pytest.mark.parametrize(
+    ("start", "seconds"),
+    [
+        ({}, 0.4),
+        (FAR, 1.5),
+    ],
+    ids=["near", "95 kg"],
+)
 def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """The full coverage, three machines and 20 seeds, is in benchmarks/identification.py.
 
@@ -321,10 +361,18 @@ def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
     plant = smc.plant("duffing")
     run = smc.run(
         smc.Scenario(
-            plant=plant, law="none", feedforward=smc.Sine(20.0, 3.0), u_max=30.0, duration=1.0
+            plant=plant,
+            law="none",
+            feedforward=smc.Sine(20.0, 3.0),
+            u_max=30.0,
+            duration=1.0,
         )
     )
-    record = {"t": run.t, "x": run.x[:, 0], "u": run.u[:, 0]}
+    record = {
+        "t": run.t,
+        "x": run.x[:, 0],
+        "u": run.u[:, 0],
+    }
     assert abs(record["u"]).max() > 15.0
     assert identification._of_plant(plant, None).fit(record)["x"] > 99.9
 

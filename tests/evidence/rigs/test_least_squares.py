@@ -66,7 +66,10 @@ class Curve(Replays):
 
     def rig(self, point) -> Any:
         plain = SimpleNamespace(
-            realistic=self.lag > 0.0, control_period=1e-3, input_delay=0.0, friction=()
+            realistic=self.lag > 0.0,
+            control_period=1e-3,
+            input_delay=0.0,
+            friction=(),
         )
         return SimpleNamespace(repeated=lambda part: plain)
 
@@ -96,7 +99,13 @@ def block(k, rows):
 
 
 @pytest.mark.parametrize(
-    "values", [(1.0, 1.0), (0.0, -50.0), (80.0, 0.0)], ids=["inside", "lowest", "highest"]
+    "values",
+    [
+        (1.0, 1.0),
+        (0.0, -50.0),
+        (80.0, 0.0),
+    ],
+    ids=["inside", "lowest", "highest"],
 )
 def test_slopes_are_derivatives_also_at_the_ends_of_ranges(values):
     curve = Curve(spread=100.0 * SPREAD)
@@ -225,7 +234,10 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
     random = np.random.default_rng(3)
     J = np.column_stack([np.ones(400), np.linspace(-1.0, 1.0, 400)])
     inverse_normal = np.linalg.inv(J.T @ J)
-    for memory, low, high in ((0.96, 0.7, 1.7), (0.0, 0.7, 1.3)):
+    for memory, low, high in (
+        (0.96, 0.7, 1.7),
+        (0.0, 0.7, 1.3),
+    ):
         shares = []
         blocks = []
         for _ in range(40):
@@ -267,7 +279,10 @@ def test_corrected_replays_have_steps_that_divide_the_period():
     even = smc.Scenario(plant="duffing", law="pid", control_period=0.001)
     assert replays._steps(even, 1)["physics_step"] == pytest.approx(1.25e-4)
     late = smc.Scenario(
-        plant="duffing", law="pid", input_delay=0.003, friction=smc.hardware.LuGre(0.3, 0.4, 0.01)
+        plant="duffing",
+        law="pid",
+        input_delay=0.003,
+        friction=smc.hardware.LuGre(0.3, 0.4, 0.01),
     )
     assert replays._steps(late, 1)["integrator"] == "implicitfast"
     assert replays._steps(late, 1)["physics_step"] == late.resolved.physics_step / 2
@@ -315,7 +330,11 @@ def test_a_corrected_search_ends_when_a_halving_moves_nothing():
 def test_a_record_is_cut_into_pieces_of_its_window():
     """3.3 s of which each second is one piece, with the scales of its motion."""
     t = 1e-3 * np.arange(3301)
-    record = {"t": t, "x": 0.3 * np.sin(5.0 * t), "u": np.cos(3.0 * t)}
+    record = {
+        "t": t,
+        "x": 0.3 * np.sin(5.0 * t),
+        "u": np.cos(3.0 * t),
+    }
     twin, data = identification._twin(smc.plant("servo_axis"), [record])
     made = Replays(twin, ["M", "b"], data, False, lambda count: None)
     assert [len(piece.measured["x"]) for piece in made.pieces] == [1101, 1101, 1101]

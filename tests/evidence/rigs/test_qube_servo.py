@@ -75,7 +75,13 @@ def brushes():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("parts", "read", "wrong"), [(2, 10, 1), (4, 12, 4)])
+@pytest.mark.parametrize(
+    ("parts", "read", "wrong"),
+    [
+        (2, 10, 1),
+        (4, 12, 4),
+    ],
+)
 def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_docs_tell(
     brushes, parts, read, wrong
 ):
@@ -99,10 +105,21 @@ def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_d
     assert np.sum(np.abs(off) > PITCH / 16) == wrong
 
 
-@pytest.mark.parametrize(("brush", "amplitude"), [(0.3, 0.5), (0.6, 0.8), (0.0, 0.5)])
+@pytest.mark.parametrize(
+    ("brush", "amplitude"),
+    [
+        (0.3, 0.5),
+        (0.6, 0.8),
+        (0.0, 0.5),
+    ],
+)
 def test_a_brush_is_read_from_a_run_and_is_unknown_if_the_torque_is_even(brush, amplitude):
     machine = smc.rig("qube_servo", brush=brush)
     trace = smc.run(machine.scenario(duration=20.0, reference=smc.Sine(amplitude, 3.0)))
-    measured = {"theta": trace.x[:, 0], "alpha": trace.x[:, 1], "plant_input": trace.u[:, 0]}
+    measured = {
+        "theta": trace.x[:, 0],
+        "alpha": trace.x[:, 1],
+        "plant_input": trace.u[:, 0],
+    }
     found = zero(Values(**RIG.values), measured)
     assert found == ({"brush": pytest.approx(brush, abs=np.radians(1.0))} if brush else {})

@@ -18,13 +18,26 @@ from smc_mujoco.evidence.rigs.rig import Fall
 
 pytestmark = pytest.mark.quick
 
-NAMES = Columns(x=("x", "q"), reference="r", feedforward="f", others=("rq",), offset=(0.25, -0.5))
+NAMES = Columns(
+    x=("x", "q"),
+    reference="r",
+    feedforward="f",
+    others=("rq",),
+    offset=(0.25, -0.5),
+)
 
 
 def record(t):
     """Columns at times t, all linear in time."""
     t = np.asarray(t, float)
-    return {"t": t, "x": 2.0 * t, "q": 3.0 * t, "u": 4.0 * t, "r": 5.0 * t, "strange": t}
+    return {
+        "t": t,
+        "x": 2.0 * t,
+        "q": 3.0 * t,
+        "u": 4.0 * t,
+        "r": 5.0 * t,
+        "strange": t,
+    }
 
 
 def gap(step, periods):
@@ -87,7 +100,11 @@ def test_columns_that_a_replay_needs_and_knows():
 
 def test_a_state_comes_from_a_cubic_about_it_and_at_the_start_from_the_first_sample():
     t = 0.01 * np.arange(100)
-    data = {"t": t, "x": 1.0 + 2.0 * t - 3.0 * t**2 + 4.0 * t**3, "q": np.where(t > 0.505, 9.0, t)}
+    data = {
+        "t": t,
+        "x": 1.0 + 2.0 * t - 3.0 * t**2 + 4.0 * t**3,
+        "q": np.where(t > 0.505, 9.0, t),
+    }
     for at in (0, 3, 50, 99):
         x, v = records.state(data, NAMES, 0.01, at)
         assert x[0] == pytest.approx(data["x"][at])

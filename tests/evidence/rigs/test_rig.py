@@ -41,7 +41,10 @@ def record():
     """7 s of the twin itself, whose arm follows a sine, read without rounding."""
     sensor = dataclasses.replace(QUBE.scenario().sensor, counts=math.inf)
     moving = QUBE.scenario(
-        duration=7.0, reference=smc.Sine(0.3, 1.5), sensor=sensor, x0=(0.02, 0.03)
+        duration=7.0,
+        reference=smc.Sine(0.3, 1.5),
+        sensor=sensor,
+        x0=(0.02, 0.03),
     )
     return recorded(smc.run(moving))
 
@@ -71,7 +74,9 @@ def test_a_rig_makes_scenarios_of_its_machine(name):
 
 @pytest.mark.parametrize("samples", [500, 1020])
 def test_a_record_too_short_to_read_the_brushes_is_repeated_with_an_even_torque(record, samples):
-    brief = {name: column[:samples] for name, column in record.items()}
+    brief = {}
+    for name, column in record.items():
+        brief[name] = column[:samples]
     assert QUBE.replay(brief, start=0.5).actuator[0].ripple == 0.0
 
 
@@ -197,7 +202,11 @@ def test_what_cannot_be_repeated_is_one_sentence(bad, words, record):
 
 
 def test_columns_have_the_units_of_the_machine():
-    assert QUBE.units == {"theta": "rad", "alpha": "rad", "plant_input": "V"}
+    assert QUBE.units == {
+        "theta": "rad",
+        "alpha": "rad",
+        "plant_input": "V",
+    }
     assert smc.rig("emps").units == {"x": "m", "u": "V"}
     assert smc.rig("realaigym_acrobot").units == {"tau_meas1": "N m", "tau_meas2": "N m"}
 

@@ -40,7 +40,12 @@ LAYER = {
 
 @pytest.mark.parametrize("kind", LAYER)
 def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
-    at = {"ALPHA": 0.6, "ALPHA_RATE": 2.0, "THETA": 1.0, "THETA_RATE": -3.0}
+    at = {
+        "ALPHA": 0.6,
+        "ALPHA_RATE": 2.0,
+        "THETA": 1.0,
+        "THETA_RATE": -3.0,
+    }
     h = 1e-3
 
     def of(**moved):
@@ -55,7 +60,10 @@ def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
 def test_the_linear_law_has_a_dead_band_and_the_sliding_modes_a_gate():
     assert firmware.acceleration(LINEAR, 0.49, memory(), 1.0, 0.0)[0] == 0.0
     tilted = memory(THETA=10.0)
-    for kind, gate in ((TWO_STATES, 150.0), (FOUR_STATES, 250.0)):
+    for kind, gate in (
+        (TWO_STATES, 150.0),
+        (FOUR_STATES, 250.0),
+    ):
         inside, outside = (
             firmware.acceleration(kind, 0.0, memory(THETA=10.0, ALPHA_RATE=rate), 1.0, 0.0)[0]
             - firmware.acceleration(kind, 0.0, memory(THETA=0.0, ALPHA_RATE=rate), 1.0, 0.0)[0]
@@ -97,7 +105,11 @@ def test_a_move_is_a_trapezoid_that_ends_at_its_target():
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_the_compiled_run_is_that_of_the_reference_loop(law):
-    fields = {"x0": told.start(3), "seed": 3, "duration": 2.5} | {"reference": smc.Step(0.2, 1.0)}
+    fields = {
+        "x0": told.start(3),
+        "seed": 3,
+        "duration": 2.5,
+    } | {"reference": smc.Step(0.2, 1.0)}
     one = smc.rig("stepper_furuta").scenario(law, **fields)
     trace = smc.run(one)
     assert_same(trace, reference.run(one))

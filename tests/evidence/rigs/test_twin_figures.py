@@ -71,12 +71,32 @@ def test_rows_are_those_of_the_records():
 
 
 def test_a_summary_is_over_the_known_figures_of_whole_twins():
-    common = {"rig": "emps", "record": "one", "law": "none", "unit": "m", "runs": 1}
-    kept = common | {"machine": 2.0, "low": 1.0, "high": 3.0}
+    common = {
+        "rig": "emps",
+        "record": "one",
+        "law": "none",
+        "unit": "m",
+        "runs": 1,
+    }
+    kept = common | {
+        "machine": 2.0,
+        "low": 1.0,
+        "high": 3.0,
+    }
     rows = [
-        TwinFigure(figure="a", twin=2.2, published=3.0, **kept),
+        TwinFigure(
+            figure="a",
+            twin=2.2,
+            published=3.0,
+            **kept,
+        ),
         TwinFigure(figure="b", twin=1.0, **kept | {"low": 0.5, "high": 1.5}),
-        TwinFigure(figure="b", twin=90.0, variant="without a part", **kept),
+        TwinFigure(
+            figure="b",
+            twin=90.0,
+            variant="without a part",
+            **kept,
+        ),
         TwinFigure(figure="c", twin=90.0, **kept | {"machine": math.nan}),
     ]
     half = pytest.approx(0.5)
@@ -89,7 +109,9 @@ def test_the_page_has_the_package_s_rows():
     for one in twin_figures.summaries(twin_figures.rows()):
         (cells,) = re.findall(rf"^\| `{one.rig}` \| {one.use} \| (.*) \|$", page, re.MULTILINE)
         count, apart, inside, published = cells.split("|")
-        told = [float(number) for number in re.findall(r"[\d.]+", apart)]
+        told = []
+        for number in re.findall(r"[\d.]+", apart):
+            told.append(float(number))
         assert told == pytest.approx([100.0 * one.median, 100.0 * one.largest], abs=0.5)
         assert int(count) == one.count
         assert int(inside) == one.inside
@@ -116,7 +138,14 @@ def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
     assert plain.ordered == 0
 
 
-@pytest.mark.parametrize(("twin", "mark"), [(math.inf, ">"), (0.1, "<"), (2.0, "D")])
+@pytest.mark.parametrize(
+    ("twin", "mark"),
+    [
+        (math.inf, ">"),
+        (0.1, "<"),
+        (2.0, "D"),
+    ],
+)
 def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, mark):
     ax = Figure().subplots()
     one = dataclasses.replace(row("emps", "program of 24.8 s", "rms error"), machine=1.0, twin=twin)

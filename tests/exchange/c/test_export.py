@@ -31,7 +31,11 @@ LAWS = catalogue()
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
 PLANTS = ("inverted_pendulum", "duffing", "pendulum_network")
 # What scenarios are like: without the model, with it, and with a surface, where the law takes one.
-WAYS = ({}, {"model": "nominal"}, {"model": "nominal", "surface": "linear"})
+WAYS = (
+    {},
+    {"model": "nominal"},
+    {"model": "nominal", "surface": "linear"},
+)
 FIELDS = ("x", "v", "u", "applied", "s")
 OF_PLANT = {
     "a1": 0.5,
@@ -84,7 +88,10 @@ def traces(compiled):
                 plant = template.plants[0]
             else:
                 plant = next(given)
-            known = {gain: OF_PLANT[its.plant] for gain, its in template.gains.items() if its.plant}
+            known = {}
+            for gain, its in template.gains.items():
+                if its.plant:
+                    known[gain] = OF_PLANT[its.plant]
             pairs[name, way] = [
                 scenario(law, plant, **more) for law in (template(**known), compiled[name](**known))
             ]
@@ -222,7 +229,9 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
     text = smc.exchange.law_to_c("observer_free", "q15")
     core = text[text.index("static const int16_t TABLE") : text.index("/* From here on")]
     assert re.search(r"double|float|smc_real|math", core) is None
-    words = {name: int(value) for name, value in re.findall(r"Q15_(\w+) = (-?\d+)", text)}
+    words = {}
+    for name, value in re.findall(r"Q15_(\w+) = (-?\d+)", text):
+        words[name] = int(value)
     assert words == {
         "ON_E": 2560,
         "ON_DE": 2048,
@@ -249,7 +258,14 @@ QUARTERS = (1, 2, 3)
 NOUGHT = -0.0
 
 
-@smc.law_function(gains={"k": 2.0, "out": 3.0, "if_": 1.5}, memory=4)
+@smc.law_function(
+    gains={
+        "k": 2.0,
+        "out": 3.0,
+        "if_": 1.5,
+    },
+    memory=4,
+)
 def turns(z, K, state):
     """Every turn of Python that there is: */ and /* too."""
     a = z.e

@@ -69,7 +69,15 @@ def neighbours(a, order):
     return w
 
 
-@smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0, "all": Gain(0.5, shared=True)}, memory=3)
+@smc.law_function(
+    joint=True,
+    gains={
+        "k": 20.0,
+        "c": 5.0,
+        "all": Gain(0.5, shared=True),
+    },
+    memory=3,
+)
 def turns(y, gains, memory):
     """Every turn of Python with arrays that there is."""
     n = len(y.x)
@@ -246,7 +254,11 @@ def scenario(law, plant=None, **fields) -> smc.Scenario:
 
 WAYS = {
     "arm": {"x0": (0.1, -0.3, 0.2), "model": "nominal"},
-    "arm without model": {"model": "none", "velocity": "levant", "v0": (0.1, 0.2, -0.3)},
+    "arm without model": {
+        "model": "none",
+        "velocity": "levant",
+        "v0": (0.1, 0.2, -0.3),
+    },
     "volts": {
         "plant": smc.plant("inverted_pendulum_network", n=3),
         "actuator": smc.DCMotor(command="voltage", gear=50.0, voltage=1e3),
@@ -356,13 +368,22 @@ def edges(y, gains, memory):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "x",
-    [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)],
+    [
+        (0.0, -0.0, 0.0),
+        (-0.0, 0.0, -0.0),
+        (math.nan, 1.0, math.nan),
+        (1.0, math.nan, -math.inf),
+    ],
 )
 def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
     (path := folder / "edges.c").write_text(smc.exchange.law_to_c(edges, joints=3))
     c = smc.exchange.law_from_c(path, flags=STRICT).function
     zero = np.zeros(3)
-    for v in ((0.0, 0.0, 0.0), (-0.0, -0.0, 1.0), (2.0, math.nan, math.nan)):
+    for v in (
+        (0.0, 0.0, 0.0),
+        (-0.0, -0.0, 1.0),
+        (2.0, math.nan, math.nan),
+    ):
         x_ = np.array(x)
         v_ = np.array(v)
         y = JointMeasurement(0.0, 1e-3, 0.0, Nothing(), x_, v_, *[zero] * 7, np.eye(3), zero, zero)

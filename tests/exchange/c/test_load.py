@@ -87,7 +87,11 @@ def shared(source: Path, target: Path, *flags: str) -> Path:
 
 
 def scenario(law: object, plant: str = "duffing", **more: object) -> smc.Scenario:
-    common = {"duration": 0.3, "noise": smc.Noise(0.01, 0.05), "disturbance": smc.Sine(0.5, 7.0)}
+    common = {
+        "duration": 0.3,
+        "noise": smc.Noise(0.01, 0.05),
+        "disturbance": smc.Sine(0.5, 7.0),
+    }
     return smc.Scenario(plant=plant, law=law, **common | more)
 
 
@@ -127,7 +131,8 @@ def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
         smc.run(sweep, threads=1),
         smc.run(sweep, threads=2),
     )  # a PlainLoopWarning would be an error
-    assert all(same(a, b) for a, b in zip(one, two, strict=True))
+    for a, b in zip(one, two, strict=True):
+        assert same(a, b)
 
 
 def test_every_number_of_the_measurement_is_where_the_header_says(file):
@@ -160,7 +165,12 @@ def test_every_number_of_the_measurement_is_where_the_header_says(file):
             + 20.0 * y.gq
         ), y.limit
 
-    more = {"model": "nominal", "surface": "linear", "reference": smc.Sine(0.1, 3.0), "u_max": 1e9}
+    more = {
+        "model": "nominal",
+        "surface": "linear",
+        "reference": smc.Sine(0.1, 3.0),
+        "u_max": 1e9,
+    }
     mine = smc.exchange.law_from_c(
         file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",)
     )
@@ -211,9 +221,9 @@ def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
         copy.deepcopy(first),
         scenario(smc.exchange.law_from_c(path)(lam=4.0)),
     ]
-    assert all(
-        each == first and hash(each.law.function) == hash(first.law.function) for each in copies
-    )
+    for each in copies:
+        assert each == first
+        assert hash(each.law.function) == hash(first.law.function)
     wider = smc.exchange.law_from_c(path, memory=20)
     renamed = smc.exchange.law_from_c(path, name="other")
     edited = smc.exchange.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
@@ -337,7 +347,9 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     )
     with ThreadPoolExecutor(2) as pool:  # each waits for its time limit
         files = file(waits, "waits.c"), file(starts, "starts.c")
-        tries = [pool.submit(smc.exchange.law_from_c, path, timeout=3.0) for path in files]
+        tries = []
+        for path in files:
+            tries.append(pool.submit(smc.exchange.law_from_c, path, timeout=3.0))
         for tried, words in zip(
             tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True
         ):

@@ -28,8 +28,15 @@ pytestmark = [
 FMI1 = (
     'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
 )
-VARIABLES = {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
-RENAMED = {"variables": VARIABLES, "constants": {"mode": 0.0}}
+VARIABLES = {
+    "x": "Plant.Theta",
+    "v": "omega",
+    "r": "setpoint",
+}
+RENAMED = {
+    "variables": VARIABLES,
+    "constants": {"mode": 0.0},
+}
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +85,11 @@ def test_samples_that_are_late_or_missed_are_steps_that_follow_each_other(folder
     """The law's state waits for a missed sample, and an FMU of a longer period for the first sample
     that is due.
     """
-    clock = {"clock": smc.Clock(jitter=5e-4, missed=0.3), "physics_step": 1e-4, "seed": 4}
+    clock = {
+        "clock": smc.Clock(jitter=5e-4, missed=0.3),
+        "physics_step": 1e-4,
+        "seed": 4,
+    }
     ours = scenario("super_twisting", **clock)
     theirs = smc.exchange.law_from_fmu(
         smc.exchange.law_to_fmu(ours, folder / "late.fmu"), isolate=False
@@ -102,7 +113,11 @@ def test_gains_are_the_fmu_s_parameters(folder):
         smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0
     )
     template = smc.exchange.law_from_fmu(path, isolate=False)
-    assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
+    assert template.defaults == {
+        "u_max": 5.0,
+        "law_lam": 4.0,
+        "law_k1": 2.0,
+    }
     with pytest.raises(smc.ScenarioError, match="law_lam"):
         template(law_lam=-1.0)
     with pytest.raises(smc.ScenarioError, match="unknown gain of gains 'lam'"):
@@ -169,8 +184,13 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED)
     function = law.function
     assert isinstance(function, load.FmuLaw)
-    assert dict(function.inputs) == {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
-    assert (function.outputs, function.period) == (("torque",), 0.01)
+    assert dict(function.inputs) == {
+        "x": "Plant.Theta",
+        "v": "omega",
+        "r": "setpoint",
+    }
+    assert function.outputs == ("torque",)
+    assert function.period == 0.01
     trace, slower = smc.run(
         [
             scenario(law(), noise=None, u_max=100.0),
@@ -186,7 +206,14 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
 def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
     trace = smc.run(
-        scenario(law, noise=None, u_max=100.0, control_period=0.02, physics_step=1e-3, duration=0.2)
+        scenario(
+            law,
+            noise=None,
+            u_max=100.0,
+            control_period=0.02,
+            physics_step=1e-3,
+            duration=0.2,
+        )
     )
     u = []
     total = 0.0
@@ -201,7 +228,11 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
 def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
     path = helper.fmi3(folder)
-    names = {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
+    names = {
+        "x": "sensor.phi",
+        "v": "sensor.omega",
+        "u": "motor.torque",
+    }
     with pytest.raises(smc.ScenarioError, match="mean nothing that a law measures, enable, mode"):
         smc.exchange.law_from_fmu(path, variables=names)
     laws = []

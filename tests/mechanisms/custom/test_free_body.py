@@ -149,7 +149,12 @@ def test_a_tumbling_body_keeps_its_angular_momentum_and_energy_and_falls_on_a_pa
     )
     trace = smc.run(
         smc.Scenario(
-            plant=body, law=nothing, duration=5.0, integrator="RK4", physics_step=1e-3, **start
+            plant=body,
+            law=nothing,
+            duration=5.0,
+            integrator="RK4",
+            physics_step=1e-3,
+            **start,
         )
     )
     inertia = np.diag([16.8e-6, 20e-6, 29.8e-6])
@@ -212,14 +217,23 @@ def test_rotation_vectors_and_quaternions_are_those_of_scipy():
         r = turn.as_rotvec()
         dr = random.normal(size=3)
         h = 1e-6
-        ends = [Rotation.from_rotvec(r + sign * h * dr) for sign in (-0.5, 0.5)]
+        ends = []
+        for sign in (-0.5, 0.5):
+            ends.append(Rotation.from_rotvec(r + sign * h * dr))
         np.testing.assert_allclose(
             rotation.rate(*r, *dr), (ends[0].inv() * ends[1]).as_rotvec() / h, atol=1e-8
         )
 
 
 @pytest.mark.parametrize(
-    "F", [(0.1, -0.2, 0.3), (0.0, 0.0, -1.0), (0.5, 0.1, -0.2), (1.0, 0.0, 0.0), (-0.3, 0.9, -2.0)]
+    "F",
+    [
+        (0.1, -0.2, 0.3),
+        (0.0, 0.0, -1.0),
+        (0.5, 0.1, -0.2),
+        (1.0, 0.0, 0.0),
+        (-0.3, 0.9, -2.0),
+    ],
 )
 def test_the_wanted_attitude_has_its_third_axis_along_the_thrust(F):
     turn = Rotation.from_quat(
@@ -354,10 +368,15 @@ def test_a_floating_base_goes_to_a_pose_under_a_law_of_arms():
         channels=["floats"],
         name="base",
     )
-    goal = [smc.Constant(value) for value in (0.3, -0.2, 0.1, 0.4, -0.3, 0.8)]
+    goal = []
+    for value in (0.3, -0.2, 0.1, 0.4, -0.3, 0.8):
+        goal.append(smc.Constant(value))
     trace = smc.run(
         smc.Scenario(
-            plant=plant, law="super_twisting_computed_torque", reference=goal, duration=8.0
+            plant=plant,
+            law="super_twisting_computed_torque",
+            reference=goal,
+            duration=8.0,
         )
     )
     assert trace.failure is None
@@ -420,7 +439,10 @@ def test_scores_are_of_the_position_the_heading_and_the_actuators(drone):
     assert found["itae"] == pytest.approx(np.trapezoid(t * np.abs(e[:, :3]).sum(axis=1), t))
     assert found["tv"] == pytest.approx(np.abs(np.diff(trace.applied, axis=0)).sum(axis=0).max())
     last = []
-    for part, size in ((e[:, :3], 0.2), (e[:, 5:], 0.3)):
+    for part, size in (
+        (e[:, :3], 0.2),
+        (e[:, 5:], 0.3),
+    ):
         last.append(t[np.flatnonzero(np.abs(part).max(axis=1) > 0.02 * size)[-1] + 1])
     assert found["settling_time"] == pytest.approx(max(last))
     pushed = smc.run(
@@ -453,5 +475,6 @@ def test_the_objective_of_a_free_body_is_that_of_its_traces(drone):
                 np.trapezoid(trace.t * np.abs(part).sum(axis=1), trace.t) / np.abs(part[0]).sum()
             )
         variation += np.max(np.abs(np.diff(trace.u, axis=0)).sum(axis=0) / drone.limits) / 0.4
-    assert (made.tracking, made.variation) == (pytest.approx(tracking), pytest.approx(variation))
+    assert made.tracking == pytest.approx(tracking)
+    assert made.variation == pytest.approx(variation)
     assert made.objective == goal.evaluation(cases[0], traces).objective

@@ -19,7 +19,9 @@ def jaco():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a display that is not there
         kinova = pytest.importorskip("dm_control.entities.manipulators.kinova")
-    joints = {f"joint_{i}": smc.Channel(motor=True, x0=x) for i, x in enumerate(START, start=1)}
+    joints = {}
+    for i, x in enumerate(START, start=1):
+        joints[f"joint_{i}"] = smc.Channel(motor=True, x0=x)
     return smc.plant_from(
         kinova.JacoArm().mjcf_model,
         channels=joints,
@@ -29,7 +31,9 @@ def jaco():
 
 def moving(jaco, law, **fields):
     """A scenario in which every joint goes 0.3 rad forth and 0.5 back."""
-    moves = [smc.signals.Waypoints((0.0, 1.5, 3.0), (x, x + 0.3, x - 0.2)) for x in START]
+    moves = []
+    for x in START:
+        moves.append(smc.signals.Waypoints((0.0, 1.5, 3.0), (x, x + 0.3, x - 0.2)))
     common = {
         "model": "nominal",
         "u_max": LIMITS,

@@ -125,7 +125,11 @@ FOREIGN = {
     "reacher": reacher,
 }
 # of each motor of the file
-CTRL = {"cartpole": 0.3, "acrobot": 0.4, "reacher": 0.002}
+CTRL = {
+    "cartpole": 0.3,
+    "acrobot": 0.4,
+    "reacher": 0.002,
+}
 
 
 @pytest.mark.slow
@@ -261,7 +265,11 @@ PUSHED = {
 
 
 @pytest.mark.parametrize(
-    ("channels", "fields"), [(("shoulder", "elbow"), PUSHED), (("elbow", "shoulder"), {})]
+    ("channels", "fields"),
+    [
+        (("shoulder", "elbow"), PUSHED),
+        (("elbow", "shoulder"), {}),
+    ],
 )
 def test_the_plain_loop_gives_the_same_bits(arm, channels, fields):
     """Also where channels have another order than the joints in the file."""
@@ -314,16 +322,24 @@ def test_threads_change_nothing(arm):
 def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
     plant = arm()
     base = smc.Scenario(
-        plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1)
+        plant=plant,
+        law=TORQUE,
+        model="nominal",
+        duration=0.05,
+        u_max=20.0,
+        x0=(0.3, 0.1),
     )
-    many = [
-        dataclasses.replace(
-            base,
-            x0=(0.1 * i, 0.2),
-            v0=0.5,
+    many = []
+    for i in range(7):
+        many.append(
+            (
+                dataclasses.replace(
+                    base,
+                    x0=(0.1 * i, 0.2),
+                    v0=0.5,
+                )
+            )
         )
-        for i in range(7)
-    ]
     first = smc.run(base)
     _ = smc.run(many)
     _ = smc.run(many)
@@ -609,7 +625,9 @@ def test_files_that_others_name_in_folders_of_their_own_count(tmp_path):
         "attaching": {"left/j": motor},
         "including": {"j": motor},
     }
-    built = [smc.plant_from(tmp_path / f"{name}.xml", joints) for name, joints in plants.items()]
+    built = []
+    for name, joints in plants.items():
+        built.append(smc.plant_from(tmp_path / f"{name}.xml", joints))
     with (tmp_path / "sub" / "assets" / "c.obj").open("a") as mesh:
         mesh.write("\n# another")
     for plant in built:
@@ -704,7 +722,8 @@ def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
     )
     assert plant.x0 == (0.0, 0.3)
     scenario = smc.Scenario(plant=plant, law="hierarchical")
-    assert (scenario.resolved.model, scenario.resolved.u_max) == ("nominal", 10.0)
+    assert scenario.resolved.model == "nominal"
+    assert scenario.resolved.u_max == 10.0
     trace = smc.run(scenario)
     assert np.abs(trace.x[-1]).max() < 1e-5
     assert "hierarchical" in smc.laws(plant)
@@ -729,7 +748,10 @@ POLE = """
 
 def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tmp_path):
     (tmp_path / "pole.xml").write_text(POLE.format(range=""))
-    for order in (("slide", "pole"), ("pole", "slide")):
+    for order in (
+        ("slide", "pole"),
+        ("pole", "slide"),
+    ):
         assert tasks.tasks(smc.plant_from(tmp_path / "pole.xml", order)) == ["regulate", "track"]
     body = (
         '<body pos="0 {y} 0"><joint name="{name}" axis="{axis}"/>'
@@ -749,7 +771,10 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tm
     (tmp_path / "three.xml").write_text(
         f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>"
     )
-    for order in (("upright", "light", "heavy"), ("heavy", "light", "upright")):
+    for order in (
+        ("upright", "light", "heavy"),
+        ("heavy", "light", "upright"),
+    ):
         plant = smc.plant_from(
             tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True))
         )

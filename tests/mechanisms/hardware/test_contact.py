@@ -49,7 +49,10 @@ HITS = pytest.mark.parametrize(("name", "kind"), MEETS, ids=["-".join(pair) for 
 def idle(name):
     """The plant without its own forces."""
     p = catalogue()[name]
-    zero = {key: 0.0 for key in p.parameters if key not in ("m", "l", "M")}
+    zero = {}
+    for key in p.parameters:
+        if key not in ("m", "l", "M"):
+            zero[key] = 0.0
     if p.n > 1:
         return plant(name, n=2, **zero)
     return plant(name, **zero)
@@ -131,7 +134,11 @@ def test_a_block_breaks_away_at_mu_m_g(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "mechanism"), [("duffing", "springs"), ("van_der_pol", "equation")]
+    ("name", "mechanism"),
+    [
+        ("duffing", "springs"),
+        ("van_der_pol", "equation"),
+    ],
 )
 def test_a_block_lies_still_on_its_bed_from_the_start(name, mechanism):
     p = plant(name)
@@ -146,7 +153,12 @@ def test_a_block_lies_still_on_its_bed_from_the_start(name, mechanism):
 
 
 @pytest.mark.parametrize(
-    ("name", "friction"), [("duffing", 0.05), ("van_der_pol", 0.2), ("duffing", 0.5)]
+    ("name", "friction"),
+    [
+        ("duffing", 0.05),
+        ("van_der_pol", 0.2),
+        ("duffing", 0.5),
+    ],
 )
 def test_a_sliding_block_never_leaves_its_bed_and_feels_one_force(name, friction):
     model, data = built(idle(name), Contact("floor", friction=friction))
@@ -172,7 +184,12 @@ BLOWS = [
 @pytest.mark.parametrize(("name", "kind", "restitution"), BLOWS)
 def test_a_blow_keeps_the_share_of_speed_it_should(name, kind, restitution):
     place, way = MEETS[name, kind]
-    for speed, ahead in ((0.3, 0.0101), (1.0, 0.01004), (2.0, 0.01021), (3.0, 0.01037)):
+    for speed, ahead in (
+        (0.3, 0.0101),
+        (1.0, 0.01004),
+        (2.0, 0.01021),
+        (3.0, 0.01037),
+    ):
         model, data = built(idle(name), contact := Contact(kind, restitution=restitution))
         if kind == "floor" and len(data.qpos) > 1:
             write(
@@ -204,7 +221,13 @@ def test_two_bobs_part_with_their_share_of_speed(name, restitution, within):
     """Their blows are short, so that they cannot slip through each other: few steps for a strong
     dashpot.
     """
-    for speed, ahead in ((0.3, 0.01), (1.0, 0.0103), (1.0, 0.0107), (3.0, 0.0103), (3.0, 0.0107)):
+    for speed, ahead in (
+        (0.3, 0.01),
+        (1.0, 0.0103),
+        (1.0, 0.0107),
+        (3.0, 0.0103),
+        (3.0, 0.0107),
+    ):
         model, data = built(idle(name), Contact("bobs", restitution=restitution))
         data.qpos[0] = -ahead
         data.qvel[0] = speed

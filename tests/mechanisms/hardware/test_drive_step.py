@@ -53,7 +53,14 @@ def mean_risen(t, first, second):
 
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])
 @pytest.mark.parametrize(
-    ("first", "second"), [(0.02, 0.005), (0.005, 0.02), (0.01, 0.01), (1e-5, 0.01), (0.01, 1e-5)]
+    ("first", "second"),
+    [
+        (0.02, 0.005),
+        (0.005, 0.02),
+        (0.01, 0.01),
+        (1e-5, 0.01),
+        (0.01, 1e-5),
+    ],
 )
 def test_the_mean_force_of_two_lags_is_exact(first, second, step):
     """For a held u there is no error of the step: what is left is rounding, of the closed form,
@@ -195,7 +202,15 @@ def test_a_rate_limit_follows_the_lag():
     )
 
 
-@pytest.mark.parametrize(("tau", "rate"), [(1e-4, 1e3), (1e-3, 100.0), (1e-3, 2e3), (0.01, 20.0)])
+@pytest.mark.parametrize(
+    ("tau", "rate"),
+    [
+        (1e-4, 1e3),
+        (1e-3, 100.0),
+        (1e-3, 2e3),
+        (0.01, 20.0),
+    ],
+)
 def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau, rate):
     """It is exact where the force is limited, or follows the lag, all the step."""
     step = 1e-3
@@ -256,7 +271,13 @@ WEAK = smc.DCMotor(0.5, 4e-4, 0.4, 2.0, 1e-4, voltage=3.0, command="voltage")
 
 
 @pytest.mark.parametrize(
-    "actuator", [(smc.Lag(0.02), MOTOR), (MOTOR,), (WEAK,)], ids=["lag", "alone", "weak"]
+    "actuator",
+    [
+        (smc.Lag(0.02), MOTOR),
+        (MOTOR,),
+        (WEAK,),
+    ],
+    ids=["lag", "alone", "weak"],
 )
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_a_motor_moves_the_block_as_scipy_says(actuator, integrator):
@@ -276,7 +297,9 @@ def test_a_motor_moves_the_block_as_scipy_says(actuator, integrator):
     )
     traces = smc.run([dataclasses.replace(base, physics_step=step) for step in (1e-3, 2.5e-4)])
     exact = moved(base, traces[0].u)
-    errors = [np.abs(trace.x[:, 0] - exact).max() for trace in traces]
+    errors = []
+    for trace in traces:
+        errors.append(np.abs(trace.x[:, 0] - exact).max())
     assert np.ptp(exact) > 0.05
     if integrator == "RK4":
         assert errors[0] < 1e-5
@@ -299,7 +322,12 @@ def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step(
     )
     trace = smc.run(
         scenario(
-            motor, plant=free, law=asking(u=6.0 / motor.scale), x0=0.0, u_max=99.0, duration=3.0
+            motor,
+            plant=free,
+            law=asking(u=6.0 / motor.scale),
+            x0=0.0,
+            u_max=99.0,
+            duration=3.0,
         )
     )
     inertia = 1.0 + motor.gear**2 * motor.rotor_inertia

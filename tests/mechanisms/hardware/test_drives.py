@@ -184,7 +184,9 @@ def test_the_joint_is_free_within_the_play_and_driven_beyond(name):
     data = home(model)
     own = home(build(plant(name)))
     n = own.qpos.size
-    rotors = [model.joint(ROTOR + model.joint(i).name).qposadr[0] for i in range(n)]
+    rotors = []
+    for i in range(n):
+        rotors.append(model.joint(ROTOR + model.joint(i).name).qposadr[0])
     assert data.qpos[rotors] == pytest.approx(own.qpos)  # the rotor starts in the middle
     idle = build(plant(name))
     while np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.0099:
@@ -234,7 +236,9 @@ def test_play_comes_after_any_drive(name, order):
         rows = driven(model, lambda t, drive=drive: drive.scale * sine(t), 0.5, data)
         assert np.isfinite(rows).all()
         assert not data.warning.number.any()
-        rotors = [model.joint(ROTOR + model.joint(i).name).qposadr[0] for i in range(n)]
+        rotors = []
+        for i in range(n):
+            rotors.append(model.joint(ROTOR + model.joint(i).name).qposadr[0])
         assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.0105
 
 
@@ -347,7 +351,12 @@ def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
     )
     trace = smc.run(
         smc.Scenario(
-            plant=axis, law="none", integrator="RK4", physics_step=1e-3, sensor=None, **fields
+            plant=axis,
+            law="none",
+            integrator="RK4",
+            physics_step=1e-3,
+            sensor=None,
+            **fields,
         )
     )
     speed = 5.0 * motor.constant / motor.resistance / drag

@@ -257,7 +257,14 @@ def test_readings_are_held_between_periods_with_their_noise_and_losses():
     assert error.std() == pytest.approx(0.1, rel=0.15)
 
 
-@pytest.mark.parametrize(("period", "delay"), [(2.5e-3, 0.0), (5e-3, 2e-3), (5e-3, 2.5e-3)])
+@pytest.mark.parametrize(
+    ("period", "delay"),
+    [
+        (2.5e-3, 0.0),
+        (5e-3, 2e-3),
+        (5e-3, 2.5e-3),
+    ],
+)
 def test_late_noise_changes_with_the_reading(period, delay):
     """A reading taken at t arrives at t + delay with one noise, until the next arrives.
 

@@ -96,7 +96,8 @@ def test_motion_and_rest_are_those_of_an_integration_by_events(plant, law, x0, l
         disturbance=d,
         u_max=3.0,
     )
-    assert (scenario.resolved.integrator, scenario.resolved.physics_step) == ("RK4", PERIOD)
+    assert scenario.resolved.integrator == "RK4"
+    assert scenario.resolved.physics_step == PERIOD
     trace = smc.run(scenario)
 
     def force(t):

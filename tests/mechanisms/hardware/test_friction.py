@@ -18,7 +18,12 @@ RK4 = mujoco.mjtIntegrator.mjINT_RK4
 INERTIA = {"inverted_pendulum": 0.125, "duffing": 1.0}  # kg m^2, kg
 PLANTS = pytest.mark.parametrize("name", sorted(INERTIA))
 STEPS = pytest.mark.parametrize(
-    ("h", "integrator"), [(2.5e-4, IMPLICIT), (1e-3, RK4)], ids=["implicitfast", "RK4"]
+    ("h", "integrator"),
+    [
+        (2.5e-4, IMPLICIT),
+        (1e-3, RK4),
+    ],
+    ids=["implicitfast", "RK4"],
 )
 BRISTLES = pytest.mark.parametrize("h", [2.5e-4, 1e-3])
 LUGRE = LuGre(
@@ -131,7 +136,12 @@ def test_a_joint_stuck_by_lugre_stands(name, h):
 
 
 @pytest.mark.parametrize(
-    ("h", "part"), [(2.5e-4, LUGRE), (1e-3, LuGre(0.5, 0.8, 0.05)), (1e-3, LuGre(0.05, 0.05, 0.01))]
+    ("h", "part"),
+    [
+        (2.5e-4, LUGRE),
+        (1e-3, LuGre(0.5, 0.8, 0.05)),
+        (1e-3, LuGre(0.05, 0.05, 0.01)),
+    ],
 )
 def test_lugre_breaks_away_at_its_static_level(h, part):
     model = bare(min(INERTIA), part, h=h)

@@ -37,9 +37,14 @@ def exact(plant: Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
 @pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
 def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default_step(plant, tau):
     scenario = smc.Scenario(
-        plant=plant, law="classical", x0=0.01, duration=DURATION, actuator=smc.Lag(tau)
+        plant=plant,
+        law="classical",
+        x0=0.01,
+        duration=DURATION,
+        actuator=smc.Lag(tau),
     )
-    assert (scenario.resolved.integrator, scenario.resolved.physics_step) == ("RK4", PERIOD)
+    assert scenario.resolved.integrator == "RK4"
+    assert scenario.resolved.physics_step == PERIOD
     trace = smc.run(scenario)
     assert np.ptp(trace.u) == 8.0  # it switches
     assert trace.x[:, 0] == pytest.approx(exact(scenario.plant, 0.01, trace.u[:, 0], tau), abs=1e-9)

@@ -89,6 +89,8 @@ def test_a_cycle_of_the_adaptive_law_does_not_depend_on_the_step():
         "inverted_pendulum", duration=3.0, changes={"actuator": smc.Backlash(GAP)}
     )
     scenario = next(scenario for scenario in made.values() if scenario.law.name == "adaptive")
-    steps = [scenario.resolved.physics_step / k for k in (1, 2, 4)]
+    steps = []
+    for k in (1, 2, 4):
+        steps.append(scenario.resolved.physics_step / k)
     for trace in smc.run([dataclasses.replace(scenario, physics_step=step) for step in steps]):
         assert smc.score(trace)["ultimate_bound"] == pytest.approx(2.1e-3, rel=0.05)

@@ -174,7 +174,11 @@ def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
     holds = np.array([limits(i)[int(one > 0.0)] for i, one in enumerate(load)])
     load = load / (load / holds).max()  # one joint is at its limit
     runs = []
-    for share, rise in ((0.96 / overshoot, 1e-9), (1.04 / overshoot, 1e-9), (0.97, 0.5)):
+    for share, rise in (
+        (0.96 / overshoot, 1e-9),
+        (1.04 / overshoot, 1e-9),
+        (0.97, 0.5),
+    ):
         runs.append(
             weightless(
                 law=pulls(torque=share * load, rise=rise),
@@ -196,7 +200,10 @@ def test_a_joint_breaks_away_at_the_holding_force(hold):
     else:
         low = -hold
         high = hold
-    for most, slope in ((high, 0.2), (low, -0.2)):
+    for most, slope in (
+        (high, 0.2),
+        (low, -0.2),
+    ):
         part = smc.hardware.Sigmoid(P1[0], P2[0], P3[0], hold=hold)
         load = smc.signals.Ramp(slope)
         trace = flywheel(
@@ -283,10 +290,16 @@ def scenarios():
     ]
     for friction in (*frictions, smc.hardware.Sigmoid(0.5, 9.0, hold=0.7)):
         yield smc.Scenario(
-            plant="panda", law="computed_torque_sliding", friction=friction, **common
+            plant="panda",
+            law="computed_torque_sliding",
+            friction=friction,
+            **common,
         )
     yield smc.Scenario(
-        plant="cart_pole", law="observer_free", friction=Curious(a=(0.5, 0.01)), **common
+        plant="cart_pole",
+        law="observer_free",
+        friction=Curious(a=(0.5, 0.01)),
+        **common,
     )
     servo = smc.hardware.servo("mx64", "m5", command="voltage")
     gust = {
@@ -305,7 +318,12 @@ def scenarios():
     # the elbow, which it then meets: the load has its force
     at_a_stop = (0.0, 0.0, 0.0, -0.0750, 0.0, 1.5, 0.0)
     yield smc.Scenario(
-        plant="panda", law="none", friction=frictions[2], x0=at_a_stop, v0=0.5, **common
+        plant="panda",
+        law="none",
+        friction=frictions[2],
+        x0=at_a_stop,
+        v0=0.5,
+        **common,
     )
 
 

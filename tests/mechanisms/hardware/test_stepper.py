@@ -120,7 +120,9 @@ def steps_by_events(motor, commands, phase, duration):
     last = 0.0
     events = [(t, 0, u) for t, u in commands]
     if motor.refill:
-        looks = [(k + phase) * motor.refill for k in range(math.ceil(duration / motor.refill))]
+        looks = []
+        for k in range(math.ceil(duration / motor.refill)):
+            looks.append((k + phase) * motor.refill)
         events += [(t, 1, 0.0) for t in looks if t < duration]
     steps = []
     free = 0.0
@@ -146,7 +148,10 @@ def steps_by_events(motor, commands, phase, duration):
         sign = 1 if speed >= 0.0 else -1
         stops = abs(speed) < motor.stop_band * per or rate < 1 or generator.wish[0] == -sign
         generator.wish = (0, 0) if stops else (sign, rate)
-        until = events[i + 1][0] if i + 1 < len(events) else duration
+        if i + 1 < len(events):
+            until = events[i + 1][0]
+        else:
+            until = duration
         while not motor.refill and max(free, t) < until and add(t):
             pass
     return [(t, way) for t, way in steps if t < duration]
@@ -260,7 +265,9 @@ def test_the_steps_are_those_of_an_event_integration(kind):
     one = scenario(dataclasses.replace(motor, speed=400.0), push)
     _, steps = by_events(one)
     state, queue = (own := looped(one).motors[0]).state, own.queue
-    made = [(queue[2 * i], queue[2 * i + 1]) for i in range(int(state.tail))]
+    made = []
+    for i in range(int(state.tail)):
+        made.append((queue[2 * i], queue[2 * i + 1]))
     made = [step for step in made if step[0] < one.duration]
     assert len(steps) > 30
     assert {way for _, way in steps} == {-1, 1}
