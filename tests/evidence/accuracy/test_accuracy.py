@@ -6,10 +6,8 @@ import math
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli.main import main
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.evidence.accuracy import accuracy
-from smc_mujoco.evidence.accuracy.accuracy import load
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
 SHORT = {
@@ -154,24 +152,3 @@ def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
     assert "default gains" not in str(table), "no law beside it is tuned"
     beside = type(table)([table[0], dataclasses.replace(table[0], law="pid", gains="shipped")])
     assert "default gains: hierarchical; tuned: pid." in " ".join(str(beside).split())
-
-
-def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(
-    tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-    options = "--law classical,pid(kp=20) --periods 0.004,0.002 --seeds 1 --duration 1"
-    with pytest.raises(SystemExit) as end:
-        main(["accuracy", "duffing", *options.split(), "--json", "a.json", "--out", "a.pdf"])
-    printed = capsys.readouterr()
-    assert not end.value.code, printed.err
-    assert max(map(len, printed.out.splitlines())) <= 80
-    assert printed.out.count("order of") == 2
-    assert "classical shipped" in printed.out
-    assert "pid yours" in printed.out
-    assert {row.law for row in load("a.json")} == {"classical", "pid"}
-    assert (tmp_path / "a.pdf").is_file()
-    with pytest.raises(SystemExit):
-        main(["accuracy", "duffing", "--periods", "4ms,2ms"])
-    assert "--periods '4ms,2ms' cannot be read: give numbers in s" in capsys.readouterr().err
