@@ -50,11 +50,7 @@ MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
 # 10 minutes on two cores
-CASES = {
-    "scenarios": 40_000,
-    "batches": 2_000,
-    "files": 8_000,
-}
+CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000}
 
 
 class Found(AssertionError):

@@ -29,11 +29,7 @@ from smc_mujoco.metrics.limit_cycle import channel_cycle
 COARSELY = pytest.mark.usefixtures("coarse_grid")
 
 HALF = math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # of sqrt|sin| sign(sin), over 2
-INTEGRATOR = {
-    "alpha": 0.0,
-    "beta": 0.0,
-    "delta": 0.0,
-}  # of a Duffing oscillator: a free mass
+INTEGRATOR = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a free mass
 LAWS = {
     "classical": smc.law("classical", k=2.0, c=0.01),
     "super_twisting": smc.law("super_twisting", k1=1.5, k2=1.1, c=0.01),

@@ -127,11 +127,7 @@ def test_gains_for_an_amplitude_keep_the_machine_below_it(name):
     loop, amplitude, _ = VECTORS[name]
     base = scenario(loop)
     wanted = 0.5 * amplitude
-    fields = {
-        "actuator": base.actuator,
-        "control_period": loop.period,
-        "u_max": math.inf,
-    }
+    fields = {"actuator": base.actuator, "control_period": loop.period, "u_max": math.inf}
     design = smc.design.gains_for(base.law, base.plant, amplitude=wanted, **fields)
     gains = tuple(design.law.gains[gain] for gain in GAINS[loop.kind])
     realised, _ = ExactLoop(loop.kind, gains, loop.period, loop.lags).cycle()

@@ -161,17 +161,9 @@ def test_ranks_are_those_of_the_medians_of_each_block():
     scores = {"a": [[1.0, 1.0, 9.0], [INF, INF, 1.0]], "b": [[1.02, 5.0, 1.0], [INF, INF, 2.0]]}
     scores["c"] = [[3.0, 1.0, 4.0], [2.0, 3.0, INF]]
     # medians 1, 1.02, 3: the first two tied; never, never, 3
-    assert mean_ranks(scores) == {
-        "a": 2.0,
-        "b": 2.0,
-        "c": 2.0,
-    }
+    assert mean_ranks(scores) == {"a": 2.0, "b": 2.0, "c": 2.0}
     scores["b"][0][0] = 1.04  # by more than 3 %
-    assert mean_ranks(scores) == {
-        "a": 1.75,
-        "b": 2.25,
-        "c": 2.0,
-    }
+    assert mean_ranks(scores) == {"a": 1.75, "b": 2.25, "c": 2.0}
     shares = {"a": np.arange(10) < 3, "b": np.arange(10) < 4}  # by means: both medians are 0
     assert mean_ranks(shares, shares=True) == {"a": 1.0, "b": 2.0}
 
@@ -397,31 +389,19 @@ def test_a_law_that_is_unbeaten_only_as_its_sets_are_few_is_not_among_the_best()
     few = np.arange(24) % 3
     found = Comparison(
         scores,
-        sets={
-            "a": own,
-            "b": own,
-            "c": few,
-        },
+        sets={"a": own, "b": own, "c": few},
     )
     assert found.beaten[:, 0].tolist() == [False, True, False]
     assert found.undecided[:, 0].tolist() == [False, False, True]
     assert found.best == [("a",)]
     assert not Comparison(
         scores,
-        sets={
-            "a": own,
-            "b": own,
-            "c": own,
-        },
+        sets={"a": own, "b": own, "c": own},
     ).undecided.any()
     close = scores | {"c": 1.01 * scores["a"]}
     assert Comparison(
         close,
-        sets={
-            "a": own,
-            "b": own,
-            "c": few,
-        },
+        sets={"a": own, "b": own, "c": few},
     ).best == [("a", "c")]
 
 

@@ -23,14 +23,7 @@ CLASSICAL = smc.law("classical", k=1.826, c=2.874)
 
 
 def scenario(**fields):
-    return smc.Scenario(
-        **{
-            "plant": "duffing",
-            "law": CLASSICAL,
-            "duration": 2.0,
-        }
-        | fields
-    )
+    return smc.Scenario(**{"plant": "duffing", "law": CLASSICAL, "duration": 2.0} | fields)
 
 
 CLASSES = {
@@ -212,11 +205,7 @@ def test_it_finds_the_worst_of_a_linear_loop():
     w = np.sqrt(k - c * c / 4)
     a = c / 2
     gain = np.trapezoid(np.abs(np.exp(-a * t) * np.sin(w * t) / w), t)
-    still = {
-        "alpha": 0.0,
-        "beta": 0.0,
-        "delta": 0.0,
-    }
+    still = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}
     base = smc.Scenario(
         plant=smc.plant("duffing", M=1.0, **still),
         law=linear,

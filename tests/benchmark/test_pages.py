@@ -34,14 +34,7 @@ def entered(folder, name, factor, failures=()):
             row = {}
             for column in runs.COLUMNS[1:]:
                 row[column] = factor * rng.uniform(0.1, 1.0)
-            group.append(
-                {
-                    "problem": cell,
-                    "instance": i,
-                    "failed": 0.0,
-                }
-                | row
-            )
+            group.append({"problem": cell, "instance": i, "failed": 0.0} | row)
         groups.append(group)
     runs.write(target / TABLE, groups)
     table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()

@@ -85,13 +85,7 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
         ("payload", lambda k: {"mismatch": {"payload": 0.006 * k, "mass": 1.0}}),
         (
             "slow_rotors",
-            lambda k: {
-                "mismatch": {
-                    "rise": 0.625,
-                    "fall": 0.625,
-                    "mass": 1.0,
-                }
-            },
+            lambda k: {"mismatch": {"rise": 0.625, "fall": 0.625, "mass": 1.0}},
         ),
     ],
 )

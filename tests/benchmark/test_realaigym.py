@@ -26,10 +26,11 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
+# channels of shoulder and elbow
 ORDER = {
     "acrobot": [1, 0],
     "pendubot": [0, 1],
-}  # channels of shoulder and elbow
+}
 DIGITS = {"torque_smoothness": 3}  # of the published criteria after the point; of the others 2
 DRAWN = {  # seed -> first times of resets, and goals
     333: ((3.9924, 8.2595, 11.3649, 15.6190, 18.2143),
@@ -209,11 +210,7 @@ def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
     monkeypatch.setattr(simulator, "TESTS", ("model", "delay", "perturbations"))
     found = simulator.robustness(boards.entry("acrobot"))
     assert found.survived["model"] == (("a", 0.0, True), ("b", 0.0, True))
-    assert found.percent == {
-        "model": 100.0,
-        "delay": 0.0,
-        "perturbations": 0.0,
-    }
+    assert found.percent == {"model": 100.0, "delay": 0.0, "perturbations": 0.0}
     assert found.score == pytest.approx(1.0 / 3.0)
 
 

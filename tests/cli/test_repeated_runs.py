@@ -117,11 +117,7 @@ def cells(table) -> list[str]:
 def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
     fine = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.1))
     lost = dataclasses.replace(fine, diverged_at=0.05)
-    runs = {
-        "a": fine,
-        "b": lost,
-        "c": lost,
-    }
+    runs = {"a": fine, "b": lost, "c": lost}
     again = {
         "a": [fine, lost],
         "b": [fine, fine],

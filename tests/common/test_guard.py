@@ -130,11 +130,7 @@ FLUSH = 0x8040  # of SSE's register: small results are 0, and small operands
 def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
     if os.uname().machine != "x86_64" or ctypes.util.find_library("c") is None:
         pytest.skip("the numbers of the modes are those of x86 and of the GNU C library")
-    modes = {
-        "FE_DOWNWARD": 0x400,
-        "FE_UPWARD": 0x800,
-        "FE_TOWARDZERO": 0xC00,
-    }
+    modes = {"FE_DOWNWARD": 0x400, "FE_UPWARD": 0x800, "FE_TOWARDZERO": 0xC00}
     arithmetic = guard.Arithmetic()
     three = 3.0
     ten = 10.0

@@ -171,8 +171,6 @@ def text(template):
     said = [flag for flag in ("continuous", "joint", "requires_model") if getattr(template, flag)]
     if template.finite_time:
         said += [f"{template.finite_time} = 0 after a finite time"]
-    else:
-        said += []
     said += [
         f"order of {what} {template.order(what, component.gains):.7g}" for what in template.accuracy
     ]

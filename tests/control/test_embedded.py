@@ -64,10 +64,7 @@ def test_every_form_is_odd_bounded_and_rises(name):
     np.testing.assert_array_equal(T, -T[::-1])
     assert np.abs(T).max() <= 1.0
     # their last bits ripple
-    slack = {
-        "observer_free_single": 2e-7,
-        "observer_free_taylor": 1e-6,
-    }.get(name, 0.0)
+    slack = {"observer_free_single": 2e-7, "observer_free_taylor": 1e-6}.get(name, 0.0)
     assert np.diff(T).min() >= -slack
 
 

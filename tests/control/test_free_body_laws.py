@@ -149,11 +149,7 @@ def test_an_unknown_torque_turns_the_body_by_the_closed_form(drone):
     with it.
     """
     law = smc.law("quaternion_sliding")
-    common = {
-        "plant": drone,
-        "duration": 10.0,
-        "control_period": 2e-3,
-    }
+    common = {"plant": drone, "duration": 10.0, "control_period": 2e-3}
     s = math.atanh(TORQUE / (J * law.gains["K"])) / law.gains["rho"]
     trace = smc.run(smc.Scenario(law=pushed(law), **common))
     assert trace.s[-1, 3] == pytest.approx(s, rel=1e-6)
@@ -172,11 +168,7 @@ def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_w
     original,
 ):
     """0.05 N along each axis, which K outgrows slowly: 0.147 m. 6 g on 32 g cost 0.34 m."""
-    common = {
-        "plant": original,
-        "law": "adaptive_quaternion_sliding",
-        "control_period": 2e-3,
-    }
+    common = {"plant": original, "law": "adaptive_quaternion_sliding", "control_period": 2e-3}
     f = 0.05
     trace = smc.run(
         smc.Scenario(

@@ -51,11 +51,7 @@ def traces():
     and no bound here is near its error. Van der Pol's oscillator without its model takes the
     longest to settle.
     """
-    common = {
-        "integrator": "Euler",
-        "control_period": 2e-3,
-        "physics_step": 2e-3,
-    }
+    common = {"integrator": "Euler", "control_period": 2e-3, "physics_step": 2e-3}
     found = {}
     for name in smc.laws():
         # one half of the laws each, whichever laws there are beside it

@@ -399,11 +399,7 @@ def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_s
 
 
 @smc.law_function(
-    gains={
-        "lam": 2.0,
-        "k1": 1.0,
-        "ki": 1.0,
-    },
+    gains={"lam": 2.0, "k1": 1.0, "ki": 1.0},
     memory=1,
 )
 def winding(y, gains, memory):
@@ -428,11 +424,7 @@ def test_observer_free_integral_does_not_wind_up():
     assert lost.s[-1] > 10
     assert np.ptp(lost.memory[2000:, 0]) == 0.0
     assert abs(lost.memory[-1, 0]) < 2.0
-    gains = {
-        "lam": 2.0,
-        "k1": 1.0,
-        "ki": 0.3,
-    }
+    gains = {"lam": 2.0, "k1": 1.0, "ki": 0.3}
     common = {
         "x": (30.0, 0.0),
         "h": 1e-2,
@@ -483,11 +475,7 @@ def test_surface_and_own_sliding_variable_give_the_same_first_order_law():
     forms = []
     for form in ("table", "taylor", "single", "q15"):
         forms.append(f"observer_free_{form}")
-    state = {
-        "f": 0.7,
-        "g": 2.0,
-        "model": 1.0,
-    }
+    state = {"f": 0.7, "g": 2.0, "model": 1.0}
     for name in (*EXACT, "power_rate", "fuzzy_gain", "prescribed_time", "integral", *forms):
         law = smc.law(name)
         slope = "k1" if name in forms else "c"
@@ -499,8 +487,5 @@ def test_surface_and_own_sliding_variable_give_the_same_first_order_law():
         )
         y = on_surface(-0.3 + 1.7 * 0.2, eq=1.7 * 0.3, **state)
         given = called(law, y._replace(e=0.2, de=-0.3), np.zeros(law.memory))
-        rounds = {
-            "observer_free_single": 1e-6,
-            "observer_free_q15": 1e-2,
-        }.get(name, 1e-12)
+        rounds = {"observer_free_single": 1e-6, "observer_free_q15": 1e-2}.get(name, 1e-12)
         np.testing.assert_allclose(own, given, rtol=rounds)

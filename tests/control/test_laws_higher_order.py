@@ -117,11 +117,7 @@ def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_m
 
 
 def test_clamped_super_twisting_keeps_its_integral_within_w_max_and_its_accuracy_below_it():
-    gains = {
-        "k1": 1.5,
-        "k2": 1.1,
-        "w_max": 0.5,
-    }
+    gains = {"k1": 1.5, "k2": 1.1, "w_max": 0.5}
     for sign in (1.0, -1.0):
         beyond = plant_a(law("super_twisting", **gains), constant(sign * 0.8), duration=40.0)
         assert np.abs(beyond.memory).max() == 0.5

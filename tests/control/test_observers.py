@@ -15,14 +15,8 @@ pytestmark = pytest.mark.quick
 H = 1e-3  # s
 LAWS = ("extended_state", "disturbance_observer")
 OBSERVERS = pytest.mark.parametrize("name", LAWS)
-ESTIMATE = {
-    "extended_state": 3,
-    "disturbance_observer": 1,
-}  # cell of the memory that holds it
-SPEED = {
-    "extended_state": "w",
-    "disturbance_observer": "l",
-}
+ESTIMATE = {"extended_state": 3, "disturbance_observer": 1}  # cell of the memory that holds it
+SPEED = {"extended_state": "w", "disturbance_observer": "l"}
 
 
 def observer(name, **gains):

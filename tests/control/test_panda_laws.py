@@ -34,6 +34,5 @@ def test_without_gravity_compensation_gravity_over_lam_k1_remains(name):
         rtol=0.02,
         atol=1e-5,
     )
-    np.testing.assert_allclose(
-        lam * np.tanh(k1 * e), -gravity, rtol=1e-3, atol=1e-3
-    )  # exactly, of any size
+    # exactly, of any size
+    np.testing.assert_allclose(lam * np.tanh(k1 * e), -gravity, rtol=1e-3, atol=1e-3)

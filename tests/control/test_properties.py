@@ -92,11 +92,7 @@ def jump(name, model):
     on_surface = [(0.4, -0.4 * slope, 0.0), (-0.3, 0.3 * slope, 0.0)]
     centres = [(0.0, 0.0, 0.0), *on_surface, (2.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0)]
     along = np.linspace(-1e-8, 1e-8, 101)
-    common = {
-        "limit": 6.0,
-        "model": model,
-        "g": 1.1,
-    }
+    common = {"limit": 6.0, "model": model, "g": 1.1}
     worst = 0.0
     for centre, fresh in itertools.product(centres, (True, False)):
         memory = np.zeros(law.memory)

@@ -17,17 +17,18 @@ from smc_mujoco.simulation import python_functions
 pytestmark = pytest.mark.quick
 
 RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
-UNIT = {
-    "a1": 0.0,
-    "a2": 0.0,
-    "b": 1.0,
-}  # the plant e'' = u
+UNIT = {"a1": 0.0, "a2": 0.0, "b": 1.0}  # the plant e'' = u
+# a1, a2, b
 PLANTS = (
     (0.0, 0.0, 1.0),
     (18.0, 0.7, 0.9),
     (-23.6, -0.16, 8.0),
-    (5.0, -1.0, 0.4),
-)  # a1, a2, b
+    (
+        5.0,
+        -1.0,
+        0.4,
+    ),
+)
 
 
 def call(law, memory, **fields):

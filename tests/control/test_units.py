@@ -18,24 +18,10 @@ from smc_mujoco.control.law import laws
 pytestmark = pytest.mark.quick
 
 SYSTEMS = [
-    {
-        "F": 4.0,
-        "X": X,
-        "T": T,
-    }
-    for X, T in ((4.0, 1.0), (1.0, 4.0), (16.0, 0.25), (0.25, 0.25))
+    {"F": 4.0, "X": X, "T": T} for X, T in ((4.0, 1.0), (1.0, 4.0), (16.0, 0.25), (0.25, 0.25))
 ]
 # exp(|e|^p) has a special unit
-ALIKE = {
-    "predefined_time": [
-        {
-            "F": 1.0,
-            "X": 1.0,
-            "T": T,
-        }
-        for T in (4.0, 0.25)
-    ]
-}
+ALIKE = {"predefined_time": [{"F": 1.0, "X": 1.0, "T": T} for T in (4.0, 0.25)]}
 WAY = np.random.default_rng(0).normal(size=(20, 4))
 
 

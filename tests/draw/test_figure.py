@@ -118,9 +118,8 @@ def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
 def test_chattering_is_drawn_as_its_mean_without_teeth():
     t = np.arange(10_001) * 1e-3
     rng = np.random.default_rng(0)
-    switching = np.where(
-        np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0
-    )  # each value held 1 sample, or more
+    # each value held 1 sample, or more
+    switching = np.where(np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0)
     drift = np.clip(np.cumsum(rng.normal(size=10_001)), -0.1, 0.1)
     for u in (
         np.where(np.arange(10_001) % 2, 6.0, -6.0),
@@ -183,9 +182,8 @@ def switching(lengths) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(6))
 def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_than_the_window(seed):
     rng = np.random.default_rng(seed)
-    within = switching(
-        [*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)]
-    )  # 40: the window
+    # 40: the window
+    within = switching([*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)])
     u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
     (part,) = decimate.chattering_parts(u, 40)
     assert part.start == 300
@@ -193,9 +191,8 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     mean = triangle(within, 20)
     line = decimate.smooth(u, 40)
     np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)
-    np.testing.assert_allclose(
-        line[300:319], mean[0]
-    )  # no needle where it begins, no dip where it ends
+    # no needle where it begins, no dip where it ends
+    np.testing.assert_allclose(line[300:319], mean[0])
     np.testing.assert_allclose(line[-319:-300], mean[-1])
     assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
 
@@ -204,9 +201,8 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
 def test_the_line_is_the_same_read_backwards(seed):
     rng = np.random.default_rng(seed)
     lengths = rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03])
-    u = switching(
-        [*[1] * 9, *lengths, *[1] * 9]
-    )  # a long hold is no chattering at the start, but is at the end
+    # a long hold is no chattering at the start, but is at the end
+    u = switching([*[1] * 9, *lengths, *[1] * 9])
     u += np.sin(np.arange(len(u)) / 50) + rng.normal(0.0, 0.02, len(u))
     np.testing.assert_allclose(
         decimate.smooth(u[::-1], 40)[::-1], decimate.smooth(u, 40), atol=1e-12
@@ -216,10 +212,8 @@ def test_the_line_is_the_same_read_backwards(seed):
 def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
     k = np.arange(2001)
     noise = np.random.default_rng(0).normal(0.0, 0.03, 2001)
-    for y in (
-        np.exp(-k / 40) + noise,
-        np.exp((k - 2000) / 40) + noise,
-    ):  # as s in the first and last 0.1 s
+    # as s in the first and last 0.1 s
+    for y in np.exp(-k / 40) + noise, np.exp((k - 2000) / 40) + noise:
         line = decimate.smooth(y, 100)
         truth = y - noise
         assert np.abs(line - truth).max() < 0.13  # the nearest whole mean is 0.65 off

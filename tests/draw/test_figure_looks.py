@@ -226,9 +226,8 @@ def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
     assert [len(rows(ax)) for ax in (over_time, end)] == [4, 4]
     assert {row.get_ylim() for row in rows(over_time)} == {panels.limits(three, "u")}
     (cross,) = [line for row in rows(over_time) for line in row.lines if line.get_marker() == "X"]
-    assert cross.get_ydata()[0] in panels.limits(
-        three, "u"
-    )  # at the edge of the range: it lies far outside
+    # at the edge of the range: it lies far outside
+    assert cross.get_ydata()[0] in panels.limits(three, "u")
     assert max(row.get_ylim()[1] for row in rows(end)) < 0.0
     assert [text.get_text() for row in rows(end) for text in row.texts] == ["the run failed"]
 

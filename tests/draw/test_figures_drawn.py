@@ -347,11 +347,7 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
     "friction": ({"plant": "duffing", "friction": Coulomb(0.5)}, ["reaction (N)"], ["delivered"]),
     "a drive": ({"plant": "duffing", "actuator": smc.Lag(0.05)}, ["delivered (N)"], ["reaction"]),
     "a pole": (
-        {
-            "plant": "cart_pole",
-            "law": "hierarchical",
-            "model": "nominal",
-        },
+        {"plant": "cart_pole", "law": "hierarchical", "model": "nominal"},
         [
             "position x (m)",
             "velocity v (m/s)",
@@ -386,11 +382,7 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
         ["u (N·m)", "sliding variable"],  # the law has none
     ),
     "torques": (
-        {
-            "plant": "furuta",
-            "law": "none",
-            "actuator": MOTOR,
-        },
+        {"plant": "furuta", "law": "none", "actuator": MOTOR},
         ["control u (N·m)"],
         ["(V)"],
     ),

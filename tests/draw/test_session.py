@@ -170,13 +170,7 @@ def test_a_body_is_pushed_once_when_the_mouse_lets_go():
     panel.asked.put(lambda: session.save(Path("no/folder/view.py")))
     studio.show(
         session,
-        Page(
-            {
-                2: 1.0,
-                4: 3.0,
-                7: 0.0,
-            }
-        ),
+        Page({2: 1.0, 4: 3.0, 7: 0.0}),
         panel,
         lambda session: True,
     )

@@ -19,11 +19,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, html
 
 SIZE = (320, 180)
-FILM = {
-    "size": SIZE,
-    "fps": 20.0,
-    "speed": 1.0,
-}
+FILM = {"size": SIZE, "fps": 20.0, "speed": 1.0}
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 
 

@@ -53,11 +53,7 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
 @pytest.mark.parametrize(
     "changes",
     [
-        {
-            "control_period": 0.01,
-            "x0": 0.4,
-            "v0": -0.2,
-        },
+        {"control_period": 0.01, "x0": 0.4, "v0": -0.2},
         {"friction": smc.Coulomb(0.1), "actuator": smc.Lag(0.02)},
         {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "x0": 0.3},
         {"mismatch": {"mass": 1.3}, "u_max": 2.0},
@@ -128,9 +124,8 @@ def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
 <keyframe><key name="up" qpos="0.2 3"/></keyframe></mujoco>""")
     environment = suite.load(smc.plant_from(path, ["a"], keyframe="up"), changes={"u_max": 1.0})
     environment.reset()
-    assert (
-        environment.physics.data.qpos[1] == 3.0
-    )  # a joint without a channel, where the keyframe has it
+    # a joint without a channel, where the keyframe has it
+    assert environment.physics.data.qpos[1] == 3.0
 
 
 # rewards, observations, ends
@@ -175,17 +170,14 @@ def test_tracking_is_rewarded_where_the_plant_follows():
     assert tasks.reward(
         *found.errors(np.array([r, 0.0]), np.array([dr, 0.0]), 300)
     ) == pytest.approx(1.0)
-    assert (
-        tasks.reward(*found.errors(np.array([r, r]), np.array([dr, dr]), 300)) < 0.95
-    )  # the pole is to stand
+    # the pole is to stand
+    assert tasks.reward(*found.errors(np.array([r, r]), np.array([dr, dr]), 300)) < 0.95
     assert found.observe(np.zeros(2), np.zeros(2), 300).shape == (7,)
 
 
 def test_tasks_are_for_the_plants_that_have_them():
-    assert tasks.tasks("overhead_crane") == [
-        "regulate",
-        "track",
-    ]  # its load hangs: nothing to swing up
+    # its load hangs: nothing to swing up
+    assert tasks.tasks("overhead_crane") == ["regulate", "track"]
     assert tasks.tasks("cart_pole") == ["regulate", "track", "swing_up"]
     assert "swing_up" not in tasks.tasks("pendulum_network")
     assert {"swing_up", "synchronise"} <= set(tasks.tasks("inverted_pendulum_network"))
@@ -203,11 +195,7 @@ def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
 def test_a_plant_that_diverges_within_a_step_ends_its_episode_and_the_next_one_begins():
     environment = suite.load(
         "duffing",
-        changes={
-            "u_max": 1e9,
-            "control_period": 0.1,
-            "x0": 1e5,
-        },
+        changes={"u_max": 1e9, "control_period": 0.1, "x0": 1e5},
     )
     environment.reset()
     timestep = environment.step([1.0])

@@ -206,17 +206,12 @@ def test_a_batch_resets_as_gymnasium_s_own_vector_does():
 
 
 def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space():
-    changes = {
-        "x0": 9.9e5,
-        "v0": 9e5,
-        "control_period": 0.1,
-    }
+    changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
     single = PlantEnv("inverted_pendulum", changes=changes)
     many = BatchEnv("inverted_pendulum", 2, changes=changes)
     single.reset(seed=0)
-    assert not single.setting.diverged(
-        single.x, single.v
-    )  # each number is below the limit of a run
+    # each number is below the limit of a run
+    assert not single.setting.diverged(single.x, single.v)
     observation, reward, terminated, _, info = single.step([0.0])
     assert (terminated, reward) == (True, 0.0)
     assert np.isnan(info["error"]).all()
@@ -236,9 +231,8 @@ def test_an_environment_is_copied_and_sent_away_as_it_stands():
     one.step([0.5])
     for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
         assert np.array_equal(other.step([1.0])[0], copy.deepcopy(one).step([1.0])[0])
-        assert np.array_equal(
-            other.reset()[0], copy.deepcopy(one).reset()[0]
-        )  # the generator of starts, too
+        # the generator of starts, too
+        assert np.array_equal(other.reset()[0], copy.deepcopy(one).reset()[0])
 
 
 def test_an_arm_tracks_a_reference_of_each_joint():
@@ -277,10 +271,11 @@ def test_an_arm_tracks_a_reference_of_each_joint():
 
 # what gymnasium has
 
+# drawing takes most of the time
 DRAWN = [
     ("duffing", "regulate"),
     ("cart_pole", "swing_up"),
-]  # drawing takes most of the time
+]
 
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(2))

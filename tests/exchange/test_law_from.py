@@ -9,11 +9,7 @@ from helpers.plants_ab import called
 import smc_mujoco as smc
 from smc_mujoco.control.law import Measurement
 
-RUN = {
-    "plant": "duffing",
-    "duration": 0.2,
-    "u_max": 6.0,
-}
+RUN = {"plant": "duffing", "duration": 0.2, "u_max": 6.0}
 LEAD = (
     [[-100.0]],
     [[1.0]],

@@ -98,9 +98,8 @@ def test_every_channel_of_every_run_starts_from_the_object_as_it_was_given(given
     )
     first, second = (smc.run(scenario) for _ in range(2))
     np.testing.assert_array_equal(first.u, second.u)
-    np.testing.assert_allclose(
-        first.u[0], -0.6 * np.array(first.scenario.x0)
-    )  # the first call of each channel
+    # the first call of each channel
+    np.testing.assert_allclose(first.u[0], -0.6 * np.array(first.scenario.x0))
 
 
 class Locked(Adaptive):

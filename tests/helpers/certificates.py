@@ -29,11 +29,7 @@ def part(theorem, margins, **data):
 PARTS = [
     part(
         "saturated PD",
-        {
-            "damping": -0.25,
-            "restoring": 0.125,
-            "local": 3.0,
-        },
+        {"damping": -0.25, "restoring": 0.125, "local": 3.0},
     ),
     part("level sets", {"actuator": 1.5, "start": 0.2}, **LEVELS),
 ]

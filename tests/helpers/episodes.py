@@ -71,9 +71,8 @@ def driven_by_gym(environment, act):
     over = False
     while True:
         u = act(observation)
-        assert environment.action_space.contains(
-            u.astype(np.float32)
-        )  # a float64 that `step` does not round
+        # a float64 that `step` does not round
+        assert environment.action_space.contains(u.astype(np.float32))
         assert environment.observation_space.contains(observation)
         states.append([*observation[: 2 * n], *(u * limit)])
         if over:

@@ -23,13 +23,14 @@ int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, s
 }
 """
 ARRAY_SHAPES = {name: (6, 6) if name == "M" else (6,) for name in ARRAYS}
+# as in smc_law.h
 MEASUREMENT = np.dtype(
     [
         ("head", "f8", (3,)),
         *((name, "f8", shape) for name, shape in ARRAY_SHAPES.items()),
         ("functions", "i8", (3,)),
     ]
-)  # as in smc_law.h
+)
 
 
 def scenarios(law) -> list[smc.Scenario]:

@@ -8,22 +8,14 @@ import numpy as np
 import smc_mujoco as smc
 from helpers import reference
 
-JOINTED = [
-    name for name in smc.plants() if not smc.plant(name).pose
-]  # the plants that are no free body
+# the plants that are no free body
+JOINTED = [name for name in smc.plants() if not smc.plant(name).pose]
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 
 
 def scenario(law="classical", **fields):
     """A Duffing oscillator for 20 ms, unless fields say otherwise."""
-    return smc.Scenario(
-        **{
-            "plant": "duffing",
-            "law": law,
-            "duration": 0.02,
-        }
-        | fields
-    )
+    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
 
 
 def made(function, gains=None, memory=8):

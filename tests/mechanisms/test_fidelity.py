@@ -37,11 +37,7 @@ def pull(model, data, x, v=0.0):
 
 DUFFINGS = [
     {},
-    {
-        "alpha": -2.0,
-        "beta": 0.5,
-        "M": 3.0,
-    },
+    {"alpha": -2.0, "beta": 0.5, "M": 3.0},
     {"alpha": -0.3, "beta": 4.0},
 ]
 
@@ -73,11 +69,7 @@ def test_the_hill_between_duffings_wells_is_nineteen_percent_too_high():
     "parameters",
     [
         {},
-        {
-            "mu": 2.5,
-            "k": 3.0,
-            "M": 0.5,
-        },
+        {"mu": 2.5, "k": 3.0, "M": 0.5},
     ],
 )
 def test_the_active_and_the_transverse_damper_change_sign_where_van_der_pols_does(parameters):

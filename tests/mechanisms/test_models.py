@@ -17,11 +17,12 @@ pytestmark = pytest.mark.quick
 
 ALL = sorted(catalogue())
 NAMES = [name for name in ALL if not catalogue()[name].pose]  # of a free body see test_quadrotor.py
+# largest n -> which are tested
 SIZES = {
     1: [1],
     2: [2],
     7: [7],
-}  # largest n -> which are tested
+}
 SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 5])]
 CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
 PLANTS = pytest.mark.parametrize("name", ALL)

@@ -97,9 +97,8 @@ def cross(a, b):
 
 
 def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
-    """The torques of the joints by Newton and Euler's recursion, (7,); J.
-
-    J. Craig, Introduction to Robotics, 6.5.
+    """The torques of the joints by Newton and Euler's recursion, (7,); J. J. Craig, Introduction to
+    Robotics, 6.5.
     """
     z = np.array([0.0, 0.0, 1.0])
     steel = 7850.0
@@ -248,11 +247,7 @@ def test_the_flange_is_where_the_makers_frames_put_it():
 
 
 def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
-    known = {
-        "law": "computed_torque_sliding",
-        "duration": 0.1,
-        "control_period": 2e-3,
-    }
+    known = {"law": "computed_torque_sliding", "duration": 0.1, "control_period": 2e-3}
     unknown = smc.Scenario(
         plant="panda",
         mismatch={"payload": 0.5},

@@ -261,17 +261,7 @@ def falling(**fields):
         "v0": (3.0, -2.0, 4.0, 0.0, 0.0, 0.0),
     }
     return smc.run(
-        smc.Scenario(
-            **(
-                start
-                | {
-                    "plant": plant,
-                    "law": "none",
-                    "duration": 2.0,
-                }
-                | fields
-            )
-        )
+        smc.Scenario(**(start | {"plant": plant, "law": "none", "duration": 2.0} | fields))
     )
 
 
@@ -397,11 +387,7 @@ LIFTS = {  # set -> thrust over weight, as its source or what was derived of it 
     "hummingbird": 10.2,
 }
 # rpm at which a set hovers, of the same sources
-HOVERS = {
-    "crazyflow": 18_968,
-    "gym": 14_480,
-    "rotorpy": 17_079,
-}
+HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}
 
 
 @pytest.mark.parametrize("name", list(QUADROTOR.sets))

@@ -174,11 +174,7 @@ START = {
 def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(name):
     plant = smc.plant(name, **dict.fromkeys(smc.plant(name).dry, 0.0))
     v0 = 1.0 if name == "servo_axis" else 0.0
-    common = {
-        "control_period": 2e-3,
-        "physics_step": 2e-3,
-        "duration": 2.0,
-    }
+    common = {"control_period": 2e-3, "physics_step": 2e-3, "duration": 2.0}
     trace = smc.run(
         smc.Scenario(
             plant=plant,

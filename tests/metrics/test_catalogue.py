@@ -72,11 +72,7 @@ def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=Fa
     scenario = SimpleNamespace(
         plant=mixed, efforts=mixed.efforts, law=SimpleNamespace(name="classical")
     )
-    more = {
-        "force": u,
-        "reaction": reaction,
-        "scenario": scenario,
-    } | fields
+    more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
     return Run(
         t=t,
         x=x,
@@ -102,6 +98,7 @@ def second_order(zeta, omega, t):
 
 # Runs of a few samples, by hand
 
+# of the reference
 STEP, PULSE = (
     [9, 9, 13, 13, 13],
     [
@@ -113,8 +110,9 @@ STEP, PULSE = (
         0,
         0,
     ],
-)  # of the reference
+)
 LAST = np.zeros((11, 2))
+# the last part is t = 8, 9, 10
 LAST[8:] = (
     [-1, 2],
     [-2, -2],
@@ -122,7 +120,7 @@ LAST[8:] = (
         -3,
         0,
     ],
-)  # the last part is t = 8, 9, 10
+)
 UNEVEN = {
     "t": [0, 1, 3],
     "x": [[3, -1], [1, 0], [0, 0]],
@@ -235,31 +233,19 @@ BY_HAND = [
     (
         m.stick_time,
         10.0,
-        {
-            "t": LONG,
-            "v": 0.9e-5,
-            "reaction": 1.0,
-        },
+        {"t": LONG, "v": 0.9e-5, "reaction": 1.0},
         "it never moved: |v| <= 1e-5",
     ),
     (
         m.stick_time,
         0.0,
-        {
-            "t": LONG,
-            "v": 1.1e-5,
-            "reaction": 1.0,
-        },
+        {"t": LONG, "v": 1.1e-5, "reaction": 1.0},
         "it crept for long",
     ),
     (
         m.stick_time,
         8.0,
-        {
-            ("t"): LONG,
-            ("v"): STOPPED,
-            ("reaction"): 1.0,
-        },
+        {("t"): LONG, ("v"): STOPPED, ("reaction"): 1.0},
         ("0.1 % of the largest speed is rest"),
     ),
     (

@@ -127,9 +127,8 @@ def test_each_channel_runs_as_it_would_under_its_law_alone():
         for name in set(ARRAYS) - {"t"}:
             one = getattr(together, name)[:, i]
             other = getattr(alone, name)[:, i]
-            np.testing.assert_allclose(
-                one, other, rtol=1e-12, atol=1e-13, err_msg=name
-            )  # MuJoCo solves for all at once
+            # MuJoCo solves for all at once
+            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-13, err_msg=name)
     assert np.abs(together.u).max(axis=0).tolist() == bounds
 
 
@@ -141,11 +140,7 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
             u_max=8.0,
             reference=SINE,
         ),
-        "elbow": {
-            "motor": True,
-            "law": "twisting",
-            "reference": None,
-        },
+        "elbow": {"motor": True, "law": "twisting", "reference": None},
     }
     plant = smc.plant_from(PENDULUM, channels=channels, name="suggesting")
     suggested = smc.Scenario(plant=plant, **COMMON)
@@ -172,10 +167,11 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
     assert pickle.loads(pickle.dumps(suggested)) == suggested
     assert suggested.reference is None
     assert suggested.references == (SINE, REST)
+    # a default follows the plant
     assert dataclasses.replace(suggested, plant=plain).references == (
         REST,
         REST,
-    )  # a default follows the plant
+    )
 
 
 REFUSED = {

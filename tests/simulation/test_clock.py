@@ -83,9 +83,8 @@ def test_a_pause_makes_all_later_samples_later_and_covers_some():
     assert_same(compiled, reference.run(scenario(clock)))
     delayed = scenario(clock, input_delay=0.007, duration=0.2)
     assert_same(smc.run(delayed), reference.run(delayed))
-    short = scenario(
-        smc.Clock(pause=PERIOD / STEPS, pause_every=7.0 * PERIOD)
-    )  # of one step: covers few samples
+    # of one step: covers few samples
+    short = scenario(smc.Clock(pause=PERIOD / STEPS, pause_every=7.0 * PERIOD))
     assert_same(compiled := smc.run(short), reference.run(short))
     assert 3 <= (late(compiled) < -0.5).sum() <= 8
     seeds = []

@@ -170,9 +170,8 @@ def test_a_grid_has_conditions_of_ones_own_under_their_names():
     )
     assert [told(s) for s in made] == ["nominal"] * 2 + ["worn gear"] * 2 + ["noise + coulomb"] * 2
     assert made[2].friction == (smc.Coulomb(0.05),)
-    assert (
-        dataclasses.replace(made[2], friction=None).condition is None
-    )  # the name goes with the fields
+    # the name goes with the fields
+    assert dataclasses.replace(made[2], friction=None).condition is None
 
 
 def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
@@ -306,9 +305,8 @@ def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
     moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
     moved += (smc.condition("c", feedforward=smc.Step(0.1)),)
     assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 12
-    assert (
-        len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2
-    )  # seed 0 alone starts at 0
+    # seed 0 alone starts at 0
+    assert len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2
     held = ARM.replace('fromto="0 0 0 0 0 -0.4"', 'fromto="0 0 0 0.4 0 0"')
     assert smc.grid(smc.plant_from(held, ["shoulder"]), law, "nominal")  # gravity moves it
 

@@ -26,11 +26,8 @@ LAWS = ("observer_free", "boundary_layer")
 SCORES = ("settling_time", "ultimate_bound", "tv_rate")
 FLOOR = 1e-4  # of the run's scale, and of u_max per second
 MOST = 0.03
-BRIEF, SLOW, LONG = (
-    3.0,
-    4.0,
-    5.0,
-)  # s: of most runs here, of Van der Pol's, of what hunts or creeps. The study's: 10 s
+# s: of most runs here, of Van der Pol's, of what hunts or creeps. The study's: 10 s
+BRIEF, SLOW, LONG = 3.0, 4.0, 5.0
 HUNTING = ("backlash", "encoder")
 CREEPING = ("lugre",)
 

@@ -163,14 +163,7 @@ def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
     """Also those that MuJoCo computes elsewhere, and with data that a law of one channel has used
     before.
     """
-    text = TENDON.format(
-        **{
-            "tendon": "",
-            "actuator": "",
-            "own": "false",
-        }
-        | parts
-    )
+    text = TENDON.format(**{"tendon": "", "actuator": "", "own": "false"} | parts)
     channels = {name: smc.Channel(x0=0.3) for name in "ab"}
     plant = smc.plant_from(text, channels=channels, name="pulled")
     common = {

@@ -183,8 +183,6 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
         # a share, 0 to 1, to which this is added
         if "delta" in keys:
             factors |= {"delta": 0.3}
-        else:
-            factors |= {}
         scenarios.append(
             smc.Scenario(
                 mismatch=factors, jump=smc.Jump(time, dict(reversed(factors.items()))), **common
@@ -300,9 +298,8 @@ def test_applied_is_the_command_of_the_delay_ago():
     for delay in delays:
         scenarios.append(smc.Scenario(**common, noise=smc.Noise(0.1, 0.1), input_delay=delay))
     for trace in smc.run(scenarios):
-        samples = math.ceil(
-            round(trace.scenario.input_delay / 0.001) / 5
-        )  # a command acts from the next sample on
+        # a command acts from the next sample on
+        samples = math.ceil(round(trace.scenario.input_delay / 0.001) / 5)
         np.testing.assert_array_equal(trace.applied[:samples], 0.0)
         np.testing.assert_array_equal(trace.applied[samples:], trace.u[: len(trace.u) - samples])
         assert np.unique(trace.u).size > 1

@@ -25,10 +25,8 @@ SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
 
 @pytest.fixture(autouse=True)
 def nothing_left_behind():
-    before = (
-        mujoco.get_mjcb_control(),
-        mujoco.get_mju_user_warning(),
-    )  # dm_control has its own warning handler
+    # dm_control has its own warning handler
+    before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
     mujoco.set_mjcb_control(None)
     mujoco.set_mju_user_warning(None)
     yield

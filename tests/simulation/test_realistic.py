@@ -28,16 +28,16 @@ PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
 TWO = pytest.mark.parametrize("name", ["duffing", "pendulum_network"])
 ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]
 LUGRE = smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::smc_mujoco.errors.ScenarioWarning"
-)  # motors of any strength
+# motors of any strength
+pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.errors.ScenarioWarning")
 MOTOR = smc.DCMotor()
 
 
+# of three bobs the first, which then runs into the second
 APART = {
     "x0": (-0.5, 0.0, 0.0),
     "v0": (12.0, 0.0, 0.0),
-}  # of three bobs the first, which then runs into the second
+}
 
 
 def small(name):
@@ -52,16 +52,7 @@ def scenario(name="duffing", law="observer_free", **changes):
     plant = small(name) if isinstance(name, str) else name
     if isinstance(law, str):
         law = smc.law(law, **smc.paper.GAINS[plant.name].get(law, {}))
-    return smc.Scenario(
-        **(
-            {
-                "plant": plant,
-                "law": law,
-                "duration": 0.1,
-            }
-            | changes
-        )
-    )
+    return smc.Scenario(**({"plant": plant, "law": law, "duration": 0.1} | changes))
 
 
 def start(plant):
@@ -441,10 +432,11 @@ def test_an_obstacle_that_is_not_reached_is_not_there(name, contact):
 RESTING = 4.0  # s
 LEVELS = (0.05, 0.5, 2.0, 8.0)  # N m, N
 STARTS = (1.0, 0.4, -0.05)  # of the plant's x0
+# barely pushing: Duffing rests near a well
 WEAK = {
     "observer_free": {"lam": 0.4},
     "boundary_layer": {"k": 0.4},
-}  # barely pushing: Duffing rests near a well
+}
 
 
 def resting(name):
@@ -764,9 +756,8 @@ def test_the_impulse_of_all_forces_is_the_change_of_momentum(name, part):
     force = 0.0 if part == "backlash" else trace.force[1:]
     left = inertia * np.diff(trace.v, axis=0)
     right = h * (force + trace.reaction[1:] + trace.d[:-1] + inertia * own[:-1])
-    exact = (
-        1e-4 if "contact" in fields else 1e-6
-    )  # a blow's force is found to a tolerance, which MuJoCo's solver has
+    # a blow's force is found to a tolerance, which MuJoCo's solver has
+    exact = 1e-4 if "contact" in fields else 1e-6
     np.testing.assert_allclose(left, right, atol=exact * np.abs(left).max())
     if part == "backlash":
         assert np.abs(trace.reaction).max() > 0.5
@@ -797,31 +788,11 @@ def test_forces_are_means_over_the_control_period():
 
 
 INSIDE = [
-    {
-        "plant": "duffing",
-        "contact": "stops",
-        "x0": 1.71,
-    },
-    {
-        "plant": "duffing",
-        "contact": "floor",
-        "x0": 1.9,
-    },
-    {
-        "plant": "duffing",
-        "contact": "peg",
-        "x0": 0.48,
-    },
-    {
-        "plant": "inverted_pendulum",
-        "contact": "wall",
-        "x0": 1.5,
-    },
-    {
-        "plant": "inverted_pendulum",
-        "contact": "peg",
-        "x0": 0.1,
-    },
+    {"plant": "duffing", "contact": "stops", "x0": 1.71},
+    {"plant": "duffing", "contact": "floor", "x0": 1.9},
+    {"plant": "duffing", "contact": "peg", "x0": 0.48},
+    {"plant": "inverted_pendulum", "contact": "wall", "x0": 1.5},
+    {"plant": "inverted_pendulum", "contact": "peg", "x0": 0.1},
     {
         "plant": "inverted_pendulum_network",
         "contact": "bobs",

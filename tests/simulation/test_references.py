@@ -55,9 +55,8 @@ def test_minimum_jerk_moves_from_rest_to_rest_and_stays():
         assert at(move, t).tolist() == [0.0, 0.0, 0.0]
     for t in (1.1 + 1e-12, 5.0):
         assert at(move, t) == pytest.approx([1.5, 0.0, 0.0], abs=1e-12)
-    assert at(move, 0.65) == pytest.approx(
-        [0.75, 1.5 * 1.875 / 0.9, 0.0]
-    )  # halfway: 15/8 of the mean speed
+    # halfway: 15/8 of the mean speed
+    assert at(move, 0.65) == pytest.approx([0.75, 1.5 * 1.875 / 0.9, 0.0])
 
 
 def test_no_other_move_between_the_same_rests_has_less_jerk():
@@ -144,11 +143,8 @@ def followed():
     """
     sine = Sine(0.5, 2.0)
     move = MinimumJerk(0.5, 0.5, 1.5)
-    common = {
-        "model": "nominal",
-        "x0": 0.0,
-        "integrator": "Euler",
-    }  # a third of the time of Runge and Kutta's rule
+    # a third of the time of Runge and Kutta's rule
+    common = {"model": "nominal", "x0": 0.0, "integrator": "Euler"}
     scenarios = []
     for name, plant in zip(FOLLOWING, itertools.cycle(PLANTS)):
         for r, T in (

@@ -251,10 +251,8 @@ class Flat(smc.Signal):
 def test_a_signal_that_fails_fails_the_run_and_is_timed(signal, field):
     trace = smc.run(scenario(**{field: signal()}))
     failed(trace, trace.diverged_at)
-    assert trace.diverged_at in (
-        pytest.approx(0.004),
-        pytest.approx(0.005),
-    )  # some stage of a step, or the next
+    # some stage of a step, or the next
+    assert trace.diverged_at in (pytest.approx(0.004), pytest.approx(0.005))
 
 
 @pytest.mark.parametrize("field", ["reference", "disturbance"])
@@ -387,9 +385,8 @@ def test_a_callback_that_was_installed_is_put_back():
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
 def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     def interrupt(_, frame):
-        if (
-            frame.f_globals["__name__"] != "weakref"
-        ):  # Python ignores exceptions there: the next alarm interrupts
+        # Python ignores exceptions there: the next alarm interrupts
+        if frame.f_globals["__name__"] != "weakref":
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             raise KeyboardInterrupt
 
@@ -412,9 +409,8 @@ def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    assert (
-        time.process_time() - begin < 10.0
-    )  # s of processor time; the run itself would take a minute
+    # s of processor time; the run itself would take a minute
+    assert time.process_time() - begin < 10.0
     assert mujoco.get_mjcb_control() is None
     assert mujoco.get_mju_user_warning() is handler
     assert smc.run(scenario()).diverged_at is None

@@ -41,9 +41,8 @@ from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key
 
-RUN = importlib.import_module(
-    "smc_mujoco.simulation.run"
-)  # the module; the public name is the function
+# the module; the public name is the function
+RUN = importlib.import_module("smc_mujoco.simulation.run")
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 THREE = smc.plant("pendulum_network", n=3)
 
@@ -192,9 +191,8 @@ def factorial(n):
 
 
 def test_a_helper_that_calls_itself_compiles():
-    trace = smc.run(
-        scenario(made(lambda y, gains, memory: (0.0, factorial(4))))
-    )  # a warning would be an error
+    # a warning would be an error
+    trace = smc.run(scenario(made(lambda y, gains, memory: (0.0, factorial(4)))))
     assert (trace.s == 24.0).all()
 
 
@@ -278,9 +276,8 @@ def test_a_law_is_zero_on_its_surface_and_opposes_s_off_it(name):
         memory = np.zeros(template.memory)
         e, de = rng.normal(size=2)
         first = template.function(seen(e, de), record(gains), memory)
-        second = template.function(
-            seen(e, de), record(gains), memory
-        )  # what it remembers points the same way
+        # what it remembers points the same way
+        second = template.function(seen(e, de), record(gains), memory)
         for u, s in (first, second):
             assert u * s <= 0.0
         assert second[0] * second[1] < 0.0
@@ -582,9 +579,8 @@ def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
 def child_runs() -> int:
     """0 if a forked child finishes its own run, its exit status if not."""
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", DeprecationWarning
-        )  # forking with threads about is what is tested
+        # forking with threads about is what is tested
+        warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
         signal.alarm(20)  # a child that hangs dies of it
@@ -911,9 +907,8 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
                 return
             done.append(True)
 
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # a shell's background job ignores it
+    # a shell's background job ignores it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     monkeypatch.setattr(numba_internals, "CFunc", lambda *arguments: Pressed())
     with pytest.raises(KeyboardInterrupt):
         compiled(numba.types.float64(numba.types.float64), math.sin)

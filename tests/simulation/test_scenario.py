@@ -22,14 +22,7 @@ TINY, HUGE = 1e-320, 1e308  # subnormal; its quotient with anything small overfl
 
 
 def scenario(**fields):
-    return smc.Scenario(
-        **{
-            "plant": "duffing",
-            "law": "classical",
-            "duration": 1.0,
-        }
-        | fields
-    )
+    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 1.0} | fields)
 
 
 def brief(value) -> str:
@@ -132,9 +125,8 @@ def test_one_parameter_under_two_names_is_refused(refused):
             ({"jump": smc.Jump(0.5, both)}, "Jump has"),
         ):
             refused(lambda fields=fields, plant=plant: scenario(plant=plant, **fields), said, words)
-        apart = scenario(
-            plant=name, mismatch={"mass": 1.2}, jump=smc.Jump(0.5, {plant.mass: 1.5})
-        )  # in turn
+        # in turn
+        apart = scenario(plant=name, mismatch={"mass": 1.2}, jump=smc.Jump(0.5, {plant.mass: 1.5}))
         mass = getattr(plant.values(apart.factors(10**6)), plant.mass)
         assert mass == pytest.approx(1.8 * plant.parameters[plant.mass])
 
@@ -168,9 +160,8 @@ def test_a_state_of_the_wrong_length_is_refused(refused):
                 field,
                 *words,
             )
-        refused(
-            lambda field=field: scenario(**{field: range(10**9)}), field, "more than"
-        )  # is not made a list
+        # is not made a list
+        refused(lambda field=field: scenario(**{field: range(10**9)}), field, "more than")
 
 
 def test_a_state_is_one_number_or_one_a_channel():

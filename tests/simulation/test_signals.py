@@ -65,29 +65,22 @@ EVERY = [
         slope=0.1,
     ),
 ]
+# on a body, which not every plant has
 BLOW = Push(
     "cart",
     x=2.0,
     z=-1.0,
     time=0.3,
     width=0.2,
-)  # on a body, which not every plant has
+)
 IN_SPACE = [BLOW, Wind(1.0, -2.0, time=0.3, width=0.4), Dryden(7.0, dt=5e-3)]
 SEEN = 0.3, -0.2, 0.1  # e, e' and s
-LED = [
-    signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)
-]  # what a reference may be
+# what a reference may be
+LED = [signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)]
 
 
 def scenario(**fields):
-    return smc.Scenario(
-        **{
-            "plant": "duffing",
-            "law": "classical",
-            "duration": 0.2,
-        }
-        | fields
-    )
+    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 0.2} | fields)
 
 
 def written(signal, times, seed=3, channel=1, stream=2):
@@ -241,9 +234,8 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
     np.testing.assert_allclose(
         gust.v[-1] - base.v[-1], length * (push.v[-1] - base.v[-1]), rtol=1e-3, atol=1e-7
     )
-    np.testing.assert_allclose(
-        gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4
-    )  # and is logged as it acts
+    # and is logged as it acts
+    np.testing.assert_allclose(gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -321,9 +313,8 @@ def test_the_frequencies_of_band_limited_noise_share_the_band_out():
     assert np.floor(part).tolist() == list(range(SINUSOIDS))
     assert np.std(part % 1.0) > 0.2
     assert abs(np.corrcoef(part, memory[SINUSOIDS:])[0, 1]) < 0.5
-    assert (
-        abs(np.corrcoef(part % 1.0, memory[SINUSOIDS:])[0, 1]) < 0.5
-    )  # a phase does not tell its frequency
+    # a phase does not tell its frequency
+    assert abs(np.corrcoef(part % 1.0, memory[SINUSOIDS:])[0, 1]) < 0.5
     assert np.all((memory[SINUSOIDS:] >= 0.0) & (memory[SINUSOIDS:] < 2 * math.pi))
 
 
@@ -331,11 +322,7 @@ def test_band_limited_noise_is_a_function_of_time_alone():
     times = np.random.default_rng(0).uniform(0.0, 10.0, 200)
     alone = [path(NOISE, [t])[0] for t in times]
     np.testing.assert_array_equal(path(NOISE, times), alone)
-    common = {
-        "law": "none",
-        "disturbance": NOISE,
-        "control_period": 1e-3,
-    }
+    common = {"law": "none", "disturbance": NOISE, "control_period": 1e-3}
     coarse, fine = (smc.run(scenario(**common, physics_step=h)).d for h in (1e-3, 2.5e-4))
     np.testing.assert_allclose(coarse, fine, atol=1e-12)  # sums of decimal times differ by an ulp
 

@@ -78,11 +78,7 @@ GIVEN = {
     smc.leaderboard: {"table": None},
     smc.study: {"scenarios": [RUN], "out": "study"},
     smc.which: {"plant": "duffing"},
-    smc.compare: {
-        "laws": "classical",
-        "plants": "duffing",
-        "conditions": "nominal",
-    },
+    smc.compare: {"laws": "classical", "plants": "duffing", "conditions": "nominal"},
     smc.audits.accuracy: {"laws": "classical", "plants": "duffing"},
     smc.worst_case: {"scenario": RUN},
     smc.Scene: {"title": "Two", "conditions": {"nominal": {"a": RUN}}},

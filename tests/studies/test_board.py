@@ -220,19 +220,11 @@ RESULTS = {  # changes of both blocks -> the result
     "barred": ({"untuned": ("second", "third")}, "none is named over second with default gains"),
     "all fail": (LOST | {"lacking": dict.fromkeys(LAWS, 2)}, "every law has runs that fail"),
     "few sets": (
-        {
-            "ahead": None,
-            "samples": 3,
-            "sets": 3,
-        },
+        {"ahead": None, "samples": 3, "sets": 3},
         "too few sets of gains (3), 7 can dec",
     ),
     "few runs": (
-        {
-            "ahead": None,
-            "samples": 4,
-            "runs": 4,
-        },
+        {"ahead": None, "samples": 4, "runs": 4},
         "too few runs (4), 7 can decide",
     ),
 }

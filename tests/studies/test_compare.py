@@ -21,11 +21,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import compare, executors, fair_gains, worst_case
 from smc_mujoco.studies.leaderboard import METRICS
 
-SHORT = {
-    "duration": 0.5,
-    "budget": 16,
-    "progress": False,
-}
+SHORT = {"duration": 0.5, "budget": 16, "progress": False}
 PLANTS = ["duffing", "inverted_pendulum"]
 
 
@@ -67,11 +63,7 @@ def kinds(found, plant="duffing"):
 
 
 def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
-    wanted = {
-        "my_law": "tuned here",
-        "classical": "shipped",
-        "pid": "yours",
-    }
+    wanted = {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
     for plant in PLANTS:
         assert kinds(found, plant) == wanted
     mine = [found.gains[plant]["my_law"].gains for plant in PLANTS]
@@ -142,11 +134,7 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
         monkeypatch.setattr(time, "time", lambda days=days: now() + 86400 * days)
-        short = {
-            "duration": 0.3,
-            "seeds": 2,
-            "threads": threads,
-        }
+        short = {"duration": 0.3, "seeds": 2, "threads": threads}
         laws = [my_law, "classical"]
         made = smc.compare(
             laws,
@@ -171,11 +159,7 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
 def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
     tables = []
     for seed in (0, 1):
-        given = {
-            "out": tmp_path,
-            "seed": seed,
-            **SHORT,
-        }
+        given = {"out": tmp_path, "seed": seed, **SHORT}
         made = smc.compare(["classical", "pid"], "duffing", "noise", 3, **given)
         tables.append(made.table)
         (unseen, *_) = made.leaderboard
@@ -280,11 +264,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     monkeypatch.setattr(worst_case, "default_budget", lambda scenario, within: 8)
     within = smc.Uncertainty(disturbance=0.5)
     laws = [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
-    given = {
-        "worst": within,
-        "out": tmp_path,
-        **SHORT,
-    }
+    given = {"worst": within, "out": tmp_path, **SHORT}
     made = smc.compare(laws, "duffing", "nominal", 1, **given)
     for case in made.worst["duffing"].values():
         assert smc.score(smc.run(case.scenario))["rms_error"] == case.value >= case.median

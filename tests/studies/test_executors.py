@@ -317,7 +317,9 @@ def wait(there: Callable[[], object]) -> None:
 def dask(
     tmp_path_factory,
 ) -> Iterator[tuple[str, list[subprocess.Popen], Callable[[], subprocess.Popen]]]:
-    """The address of a scheduler; its process and that of its worker; what starts another worker."""
+    """The address of a scheduler; its process and that of its worker; what starts another
+    worker.
+    """
     tmp_path = tmp_path_factory.mktemp("dask")
     file = tmp_path / "scheduler.json"
     common = "--no-dashboard", "--scheduler-file", str(file)

@@ -69,20 +69,12 @@ FAILED = made(RUN, 0.2, diverged_at=0.1, failure="a law raised")
 LEAST = [  # the shares at which runs settle, whose is least, and whose is most
     ({"a": 0.2, "b": 0.4}, "a (0.400 s)", "b (0.800 s)"),
     (
-        {
-            "a": 0.50,
-            "b": 0.51,
-            "c": 0.8,
-        },
+        {"a": 0.50, "b": 0.51, "c": 0.8},
         "a and b tied (1.00 to 1.02 s)",
         "c (1.60 s)",
     ),  # 2 % apart
     (
-        {
-            "a": 0.50,
-            "b": 0.52,
-            "c": 0.2,
-        },
+        {"a": 0.50, "b": 0.52, "c": 0.2},
         "c (0.400 s)",
         "b (1.04 s)",
     ),  # 4 % apart

@@ -162,7 +162,10 @@ def test_another_order_of_a_class_s_definitions_is_no_edit():
 
 def test_a_key_does_not_depend_on_the_process():
     made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
-    code = f"from smc_mujoco import grid; from smc_mujoco.studies.run_key import key; print(key({made}))"
+    code = (
+        "from smc_mujoco import grid; from smc_mujoco.studies.run_key import key; "
+        f"print(key({made}))"
+    )
     done = python("-c", code, PYTHONHASHSEED="1")
     assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
 
@@ -234,11 +237,7 @@ class Weighted:
 
 def reaching(value: object, text: str = "THING(y.e)", before: str = "") -> Callable:
     """A law that calls something global."""
-    space: dict = {
-        "__name__": "written",
-        "THING": value,
-        "functools": functools,
-    }
+    space: dict = {"__name__": "written", "THING": value, "functools": functools}
     exec(f"{before}\ndef law(y, gains, memory): return {text}, y.e", space)
     return space["law"]
 
@@ -321,9 +320,8 @@ def test_replaced_functions_of_a_plant_change_the_key():
     def nothing(*given):
         yield from ()
 
-    exec(
-        "def generated(x, v, i, q): return 0.0, 2.0", made := {}
-    )  # without a module, as SymPy's lambdify
+    # without a module, as SymPy's lambdify
+    exec("def generated(x, v, i, q): return 0.0, 2.0", made := {})
     own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
     contacts = own.plant.contacts
     mechanisms = own.plant.mechanisms
@@ -354,11 +352,7 @@ def test_metrics_are_the_same_after_a_score():
 
 
 def test_a_global_with_the_name_of_an_attribute_does_not_count():
-    space = {
-        "__name__": "users",
-        "t": 3.0,
-        "G": 2.0,
-    }
+    space = {"__name__": "users", "t": 3.0, "G": 2.0}
     exec("def timed(y, gains, memory):\n    return -G * y.e + 0.0 * y.t, y.e", space)
     before = fingerprint.now(space["timed"])
     space["t"] = open  # neither read by the law nor comparable

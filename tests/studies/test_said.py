@@ -33,11 +33,7 @@ def attacked(law: str, value: float, median: float, **fields: object) -> WorstCa
         "outside": "",
         "seed": 0,
     }
-    both = {
-        "scenario": scenario,
-        "nominal": scenario,
-        "within": WITHIN,
-    }
+    both = {"scenario": scenario, "nominal": scenario, "within": WITHIN}
     return WorstCase(value=value, median=median, **given | both | fields)
 
 
@@ -132,9 +128,8 @@ def test_a_result_is_read_only_where_its_seal_fits(tmp_path):
     file.write_text("other")
     assert kept(1, "three") == "three"
     assert kept(2, "four") == "four"
-    assert [one.read_text() for one in tmp_path.iterdir()] == [
-        "four"
-    ]  # those with other hashes are removed
+    # those with other hashes are removed
+    assert [one.read_text() for one in tmp_path.iterdir()] == ["four"]
 
 
 @pytest.mark.parametrize("task", ["sway", "payload", "wall", "behind", "blow"])

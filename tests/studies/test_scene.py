@@ -194,11 +194,7 @@ PLANTS = {
         (0.5,),
     ),
     "van_der_pol": (
-        {
-            "M": 1.0,
-            "mu": 1.0,
-            "k": 1.0,
-        },
+        {"M": 1.0, "mu": 1.0, "k": 1.0},
         (2.0,),
     ),
     "duffing": (
@@ -235,16 +231,8 @@ GAINS = {
     "inverted_pendulum": {
         "observer_free": {"lam": 4.364, "k1": 9.708},
         "classical": {"k": 1.945, "c": 12.0},
-        "boundary_layer": {
-            "k": 6.0,
-            "c": 9.06,
-            "phi": 2.096,
-        },
-        "adaptive": {
-            "gamma": 104.7,
-            "c": 12.0,
-            "k0": 0.0,
-        },
+        "boundary_layer": {"k": 6.0, "c": 9.06, "phi": 2.096},
+        "adaptive": {"gamma": 104.7, "c": 12.0, "k0": 0.0},
         "adaptive_leak": {
             "gamma": 20.31,
             "c": 12.0,
@@ -262,16 +250,8 @@ GAINS = {
     "van_der_pol": {
         "observer_free": {"lam": 6.0, "k1": 1.976},
         "classical": {"k": 6.0, "c": 2.849},
-        "boundary_layer": {
-            "k": 5.763,
-            "c": 2.768,
-            "phi": 0.01578,
-        },
-        "adaptive": {
-            "gamma": 66.11,
-            "c": 2.853,
-            "k0": 0.0,
-        },
+        "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
+        "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
         "adaptive_leak": {
             "gamma": 7.738,
             "c": 2.821,
@@ -289,16 +269,8 @@ GAINS = {
     "duffing": {
         "observer_free": {"lam": 6.0, "k1": 3.076},
         "classical": {"k": 3.91, "c": 3.576},
-        "boundary_layer": {
-            "k": 6.0,
-            "c": 3.975,
-            "phi": 0.5429,
-        },
-        "adaptive": {
-            "gamma": 600.0,
-            "c": 4.371,
-            "k0": 0.0,
-        },
+        "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
+        "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
         "adaptive_leak": {
             "gamma": 13.87,
             "c": 4.256,
@@ -316,16 +288,8 @@ GAINS = {
     "pendulum_network": {
         "observer_free": {"lam": 2.922, "k1": 6.19},
         "classical": {"k": 0.9747, "c": 5.944},
-        "boundary_layer": {
-            "k": 6.0,
-            "c": 6.705,
-            "phi": 2.577,
-        },
-        "adaptive": {
-            "gamma": 1.294,
-            "c": 6.718,
-            "k0": 0.0,
-        },
+        "boundary_layer": {"k": 6.0, "c": 6.705, "phi": 2.577},
+        "adaptive": {"gamma": 1.294, "c": 6.718, "k0": 0.0},
         "adaptive_leak": {
             "gamma": 24.32,
             "c": 9.468,
@@ -343,16 +307,8 @@ GAINS = {
     "inverted_pendulum_network": {
         "observer_free": {"lam": 3.961, "k1": 9.362},
         "classical": {"k": 1.73, "c": 11.11},
-        "boundary_layer": {
-            "k": 6.0,
-            "c": 8.705,
-            "phi": 2.328,
-        },
-        "adaptive": {
-            "gamma": 2.189,
-            "c": 9.408,
-            "k0": 0.0,
-        },
+        "boundary_layer": {"k": 6.0, "c": 8.705, "phi": 2.328},
+        "adaptive": {"gamma": 2.189, "c": 9.408, "k0": 0.0},
         "adaptive_leak": {
             "gamma": 28.47,
             "c": 11.36,
@@ -439,11 +395,7 @@ def test_a_name_that_the_study_does_not_have_is_answered_with_the_nearest(names,
         ("vdp_disturbance", {"nominal": "nominal", "sine": "sine"}),
         (
             "control_signals",
-            {
-                "nominal": "nominal",
-                "noise": "noise",
-                "sine": "sine",
-            },
+            {"nominal": "nominal", "noise": "noise", "sine": "sine"},
         ),
     ],
 )
@@ -463,11 +415,7 @@ def ends_of(name):
 
 def test_a_drone_upside_down_loses_the_height_of_another_coding():
     traces, names = ends_of("quadrotor_flip")
-    published = {
-        "geometric": 6.30,
-        "quaternion_sliding": 3.64,
-        "adaptive_quaternion_sliding": 3.69,
-    }
+    published = {"geometric": 6.30, "quaternion_sliding": 3.64, "adaptive_quaternion_sliding": 3.69}
     assert {law: names["lost"](traces[law]) for law in published} == pytest.approx(
         published, rel=0.1
     )

@@ -16,14 +16,7 @@ from smc_mujoco.studies.sensitivity import default_over, default_points
 
 
 def scenario(**fields) -> smc.Scenario:
-    return smc.Scenario(
-        **{
-            "plant": "duffing",
-            "law": "pid",
-            "duration": 0.5,
-        }
-        | fields
-    )
+    return smc.Scenario(**{"plant": "duffing", "law": "pid", "duration": 0.5} | fields)
 
 
 def space(*names: str) -> SimpleNamespace:
@@ -32,10 +25,8 @@ def space(*names: str) -> SimpleNamespace:
 
 
 def test_indices_of_ishigami_s_function_are_its_closed_forms():
-    """T.
-
-    Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone, and a
-    fourth never.
+    """T. Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone,
+    and a fourth never.
     """
     n = 4096
     three = 2.0 * math.pi
@@ -208,9 +199,8 @@ def test_an_axis_of_chance_bounds_no_region_and_is_not_improved():
 
 def test_the_improvement_is_told_by_the_half_that_did_not_choose_it():
     shares = np.random.default_rng(1).random((400, 2))
-    values = np.where(
-        np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1]
-    )  # better above, in the half that tells
+    # better above, in the half that tells
+    values = np.where(np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1])
     assert module.improvement(space("a", "b"), shares, values) is None
 
 

@@ -103,9 +103,10 @@ def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
 
 def test_bars_are_shares_of_each_joints_limit(trace):
     assert arm.has_bars(trace)
+    # volts
     assert not arm.has_bars(
         struck(trace, actuator=smc.DCMotor(command="voltage", gear=50.0), u_max=None)
-    )  # volts
+    )
     bars = overlay(trace)
     expected = trace.applied[:20].mean(axis=0) / np.array([4.0, 2.0, 9.0])
     assert bars.shares
@@ -127,9 +128,8 @@ def test_bars_are_shares_of_each_joints_limit(trace):
     down = round(zero) + quarter
     assert image[up, middles[0]].tolist() == list(style.rgb(COLOUR))
     assert image[down, middles[0]].tolist() == list(style.rgb(style.PAPER))
-    assert image[down, middles[1]].tolist() == list(
-        style.rgb(style.FAILED)
-    )  # all that the motor has
+    # all that the motor has
+    assert image[down, middles[1]].tolist() == list(style.rgb(style.FAILED))
     assert (
         image[up, middles[2]].tolist()
         == image[down, middles[2]].tolist()
@@ -146,9 +146,8 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
     assert 250 - 100 * arm.BLOW_DISTANCE - 3 <= x.max() <= 250 - 100 * arm.BLOW_DISTANCE + 1
     assert abs(np.median(y) - 100) <= 1
-    edges = np.array(
-        [0.0, 0.02, 0.03, 0.14, 0.16, 0.18]
-    )  # s, of frames; it is seen until 0.12 s after its end
+    # s, of frames; it is seen until 0.12 s after its end
+    edges = np.array([0.0, 0.02, 0.03, 0.14, 0.16, 0.18])
     frames = []
     for frame in range(5):
         frames.append(overlay(hit, edges, body).over(paper(), frame))

@@ -56,9 +56,8 @@ def test_an_own_model_s_camera_is_found_by_its_name(trace):
     assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
     azimuth = -scene.turn(trace.scenario)[:2, 2]
     down = -scene.turn(trace.scenario)[2, 2]
-    assert azimuth / np.linalg.norm(azimuth) == pytest.approx(
-        [0.0, 1.0]
-    )  # the first that stands still, which
+    # the first that stands still, which
+    assert azimuth / np.linalg.norm(azimuth) == pytest.approx([0.0, 1.0])
     assert down == pytest.approx(np.sin(np.radians(scene.LOW_ELEVATION)))  # looks along the floor
     with pytest.raises(smc.ScenarioError, match="sid"):
         scene.turn(trace.scenario, "sid")
@@ -71,9 +70,8 @@ def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace,
     with staged([trace] * machines, ["#0072B2", "#D55E00"][:machines], SIZE, ROOM) as shown:
         (link,) = shown.links[0]
         ball = next(i for i in range(shown.model.ngeom) if shown.model.geom_rgba[i, 1] > 0.8)
-        assert (
-            shown.model.geom_rgba[link, 2] > 2 * shown.model.geom_rgba[link, 0]
-        )  # blue, not MuJoCo's grey
+        # blue, not MuJoCo's grey
+        assert shown.model.geom_rgba[link, 2] > 2 * shown.model.geom_rgba[link, 0]
         assert shown.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
 
 
@@ -93,9 +91,8 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
     (followed,) = tracks([trace], ["#0072B2"])
     followed.motion = motion
     low = shown.reach(followed)[:, 2].min()
-    assert low == pytest.approx(
-        motion.poses[:, 3].min() - 0.1, abs=0.2
-    )  # the ball is in the picture
+    # the ball is in the picture
+    assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)
 
 
 @pytest.mark.parametrize(

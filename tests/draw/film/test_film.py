@@ -78,11 +78,8 @@ def test_arrows_are_to_scale_and_a_bar_shows_switching():
     arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 0.2), "#0072B2")
     assert arrow.high == pytest.approx(0.25, abs=0.02)
     assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
-    assert [part.layer for part in (arrow, bar, push)] == [
-        0,
-        0,
-        1,
-    ]  # each arrow is beyond the one before
+    # each arrow is beyond the one before
+    assert [part.layer for part in (arrow, bar, push)] == [0, 0, 1]
     assert push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
 
 

@@ -89,9 +89,8 @@ def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypat
         assert shown.data.geom_xpos[board, 0] == pytest.approx(shown.data.geom_xpos[rail, 0])
         rod = cut.geom("m0/rod").id
         ends = shown.data.geom_xpos[rod] + np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
-        assert (
-            np.ptp(shown.project(ends)[:, 1]) > 120.0
-        )  # px of a pole of 1 m: 81 with the whole rail
+        # px of a pole of 1 m: 81 with the whole rail
+        assert np.ptp(shown.project(ends)[:, 1]) > 120.0
 
 
 def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeypatch):

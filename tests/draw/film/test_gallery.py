@@ -13,9 +13,8 @@ from smc_mujoco.common import gl
 
 GALLERY = Path(__file__).parents[3] / "videos" / "gallery.py"
 BLOCK = 15  # px
-MAX_DIFFERENCE = (
-    14.0  # of 255, of the mean of a block: WebP changes it by up to 8.5; letters 4 px off, by 34
-)
+# of 255, of the mean of a block: WebP changes it by up to 8.5; letters 4 px off, by 34
+MAX_DIFFERENCE = 14.0
 made = importlib.util.spec_from_file_location("gallery", GALLERY)
 assert made is not None
 assert made.loader is not None

@@ -90,9 +90,8 @@ def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp
             x = np.nonzero(red)[1]
             assert red.sum() > 100
             assert np.abs(x.mean() - centre[0]) < 100
-            assert (x.mean() > centre[0]) == (
-                push > 0.0
-            )  # seen from the front, the near side goes right
+            # seen from the front, the near side goes right
+            assert (x.mean() > centre[0]) == (push > 0.0)
 
 
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():

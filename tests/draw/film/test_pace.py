@@ -73,9 +73,8 @@ def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, sp
 
 
 def test_films_have_a_longest_duration(base, monkeypatch):
-    trace = moving(
-        base, lambda t: np.sin(20.0 * t)
-    )  # more than a fifth of its range a frame, all the time
+    # more than a fifth of its range a frame, all the time
+    trace = moving(base, lambda t: np.sin(20.0 * t))
     found = pace.clock([trace], FPS)
     assert 4.0 < len(found.times) / FPS <= 8.1
     assert set(found.speeds) == {0.5}
@@ -104,11 +103,8 @@ def test_impacts_are_slowest(monkeypatch):
 def test_frames_whose_middle_is_near_that_of_a_push_are_slowest(base, monkeypatch):
     monkeypatch.setattr(style, "pushes", lambda runs: [SimpleNamespace(time=2.0, width=0.1)])
     grid, found = pace.speeds([moving(base, np.zeros_like)], FPS)
-    assert (FPS * grid[found == 0.125]).round().tolist() == [
-        60,
-        61,
-        62,
-    ]  # of middles 2.017, 2.05 and 2.083 s
+    # of middles 2.017, 2.05 and 2.083 s
+    assert (FPS * grid[found == 0.125]).round().tolist() == [60, 61, 62]
 
 
 def test_a_diverged_run_does_not_make_the_others_rest(base):

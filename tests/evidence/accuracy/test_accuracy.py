@@ -10,11 +10,7 @@ from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.evidence.accuracy import accuracy
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
-SHORT = {
-    "periods": PERIODS,
-    "seeds": 1,
-    "duration": 8.0,
-}
+SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}
 
 
 def double_integrator():

@@ -37,11 +37,7 @@ SAID = {
             part("reaching", {"reaching": -6.0, "actuator": 0.0}, X=0.0, S=0.0),
             part(
                 "super-twisting",
-                {
-                    "integral": -7.0,
-                    "slope": -8.0,
-                    "actuator": 9.0,
-                },
+                {"integral": -7.0, "slope": -8.0, "actuator": 9.0},
             ),
         ],
     ),
@@ -70,21 +66,13 @@ SAID = {
     "super-twisting": certificate(
         "van_der_pol",
         "super_twisting",
-        {
-            "k1": 3.0,
-            "k2": 2.0,
-            "c": 1.5,
-        },
+        {"k1": 3.0, "k2": 2.0, "c": 1.5},
         disturbance=0.5,
         slope=1.75,
         parts=[
             part(
                 "super-twisting",
-                {
-                    "integral": 0.25,
-                    "slope": 0.1,
-                    "actuator": 0.2,
-                },
+                {"integral": 0.25, "slope": 0.1, "actuator": 0.2},
                 X=0.3,
             )
         ],

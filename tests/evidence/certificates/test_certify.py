@@ -27,16 +27,8 @@ from smc_mujoco.evidence.certificates import checker, loops, maker
 KEPT = {
     ("van_der_pol", "observer_free"): {"lam": 6.0, "k1": 1.992},
     ("inverted_pendulum", "classical"): {"k": 1.523, "c": 15.36},
-    ("duffing", "terminal"): {
-        "k": 1.848,
-        "b": 2.288,
-        "bound": 0.02173,
-    },
-    ("inverted_pendulum", "super_twisting"): {
-        "k1": 2.025,
-        "k2": 8.678,
-        "c": 9.658,
-    },
+    ("duffing", "terminal"): {"k": 1.848, "b": 2.288, "bound": 0.02173},
+    ("inverted_pendulum", "super_twisting"): {"k1": 2.025, "k2": 8.678, "c": 9.658},
 }
 
 

@@ -16,11 +16,7 @@ from smc_mujoco.evidence.certificates.checker import arb
 
 LAWS = {
     "observer_free": {"lam": 2.3, "k1": 1.7},
-    "boundary_layer": {
-        "k": 2.3,
-        "c": 1.7,
-        "phi": 0.4,
-    },
+    "boundary_layer": {"k": 2.3, "c": 1.7, "phi": 0.4},
     "classical": {"k": 2.3, "c": 1.7},
     "lqr": {
         "a1": 0.7,
@@ -147,11 +143,7 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
         {"A": 0.8},
         {"B": -0.7, "E": 0.3},
         {"C": -0.9, "F": -0.4},
-        {
-            "C": 0.5,
-            "E": 2.9,
-            "F": 0.8,
-        },
+        {"C": 0.5, "E": 2.9, "F": 0.8},
     ],
 )
 def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
@@ -183,11 +175,7 @@ def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
 
 
 def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_strong_as_the_law():
-    terms = {
-        "B": -0.3,
-        "E": 0.4,
-        "F": 0.2,
-    }
+    terms = {"B": -0.3, "E": 0.4, "F": 0.2}
     e = plant(**terms)
     made = loop("classical", terms)
     gains = {
@@ -237,11 +225,7 @@ def test_margins_of_super_twisting_are_those_of_its_form():
     p = 4.5
     w = -1.0
     r = 0.97
-    gains = {
-        "k1": 3.0,
-        "k2": 2.6,
-        "c": c,
-    }
+    gains = {"k1": 3.0, "k2": 2.6, "c": c}
     f = checker.feedback({"name": "super_twisting", "gains": gains}, 4.0)
     det = p * r - w * w
     z1 = math.sqrt(q * r / det)
@@ -259,11 +243,7 @@ def test_margins_of_super_twisting_are_those_of_its_form():
         "slope": L - fastest - slope,
         "actuator": 4.0 - held - 3.0 * z1,
     }
-    doc = {
-        "disturbance": d0,
-        "slope": slope,
-        "u_max": 4.0,
-    }
+    doc = {"disturbance": d0, "slope": slope, "u_max": 4.0}
     part = {
         "P": [p, w, r],
         "L": L,

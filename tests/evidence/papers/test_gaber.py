@@ -176,11 +176,7 @@ def coupled(
     ours: tuple[float, float, float], classical: tuple[float, float, float], slower: float
 ) -> Told:
     """Overshoot at the three couplings."""
-    at = {
-        0.0: 0,
-        0.5: 1,
-        5.0: 2,
-    }
+    at = {0.0: 0, 0.5: 1, 5.0: 2}
 
     def told(s: Scenario) -> dict[str, float]:
         over = {OURS: ours, CLASSICAL: classical}[s.law.name][at[s.plant.parameters["kc"]]]
@@ -592,11 +588,7 @@ def paper_like(s: Scenario) -> dict[str, float]:
 def opposite(s: Scenario) -> dict[str, float]:
     """Runs as it has not."""
     name = s.law.name
-    tolerated = {
-        OURS: 0.01,
-        HOSMC: 0.01,
-        CLASSICAL: 0.05,
-    }.get(name, 0.1)
+    tolerated = {OURS: 0.01, HOSMC: 0.01, CLASSICAL: 0.05}.get(name, 0.1)
     return {
         "tv_rate": 1.0,
         "max_u": 6.0,

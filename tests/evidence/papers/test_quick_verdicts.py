@@ -77,11 +77,7 @@ def record(claim: Claim, late: bool) -> Record:
         numbers |= {
             f"{gains}: {what}": value for what, value in claim.beside[gains].items() if not late
         }
-    return {
-        "whose": claim.whose,
-        "verdict": claim.verdict,
-        "numbers": numbers,
-    }
+    return {"whose": claim.whose, "verdict": claim.verdict, "numbers": numbers}
 
 
 def agrees(value: float, known: float | list[float]) -> bool:

@@ -156,11 +156,7 @@ def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
 
 # laws
 
-FREE = {
-    "alpha": 0.0,
-    "beta": 0.0,
-    "delta": 0.0,
-}  # of a Duffing oscillator: a mass of 1 kg
+FREE = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a mass of 1 kg
 
 
 def test_implicit_twisting_has_both_signs_at_the_end_of_the_period():

@@ -202,11 +202,7 @@ def test_what_cannot_be_repeated_is_one_sentence(bad, words, record):
 
 
 def test_columns_have_the_units_of_the_machine():
-    assert QUBE.units == {
-        "theta": "rad",
-        "alpha": "rad",
-        "plant_input": "V",
-    }
+    assert QUBE.units == {"theta": "rad", "alpha": "rad", "plant_input": "V"}
     assert smc.rig("emps").units == {"x": "m", "u": "V"}
     assert smc.rig("realaigym_acrobot").units == {"tau_meas1": "N m", "tau_meas2": "N m"}
 

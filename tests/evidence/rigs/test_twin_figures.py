@@ -78,11 +78,7 @@ def test_a_summary_is_over_the_known_figures_of_whole_twins():
         "unit": "m",
         "runs": 1,
     }
-    kept = common | {
-        "machine": 2.0,
-        "low": 1.0,
-        "high": 3.0,
-    }
+    kept = common | {"machine": 2.0, "low": 1.0, "high": 3.0}
     rows = [
         TwinFigure(
             figure="a",

@@ -37,11 +37,8 @@ WAYS = (
     {"model": "nominal", "surface": "linear"},
 )
 FIELDS = ("x", "v", "u", "applied", "s")
-OF_PLANT = {
-    "a1": 0.5,
-    "a2": -0.2,
-    "b": 2.0,
-}  # which a scenario gives to a law of the library, and to none in C
+# which a scenario gives to a law of the library, and to none in C
+OF_PLANT = {"a1": 0.5, "a2": -0.2, "b": 2.0}
 # Laws whose C takes every turn there is: powers, roots, tables, loops, branches, several results,
 # state.
 SINGLE = (
@@ -232,17 +229,13 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
     words = {}
     for name, value in re.findall(r"Q15_(\w+) = (-?\d+)", text):
         words[name] = int(value)
-    assert words == {
-        "ON_E": 2560,
-        "ON_DE": 2048,
-        "LAM": 24576,
-    }  # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
+    # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
+    assert words == {"ON_E": 2560, "ON_DE": 2048, "LAM": 24576}
     core = back(folder, smc.law("observer_free"), "q15").library.smc_q15_u
     core.restype = ctypes.c_int16
     core.argtypes = [ctypes.c_int16] * 2
-    assert core(-32768, 24576) == core(
-        -32767, 24576
-    )  # which the sliding variable's function never gives
+    # which the sliding variable's function never gives
+    assert core(-32768, 24576) == core(-32767, 24576)
     s = np.arange(-32767, 32768)
     i = np.abs(s) >> 7
     part = np.abs(s) & 127
@@ -259,11 +252,7 @@ NOUGHT = -0.0
 
 
 @smc.law_function(
-    gains={
-        "k": 2.0,
-        "out": 3.0,
-        "if_": 1.5,
-    },
+    gains={"k": 2.0, "out": 3.0, "if_": 1.5},
     memory=4,
 )
 def turns(z, K, state):

@@ -127,10 +127,8 @@ def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
     for lam in (2.0, 6.0):
         for seed in range(4):
             sweep.append(scenario(mine(lam=lam), seed=seed, duration=0.1))
-    one, two = (
-        smc.run(sweep, threads=1),
-        smc.run(sweep, threads=2),
-    )  # a PlainLoopWarning would be an error
+    # a PlainLoopWarning would be an error
+    one, two = smc.run(sweep, threads=1), smc.run(sweep, threads=2)
     for a, b in zip(one, two, strict=True):
         assert same(a, b)
 

@@ -72,7 +72,9 @@ def scenario(law, of_surface=None, velocity="measured", **more) -> smc.Scenario:
 
 @pytest.fixture(scope="module")
 def combined(folder):
-    """Combination -> its FMU, compiled in a third of the time without optimisation, and its trace."""
+    """Combination -> its FMU, compiled in a third of the time without optimisation, and its
+    trace.
+    """
     scenarios = [scenario(*one) for one in COMBINED]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
@@ -292,11 +294,7 @@ def test_a_value_out_of_its_range_is_refused_in_words(twisting, values, said):
 
 def test_a_long_step_is_its_samples_and_a_short_one_holds(twisting):
     fine, long, short = (Importer(*twisting) for _ in range(3))
-    x = {
-        "x": 0.3,
-        "r": 0.1,
-        "dr": 0.0,
-    }
+    x = {"x": 0.3, "r": 0.1, "dr": 0.0}
     expected = [fine.step(1e-3 * k, **x) for k in range(10)]
     assert long.step(0.0, 4e-3, **x) == expected[3]
     assert long.step(4e-3, 6e-3, **x) == expected[9]

@@ -28,11 +28,7 @@ pytestmark = [
 FMI1 = (
     'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
 )
-VARIABLES = {
-    "x": "Plant.Theta",
-    "v": "omega",
-    "r": "setpoint",
-}
+VARIABLES = {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
 RENAMED = {
     "variables": VARIABLES,
     "constants": {"mode": 0.0},
@@ -113,11 +109,7 @@ def test_gains_are_the_fmu_s_parameters(folder):
         smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0
     )
     template = smc.exchange.law_from_fmu(path, isolate=False)
-    assert template.defaults == {
-        "u_max": 5.0,
-        "law_lam": 4.0,
-        "law_k1": 2.0,
-    }
+    assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
     with pytest.raises(smc.ScenarioError, match="law_lam"):
         template(law_lam=-1.0)
     with pytest.raises(smc.ScenarioError, match="unknown gain of gains 'lam'"):
@@ -184,11 +176,7 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED)
     function = law.function
     assert isinstance(function, load.FmuLaw)
-    assert dict(function.inputs) == {
-        "x": "Plant.Theta",
-        "v": "omega",
-        "r": "setpoint",
-    }
+    assert dict(function.inputs) == {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
     assert function.outputs == ("torque",)
     assert function.period == 0.01
     trace, slower = smc.run(
@@ -228,11 +216,7 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
 def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
     path = helper.fmi3(folder)
-    names = {
-        "x": "sensor.phi",
-        "v": "sensor.omega",
-        "u": "motor.torque",
-    }
+    names = {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
     with pytest.raises(smc.ScenarioError, match="mean nothing that a law measures, enable, mode"):
         smc.exchange.law_from_fmu(path, variables=names)
     laws = []
@@ -266,7 +250,10 @@ def test_periods_that_do_not_fit_are_said(foreign):
         (1.0, r"the step from t = 0 s died of SIGSEGV"),
         (
             2.0,
-            r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout=",
+            (
+                r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give "
+                r"timeout="
+            ),
         ),
         (3.0, r"torque is nan after 1 steps: fix the FMU"),
         (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
@@ -305,7 +292,8 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
     [
         (
             {},
-            "controller.fmu has inputs that mean nothing that a law measures, mode: say which it is, "
+            "controller.fmu has inputs that mean nothing that a law measures, mode: say which it "
+            "is, "
             "variables={'x': 'mode'}, or hold each, constants={'mode': 0.0}",
         ),
         (

@@ -65,7 +65,9 @@ def made(folder):
 
 
 def seen(known, controller: Controller, trace: smc.Trace, k: int) -> dict[str, float]:
-    """The inputs of an FMU at a sample of a trace without noise: what the controller's law reads."""
+    """The inputs of an FMU at a sample of a trace without noise: what the controller's law
+    reads.
+    """
     motion = np.repeat(np.transpose([type(REFERENCE).value(trace.t[k], REFERENCE)]), 3, axis=1)
     y = controller.joint_measurement(trace.x[k], trace.v[k], trace.t[k], motion)
     vectors = {name: getattr(y, name) for name in ("x", "v", "r", "dr", "ddr", "h", "g")}

@@ -44,11 +44,7 @@ ROAD = {  # name -> package, file, channels
     "menagerie-like": (
         None,
         ARM,
-        {
-            "pan": SERVO,
-            "lift": SERVO,
-            "elbow": SERVO,
-        },
+        {"pan": SERVO, "lift": SERVO, "elbow": SERVO},
     ),
     "dm acrobot": ("dm_control", "suite/acrobot.xml", ["elbow"]),
     "manipulator": (
@@ -168,9 +164,8 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
     (tmp_path / "arm.xml").write_text(ARM)
     monkeypatch.chdir(tmp_path)
     for text in ("arm.xml:lift,elbow", "arm.xml:lift+elbow", "arm.xml: lift, elbow"):
-        with pytest.raises(
-            smc.ScenarioError, match="motor=True"
-        ):  # a menagerie's servos are not motors
+        # a menagerie's servos are not motors
+        with pytest.raises(smc.ScenarioError, match="motor=True"):
             as_plant(text)
     (tmp_path / "arm.xml").write_text(
         ARM.replace("<position", "<motor").replace(' kp="100" kv="10" inheritrange="1"', "")
@@ -200,9 +195,8 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
       <mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size=".05" pos="0 0 -.3"/>
       </body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
-    with pytest.raises(
-        smc.ScenarioError, match="starts at rest at 0"
-    ):  # before any gains are searched
+    # before any gains are searched
+    with pytest.raises(smc.ScenarioError, match="starts at rest at 0"):
         smc.which(
             "one.xml:j",
             "nominal",

@@ -119,11 +119,7 @@ def test_two_seconds_of_a_flip_are_those_of_an_integration_without_mujoco(drone)
     place, turn, v, w = newton_euler(2.0, 4e-3)
     misses = []
     for step in (2e-3, 1e-3):
-        common = {
-            "control_period": 4e-3,
-            "physics_step": step,
-            "duration": 2.0,
-        }
+        common = {"control_period": 4e-3, "physics_step": step, "duration": 2.0}
         trace = smc.run(smc.Scenario(plant=drone, law=flip, **common))
         attitude = Rotation.from_rotvec(trace.x[-1, 3:].copy()).as_matrix()
         off = trace.x[-1, :3] - place, attitude - turn, trace.v[-1] - [*v, *w]

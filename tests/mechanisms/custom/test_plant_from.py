@@ -119,17 +119,9 @@ def read(plant: Plant) -> mujoco.MjModel:
 
 # it moves as in MuJoCo
 
-FOREIGN = {
-    "cartpole": cartpole,
-    "acrobot": acrobot,
-    "reacher": reacher,
-}
+FOREIGN = {"cartpole": cartpole, "acrobot": acrobot, "reacher": reacher}
 # of each motor of the file
-CTRL = {
-    "cartpole": 0.3,
-    "acrobot": 0.4,
-    "reacher": 0.002,
-}
+CTRL = {"cartpole": 0.3, "acrobot": 0.4, "reacher": 0.002}
 
 
 @pytest.mark.slow
@@ -469,9 +461,8 @@ def test_a_channel_s_limit_is_what_the_file_s_motor_gives(arm, tmp_path, name):
     assert smc.Scenario(plant=plant, law="none").limits == (limit if limit < math.inf else 6.0,)
     raw = read(plant)
     data = mujoco.MjData(raw)
-    if not name.startswith(
-        "ideal"
-    ):  # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
+    # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
+    if not name.startswith("ideal"):
         forces = []
         for data.ctrl[0] in (-100.0, 100.0):
             mujoco.mj_forward(raw, data)

@@ -114,11 +114,7 @@ def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
 
 @pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network"])
 def test_no_lag_and_no_limit_are_the_plants_own_actuator_to_the_bit(name):
-    common = {
-        "plant": name,
-        "law": "super_twisting",
-        "duration": 0.2,
-    }
+    common = {"plant": name, "law": "super_twisting", "duration": 0.2}
     own, lag, rate = smc.run(
         [
             smc.Scenario(**common, actuator=a)

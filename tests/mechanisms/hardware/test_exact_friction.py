@@ -13,11 +13,7 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 
 PERIOD = 1e-3
-EXACT = {
-    "rtol": 1e-11,
-    "atol": 1e-13,
-    "method": "DOP853",
-}
+EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
 
 
 def by_events(scenario, u, level, d=lambda t: 0.0):
@@ -153,11 +149,7 @@ def test_scores_do_not_depend_on_the_step(law):
             rel=0.005,
             abs=1e-9,
         )
-    known = {
-        "classical": 5.68e-4,
-        "adaptive": 1.42e-3,
-        "super_twisting": 0.0,
-    }
+    known = {"classical": 5.68e-4, "adaptive": 1.42e-3, "super_twisting": 0.0}
     assert scores[0]["steady_error"] == pytest.approx(known[law], rel=0.005, abs=1e-9)
 
 

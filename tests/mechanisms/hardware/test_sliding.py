@@ -109,9 +109,8 @@ def test_a_coasting_joint_slows_down_by_the_formula():
     exact = solve_ivp(
         lambda t, v: -sigmoid(v, P1[3], P2[3], P3[3]), (0, 1), [1.5], t_eval=trace.t, rtol=1e-10
     )
-    np.testing.assert_allclose(
-        trace.v[:, 0], exact.y[0], atol=3e-4
-    )  # of a step of 0.25 ms, of first order
+    # of a step of 0.25 ms, of first order
+    np.testing.assert_allclose(trace.v[:, 0], exact.y[0], atol=3e-4)
 
 
 # a joint at rest
