@@ -87,8 +87,8 @@ def pages() -> dict[str, dict[str, list[Page]]]:
 
 SURFACES = """`smc.Scenario(surface=smc.surface("terminal"), ...)` replaces the sliding variable
 $e' + c e$ of a law of relative degree 1."""
-ESTIMATORS = """`smc.Scenario(velocity=smc.estimator("levant"), ...)` replaces the velocity sensor by
-an estimate from the position $x$."""
+ESTIMATORS = """`smc.Scenario(velocity=smc.estimator("levant"), ...)` replaces the velocity
+sensor by an estimate from the position $x$."""
 
 
 def files(drawn_stills: Mapping[str, bytes]) -> dict[str, bytes]:
