@@ -178,3 +178,13 @@ def test_a_unit_follows_the_exponent_that_a_law_was_given():
     for a in (0.25, 0.75):
         low, high = search_space.box(smc.law("power_rate", a=a), scales)["k"]
         assert math.sqrt(low * high) == pytest.approx(6.0 / (2.0 / 0.5) ** a)
+
+
+@pytest.mark.parametrize("name", [name for name in LAWS if name != "swing_up"])
+def test_a_wrong_unit_of_any_gain_would_be_seen(name):
+    law = given(name, np.random.default_rng(0))
+    plain = np.concatenate([np.concatenate(run(law, model=model)) for model in (0.0, 1.0)])
+    for gain, value in law.gains.items():
+        other = dataclasses.replace(law, gains=dict(law.gains) | {gain: 2.0 * value})
+        changed = np.concatenate([np.concatenate(run(other, model=model)) for model in (0.0, 1.0)])
+        assert np.abs(changed - plain).max() > 1e-6, gain
