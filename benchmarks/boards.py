@@ -51,7 +51,7 @@ def table(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the boards."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("robot", choices=realaigym.ROBOTS)
     parser.add_argument("--entry", metavar="FOLDER", help="a law and entry.toml: its rows alone")
     parser.add_argument("--no-robustness", action="store_true", help="leave out its 722 machines")

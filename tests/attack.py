@@ -103,7 +103,7 @@ def ran(scenarios: Any) -> Any:
         return None
 
 
-def sound(trace: smc.Trace) -> None:
+def sound(trace: smc.Trace) -> None:  # noqa: PLR0912
     """Raise Found unless the trace has its shape, finite numbers up to where it says that it ends,
     then NaN.
     """

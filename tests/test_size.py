@@ -45,7 +45,7 @@ def docstring_lines(tree: ast.Module) -> set[int]:
     for node in ast.walk(tree):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             first = node.body[0]
-            lines |= set(range(first.lineno, first.end_lineno + 1))
+            lines |= set(range(first.lineno, (first.end_lineno or 0) + 1))
     return lines
 
 

@@ -338,7 +338,7 @@ def answered(functions, gains, tuning, memory, memories, known, driven, seen, y,
         position[1],
         velocity[0],
         velocity[1],
-        *known[:11],
+        *known[:11],  # pyright: ignore[reportCallIssue] eleven numbers
         known[13],
     )
     if driven == 0:

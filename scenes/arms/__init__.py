@@ -86,9 +86,9 @@ def arm() -> Plant:
 def inertia() -> tuple[float, ...]:
     """Return the inertia of each joint in the ready pose, kg m^2: the diagonal of M."""
     panda = arm()
-    M = panda.nominal.dynamics(
-        np.array(panda.rest), np.zeros(panda.n), Values(**panda.parameters)
-    ).M  # pyright: ignore
+    rest = np.array(panda.rest)
+    dynamics = panda.nominal.dynamics  # pyright: ignore
+    M = dynamics(rest, np.zeros(panda.n), Values(**panda.parameters)).M
     return tuple(np.diag(M).tolist())
 
 

@@ -194,7 +194,7 @@ class Group:
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks = np.flatnonzero(common.any(axis=1))
-        kept = np.ix_(range(len(self.laws)), blocks, np.flatnonzero(common.any(axis=0)))
+        kept = np.ix_(np.arange(len(self.laws)), blocks, np.flatnonzero(common.any(axis=0)))
         parts = []
         for values in (cube, self.outcome, self.sets, halves, trends):
             parts.append(dict(zip(self.laws, values[kept], strict=True)))

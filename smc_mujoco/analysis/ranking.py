@@ -245,7 +245,7 @@ class Comparison:
     @property
     def worse(self) -> np.ndarray:
         """Whether another law is better, (laws, blocks)."""
-        return self.better.any(axis=1).T
+        return np.asarray(self.better.any(axis=1)).T
 
     @property
     def beaten(self) -> np.ndarray:
@@ -498,14 +498,14 @@ def ranks(comparison: Comparison) -> list[Rank]:
     behind |= (lacking[:, None] == lacking) & larger
     by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
     means = by_block.mean(axis=1).tolist()
-    doubted = (comparison.beaten | comparison.undecided).any(axis=1).tolist()
+    doubted = np.any(comparison.beaten | comparison.undecided, axis=1).tolist()
     order = []
     for n, mean in zip(lacking.sum(axis=1), means, strict=True):
         order.append((int(n), round(mean, 9)))
     found = []
     for i, law in enumerate(comparison.laws):
         place = sum(other < order[i] for other in order) + (1 + order.count(order[i])) / 2
-        found.append(Rank(law, means[i], place, not doubted[i]))
+        found.append(Rank(law, means[i], place, not bool(doubted[i])))
     return sorted(found, key=lambda rank: (rank.place, rank.law))
 
 

@@ -145,11 +145,10 @@ def basin(
     if len(counts := items_of("points", points)) != 2:
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
     nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
-    if x is None:
-        x = np.linspace(-reach, reach, nx)
-    if v is None:
-        v = np.linspace(-VELOCITY_RATIO * reach, VELOCITY_RATIO * reach, nv)
-    return basin_of(base, x, v, threads, report)
+    positions = np.linspace(-reach, reach, nx) if x is None else x
+    fastest = VELOCITY_RATIO * reach
+    velocities = np.linspace(-fastest, fastest, nv) if v is None else v
+    return basin_of(base, positions, velocities, threads, report)
 
 
 def basin_of(

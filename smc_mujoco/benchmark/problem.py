@@ -313,7 +313,8 @@ def cells(version: int) -> list[str]:
     """List every plant/condition of the rules, also those that are left out."""
     of = rules(version)
     plants = of.get("plants", [])
-    conditions = dict.fromkeys(plants, of.get("conditions", ()))
+    usual: list[str] = of.get("conditions", [])
+    conditions = dict.fromkeys(plants, usual)
     for plant, fields in of["more"].items():
         conditions[plant] = fields["conditions"]
     listed = []

@@ -219,7 +219,7 @@ class Results:
         means = ranks.mean(axis=1)
         draws = np.random.default_rng(0).integers(count, size=(DRAWS, count))
         drawn = ranks[:, draws].mean(axis=2)  # (entries, DRAWS)
-        order = np.argsort(means, kind="stable").tolist()
+        order: list[int] = np.argsort(means, kind="stable").tolist()
         tails = (50.0 - LEVEL / 2, 50.0 + LEVEL / 2)
         standings = []
         for i in order:

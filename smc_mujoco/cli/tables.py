@@ -97,7 +97,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
             least = {name: floor(traces[label].scenario, name) for name in units}
             rows[label] = []
             for name in shown.values():
-                of_runs = [run and run[group.name][name] for run in runs]
+                of_runs: list[Any] = [run and run[group.name][name] for run in runs]
                 rows[label].append(_marked(of_runs, traces[label].scenario, least[name]))
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
@@ -163,7 +163,7 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     for label, runs in values.items():
         rows[label] = []
         for name, _, factor in shown.values():
-            of_runs = [run and factor * run.get(name, math.nan) for run in runs]
+            of_runs: list[Any] = [run and factor * run.get(name, math.nan) for run in runs]
             rows[label].append(_marked(of_runs, traces[label].scenario))
     return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
 

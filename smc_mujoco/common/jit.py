@@ -257,7 +257,7 @@ def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
     options = {"error_model": "numpy"}
     made = internals.CFunc(body, (signature.args, signature.return_type), {}, options)
     if key is not None:
-        made._cache = Cache(key)
+        made._cache = Cache(key)  # pyright: ignore[reportAttributeAccessIssue] numba's own
     with _compiling():
         made.compile()
     return made
@@ -350,8 +350,8 @@ class Cache:
     def __init__(self, key: Key):
         self.key = key
         package = Path(__file__).parents[1]
-        if numba.config.CACHE_DIR:
-            self.folder = Path(numba.config.CACHE_DIR)
+        if folder := getattr(numba.config, "CACHE_DIR", ""):
+            self.folder = Path(folder)
         elif os.access(package, os.W_OK):
             self.folder = package / "__pycache__"
         else:

@@ -78,7 +78,7 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
 def _calls_compiled(function: FunctionType) -> bool:
     """Return whether a function refers to a compiled function, by name or in a module."""
     names = names_in(function.__code__)
-    values = [function.__globals__.get(name) for name in names.variables]
+    values: list[Any] = [function.__globals__.get(name) for name in names.variables]
     values += [cell.cell_contents for cell in function.__closure__ or ()]
     for value in values:
         if is_jitted(value):
@@ -90,7 +90,8 @@ def _calls_compiled(function: FunctionType) -> bool:
 
 def _holds(module: ModuleType, names: set[str]) -> bool:
     """Return whether a module has a compiled function with one of these names."""
-    return any(is_jitted(vars(module).get(name)) for name in names)
+    members: list[Any] = [vars(module).get(name) for name in names]
+    return any(map(is_jitted, members))
 
 
 @functools.cache

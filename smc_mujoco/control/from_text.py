@@ -198,5 +198,5 @@ def parsed_gains(text: str, what: str) -> dict[str, Any]:
             raise ScenarioError(
                 f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3"
             )
-        parsed[name] = values if len(values) > 1 else values[0]
+        parsed[name] = values[0] if len(values) == 1 else values
     return parsed

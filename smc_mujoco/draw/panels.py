@@ -442,7 +442,7 @@ def over_time(
         list(zip(traces, colours, means, lines, starts, strict=True))
     ):
         y = QUANTITIES[name](trace)
-        look = {"color": colour, "drawstyle": steps(trace, name)}
+        look: dict[str, Any] = {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:
             artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
         if y.shape[1] > 1:
@@ -453,10 +453,11 @@ def over_time(
         end = trace.t[-1] + trace.scenario.control_period
         if trace.diverged_at is not None and end > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
-            look = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
+            look: dict[str, Any] = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
             artists += ax.plot(trace.t[-1], last, "X", **look)
     for (first, *_), start, stop in shared:
-        look = {"color": style.INK, "drawstyle": steps(traces[first], name), "gid": AGREED}
+        look: dict[str, Any] = {"color": style.INK, "drawstyle": steps(traces[first], name)}
+        look["gid"] = AGREED
         path = between(lines[first], start, stop)
         artists += ax.plot(*path, lw=style.points(LINE), **look)
     tell_agreements(ax, shared if told else [], lines, names)

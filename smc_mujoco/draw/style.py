@@ -17,6 +17,7 @@ import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -149,9 +150,10 @@ def page(width: float = FULL_WIDTH):
         letters = RC["font.size"]
     scale = letters / RC["font.size"]
     keys = ("size", "linewidth", "markersize")
-    return rc_context(
-        {key: value * scale if key.endswith(keys) else value for key, value in RC.items()}
-    )  # pyright: ignore[reportArgumentType]
+    scaled: Any = {}
+    for key, value in RC.items():
+        scaled[key] = value * scale if key.endswith(keys) else value
+    return rc_context(scaled)
 
 
 def points(size: float) -> float:
@@ -214,6 +216,14 @@ def palette() -> dict[str, dict[str, str]]:
     The report's laws are first, then baselines. A law without a colour here gets one by its name.
     """
     return json.loads(Path(__file__).with_name("law_colours.json").read_text(encoding="utf-8"))
+
+
+def spread(count: int) -> list[str]:
+    """Return colours, each the farthest from the neutral ones and from all before it."""
+    used = [PAPER, INK, DISTURBANCE, REACTION, FAILED]
+    for _ in range(count):
+        used.append(_farthest([colour for colour in _grid(0) if colour not in used], used))
+    return used[len(used) - count :]
 
 
 def _farthest(colours: Sequence[str], others: Sequence[str]) -> str:

@@ -370,7 +370,7 @@ def of_nominal(plant: Plant) -> PythonFunction:
     names = tuple(plant.parameters)
 
     def body(inputs, parameters, _):
-        seen = np.ctypeslib.as_array(inputs, (len(SEEN),)).view(SEEN)[0]
+        seen = np.ctypeslib.as_array(inputs, (len(SEEN.names or ()),)).view(SEEN)[0]
         n = int(seen["n"])
         arrays = [np.array(pointer(int(seen[name]))[:n]) for name in ("x", "v", "u")]
         values = Values(**dict(zip(names, parameters[: len(names)], strict=True)))

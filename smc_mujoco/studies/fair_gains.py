@@ -336,7 +336,7 @@ class Trial(NamedTuple):
                     for candidate in candidates[plant.name]:
                         parts = candidate.unseen(plant, goal, self.seeds(count), self.threads)
                         for of_law, values in zip(runs[:3], parts, strict=True):
-                            of_law[candidate.law.name] = values
+                            of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
                         shown.advance(1.0)
                     found[plant.name] = runs
         return found

@@ -94,9 +94,10 @@ class Outcome:
 
     def values(self, measure: Measure) -> dict[str, dict[str, float]]:
         """Return condition -> label -> value: NaN for a run that failed, inf for "never"."""
-        value = measure
         if isinstance(measure, str):
             value = lookup("metric", measure, CATALOGUE).of
+        else:
+            value = measure
         found: dict[str, dict[str, float]] = {}
         for name, runs in self.traces.items():
             found[name] = {}
@@ -317,7 +318,7 @@ class Scene:
             raise ScenarioError(f"conditions of {self.title!r} have one file name: rename one")
         film = self.film or next(iter(self.conditions))
         lookup("condition to film", film, self.conditions)
-        lookup("kind of figure", self.figure, FIGURES)
+        lookup("kind of figure", self.figure, dict.fromkeys(FIGURES))
         for name in self.answers:
             lookup("metric that answers", name, CATALOGUE)
         object.__setattr__(self, "film", film)

@@ -8,7 +8,7 @@ This order is not tested; the last line of the answer says how sure it is.
 """
 
 import dataclasses
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -208,8 +208,8 @@ def _fit(table: Table) -> tuple[dict[str, float], list[str]]:
 
 def _order(boards: Boards) -> list[str]:
     """Return the laws by the number of their failed runs, then by mean rank over all blocks."""
-    failed: Counter[str] = Counter()
-    rank: Counter[str] = Counter()
+    failed: dict[str, int] = defaultdict(int)
+    rank: dict[str, float] = defaultdict(float)
     for board in boards:
         for entry in board.entries:
             failed[entry.law] += entry.failed

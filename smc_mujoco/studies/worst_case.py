@@ -139,9 +139,8 @@ class WorstCases(Tables, list[WorstCase]):
         """
         from scipy.stats import kendalltau
 
-        return float(
-            kendalltau([case.median for case in self], [case.value for case in self]).statistic
-        )  # pyright: ignore[reportAttributeAccessIssue] scipy's stubs lack it
+        found: Any = kendalltau([case.median for case in self], [case.value for case in self])
+        return float(found.statistic)
 
     @property
     def title(self) -> str:

@@ -38,7 +38,7 @@ def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str
         tolerance = 0.0
         if math.isfinite(value):
             tolerance = float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}")
-        tolerance = tolerances.get(name, tolerance)
+        tolerance: Any = tolerances.get(name, tolerance)
         entry[name] = {"value": value, "tolerance": tolerance, "unit": unit}
     try:
         with locked(file.parent):
@@ -73,11 +73,11 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
     limits = []
     for name in names:
         value, unit = response.value(name)
-        golden = known[name]["value"]
+        golden: Any = known[name]["value"]
         tolerance = tolerances.get(name, known[name]["tolerance"])
         alike = value == golden or (math.isnan(value) and math.isnan(golden))
         within = alike or abs(value - golden) <= tolerance
-        asked = f"{quantity(golden)} ± {quantity(tolerance)}"
+        asked = f"{quantity(golden)} ± {quantity(tolerance)}"  # pyright: ignore[reportArgumentType] NaN is None only in the file
         limits.append(Limit(name, quantity(value, unit), asked, within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 

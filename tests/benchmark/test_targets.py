@@ -107,7 +107,8 @@ def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_boar
         targets = smc.problem(name).targets
         assert set(targets) == set(problem.MEASURES), name
         for levels in targets.values():
-            assert len(levels) == 5 and list(levels) == sorted(levels), name
+            assert len(levels) == 5, name
+            assert list(levels) == sorted(levels), name
         assert {"speed", "calm"} <= set(suite.boards(name))
     assert suite.boards("duffing/sine@1") == ("forces", "speed", "calm")
     assert suite.boards("duffing/encoder@1") == ("sensors", "speed", "calm")

@@ -251,12 +251,10 @@ def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_pr
     runs = []
     for level in levels:
         runs.append(
-            (
-                scenario(
-                    "cart_pole",
-                    friction=smc.Coulomb(level),
-                    duration=20.0,
-                )
+            scenario(
+                "cart_pole",
+                friction=smc.Coulomb(level),
+                duration=20.0,
             )
         )
     traces = smc.run(runs)

@@ -310,11 +310,11 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     known = {field.name for field in dataclasses.fields(Uncertainty)}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
-            values = tuple(map(float, text.split(":")))
+            values = [float(part) for part in text.split(":")]
         except ValueError:
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
-        value = values if len(values) > 1 else values[0]
+        value = tuple(values) if len(values) > 1 else values[0]
         if name in known:
             fields[name] = value
         else:

@@ -128,6 +128,7 @@ class Puppet:
             places = [trace.x[sample, : self.shown]]
             if np.isfinite(goal).all():
                 places.insert(0, goal)
+            world = np.empty((0, 0, 3))
             for x in places:
                 world = scene.boxes(*self.posed(track, data, x, float(trace.t[sample])))
                 moved.append(world[links].reshape(-1, 3))

@@ -125,9 +125,9 @@ def _run(scenario: Scenario) -> dict[str, Any]:
     """Return a short description of a run. Its name is a hash of the whole scenario."""
     plant = scenario.plant
     suite = plants().get(scenario.plant.name)
-    known = suite.parameters | {"n": suite.n} if suite else {}
+    known = dict(suite.parameters) | {"n": suite.n} if suite else {}
     changed = {}  # other than the suite's
-    for name, value in (plant.parameters | {"n": plant.n}).items():
+    for name, value in (dict(plant.parameters) | {"n": plant.n}).items():
         if name not in known or known[name] != value:
             changed[name] = value
     return {

@@ -71,7 +71,7 @@ def _loop(
         steep = law.lam
         c = law.k1
 
-        def sigma(s):
+        def sigma(s):  # pyright: ignore[reportRedeclaration]
             return np.clip(law.lam * np.tanh(s), -top, top)
 
     elif law.name in ("classical", "terminal", "super_twisting"):
@@ -79,7 +79,7 @@ def _loop(
         steep = math.inf
         c = getattr(law, "c", 1.0)
 
-        def sigma(s):
+        def sigma(s):  # pyright: ignore[reportRedeclaration]
             return k * np.sign(s)
 
     else:

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from markupsafe import Markup
 
@@ -386,7 +387,8 @@ def scenes(work: Work) -> list[Markup]:
 
 def filmed(work: Work, plant: str, traces: Sequence[Trace]) -> bytes:
     """Return a film of traces, as MP4."""
-    return work.kept(
+    kept: Any = work.kept
+    return kept(
         f"film-{plant}.mp4",
         [scenarios.LAWS, work.plan.scene, GAINS, FILM_SIZE, FILM_RATE],
         lambda report: traces,

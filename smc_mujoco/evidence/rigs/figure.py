@@ -5,6 +5,7 @@ many.
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -106,7 +107,7 @@ def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
         handles = []
         for use in dict.fromkeys(row.use for _, row in places):
             filling = style.PAPER if use == FITTED else style.INK
-            mark = {"color": style.INK, "marker": MARKS[use], "mfc": filling, "ls": ""}
+            mark: Any = {"color": style.INK, "marker": MARKS[use], "mfc": filling, "ls": ""}
             handles.append(Line2D([], [], label=use, **mark))
         cross = Line2D([], [], color=style.MUTED, marker="x", ls="", label="published numbers")
         handles.append(cross)

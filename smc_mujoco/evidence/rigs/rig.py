@@ -164,7 +164,7 @@ class Rig:
         """Return name -> the rig with one of its parameter sets: "set 1" for its own, then those of
         the ensemble.
         """
-        sets = {"set 1": self}
+        sets: dict[str, Rig] = {"set 1": self}
         for i, values in enumerate(self.ensemble, 2):
             sets[f"set {i}"] = self.with_values(values, "ensemble")
         return sets

@@ -111,7 +111,7 @@ class Summary(NamedTuple):
 
     rig: str
     use: str
-    count: int  # of figures that are known
+    count: int  # of figures that are known  # pyright: ignore[reportIncompatibleMethodOverride]
     median: float  # of how far the twin is from the machine, a share
     largest: float
     inside: int  # number of the machine's figures within the twin's range
@@ -166,7 +166,7 @@ def summaries(rows: Sequence[TwinFigure]) -> list[Summary]:
 @functools.cache
 def _stored() -> tuple[list[TwinFigure], list[Order]]:
     """Return the rows of the file; None stands for NaN, and "falls" for inf."""
-    meaning: dict[Any, float] = {None: math.nan, "falls": math.inf}
+    meaning: dict[Any, Any] = {None: math.nan, "falls": math.inf}
     data = read_json(FILE)
     figures = []
     for row in data["figures"]:

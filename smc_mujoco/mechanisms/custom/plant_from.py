@@ -21,7 +21,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -216,7 +216,7 @@ def _plant(
         limits = own.reach_of(label, model, joints[0])
         units = ("m",) * 3 + ("rad",) * 3
         x0 = own.pose_at_start(model, joints[0], keyframe)
-        special = {"rest": x0, "pose": own.held_pose(label, model, joints[0])}
+        special: dict[str, Any] = {"rest": x0, "pose": own.held_pose(label, model, joints[0])}
     else:
         motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
         limits = tuple(motor.limit for motor in motors)

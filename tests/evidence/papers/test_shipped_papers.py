@@ -36,7 +36,8 @@ def test_at_least_five_papers_ship_with_4_to_12_claims_each():
         assert 4 <= len(found.claims) <= 12, name
         assert found.access, name
         for claim in found.claims.values():
-            assert claim.where and claim.thresholds, name
+            assert claim.where, name
+            assert claim.thresholds, name
 
 
 @pytest.mark.parametrize("name", PAPERS)
@@ -215,9 +216,11 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
         error = 0.0
         if abs(sign) > 1.0:
             sign = math.copysign(1.0, b)
-            left = lambda z, b=b: (
-                z * (1.0 + h * k2 + h * h * k4) + h * k1 * math.sqrt(z) + h * h * k3 - abs(b)
-            )
+
+            def left(z, b=b):
+                linear = z * (1.0 + h * k2 + h * h * k4)
+                return linear + h * k1 * math.sqrt(z) + h * h * k3 - abs(b)
+
             error = sign * root_scalar(left, bracket=(0.0, abs(b)), xtol=1e-15).root
         velocity += h * (k3 * sign + k4 * error) + h * u
         position = x - error + h * velocity

@@ -255,7 +255,7 @@ NOUGHT = -0.0
     gains={"k": 2.0, "out": 3.0, "if_": 1.5},
     memory=4,
 )
-def turns(z, K, state):
+def turns(z, K, state):  # noqa: PLR0912
     """Every turn of Python that there is: */ and /* too."""
     a = z.e
     b = z.de

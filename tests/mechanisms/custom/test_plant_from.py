@@ -324,12 +324,10 @@ def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
     many = []
     for i in range(7):
         many.append(
-            (
-                dataclasses.replace(
-                    base,
-                    x0=(0.1 * i, 0.2),
-                    v0=0.5,
-                )
+            dataclasses.replace(
+                base,
+                x0=(0.1 * i, 0.2),
+                v0=0.5,
             )
         )
     first = smc.run(base)
