@@ -338,8 +338,8 @@ def answered(functions, gains, tuning, memory, memories, known, driven, seen, y,
         position[1],
         velocity[0],
         velocity[1],
-        *known[:11],  # pyright: ignore[reportCallIssue] eleven numbers
-        known[13],
+        *known[:11],
+        known[13],  # pyright: ignore[reportCallIssue] after eleven
     )
     if driven == 0:
         f = f1
