@@ -177,4 +177,4 @@ def test_an_answer_that_half_the_step_changes_is_printed_too():
     traces = show.simulate(scene, 1)
     again = show.repeat(scene, 1)
     (said,) = show.other_answers(scene, traces, again, scene.sentence(traces))
-    assert said == "At half the physics step: Step 0.0005 s."
+    assert said == "At half the physics step: step 0.0005 s"
