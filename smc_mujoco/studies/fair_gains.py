@@ -272,7 +272,9 @@ class Trial(NamedTuple):
         def searched() -> "Tuned":
             with warnings.catch_warnings():  # the remark says so
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
-                warnings.filterwarnings("ignore", ".* no unit, and so a search", ScenarioWarning)
+                warnings.filterwarnings(
+                    "ignore", ".* have no unit and are searched", ScenarioWarning
+                )
                 return search.tune(
                     plant,
                     law,
