@@ -6,11 +6,11 @@ in [0, 1], where rms is taken over the channels. T is dm_control's tolerance abo
 (Tassa et al., DeepMind Control Suite, 2018), and the form is that of its cart-pole. The margins, 1
 (rad or m) for e and 5 (per second) for w, are chosen.
 
-    task          e                                          w              |x| at the start
-    regulate      x                                          x'             up to the plant's x0
-    track         x - r in driven channels, x in others      x' - r', x'    up to the plant's x0
+    task          e                                          w             |x| at the start
+    regulate      x                                          x'            up to the plant's x0
+    track         x - r in driven channels, x in others      x' - r', x'   up to the plant's x0
     swing_up      1 - cos x of toppling hinges, x of others  x'            within 0.1 rad of hanging
-    synchronise   x - mean of the channels                   x' - its mean  up to the largest x0
+    synchronise   x - mean of the channels                   x' - its mean up to the largest x0
 
 Of an arm such as `panda`, whose rest is a pose, x and the spread of starts count from this pose,
 and r is a reference for each joint. An arm is neither swung up nor synchronised. If joints have
