@@ -225,7 +225,7 @@ def test_finished_parts_are_kept_before_an_error_is_raised(monkeypatch):
         ),
         (
             ("pickle.loads", lambda data: smc.nowhere),
-            "nowhere",  # whoever sent it is told to install what is installed here
+            "nowhere",  # an ImportError, of which the sender makes a sentence
         ),
     ],
 )
