@@ -20,6 +20,8 @@ import threading
 import weakref
 from typing import TYPE_CHECKING
 
+from smc_mujoco.common import process
+
 if TYPE_CHECKING:
     import mujoco
 
@@ -137,21 +139,12 @@ def probe(backend: str, code: str = PROBE) -> str | None:
     """Return None if a new process can run some code with a backend, else the last line of its
     error.
     """
-    import subprocess
-
-    environment = os.environ | ({"MUJOCO_GL": backend} if backend else {})
+    environment = {"MUJOCO_GL": backend} if backend else {}
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
-        done = subprocess.run(
-            command,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return f"a trial failed: {error}"
+        done = process.timed(command, TIMEOUT, **environment)
+    except process.TimedOut:
+        return f"a trial did not end within {TIMEOUT:g} s"
     if done.returncode == 0:
         return None
     return (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]

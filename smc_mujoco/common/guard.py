@@ -15,8 +15,6 @@ import json
 import os
 import signal
 import sys
-import threading
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -37,7 +35,6 @@ USUAL = (
     float.fromhex("0x1.999999999999ap-4"),
     float.fromhex("0x1.99999999999a0p-26"),
 )
-WATCH_PERIOD = 0.5  # s between two looks for the process that wants a job done
 # Signal -> its usual cause. The causes of other signals are reads, writes and divisions.
 CAUSES = {
     int(signal.SIGABRT): "aborts",
@@ -78,7 +75,7 @@ def run_isolated(module: str, job: Mapping[str, Any], timeout: float) -> Any:
                 }
             )
             (folder / "job").write_text(task, encoding="utf-8")
-        command = [sys.executable, "-P", __file__, str(folder), str(os.getpid())]
+        command = [sys.executable, "-P", __file__, str(folder)]
         try:
             code = process.timed(command, timeout, output=False).returncode
         except process.TimedOut:
@@ -169,21 +166,6 @@ def limit() -> None:
             resource.setrlimit(kind, (bound, resource.getrlimit(kind)[1]))
 
 
-def die_with(parent: int) -> None:
-    """End this process and all that it has started when its parent has ended, however it ended.
-
-    A process whose parent has ended gets another one, except on Windows.
-    """
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(WATCH_PERIOD)
-        os.killpg(0, signal.SIGKILL)
-
-    if os.name == "posix":
-        threading.Thread(target=watch, daemon=True).start()
-
-
 def run(folder: Path) -> None:
     """Do the job in a folder, and report there."""
     task = json.loads((folder / "job").read_text(encoding="utf-8"))
@@ -204,5 +186,4 @@ def run(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    die_with(int(sys.argv[2]))
     run(Path(sys.argv[1]))

@@ -1,11 +1,17 @@
-"""Commands with a time limit, and locks in forked processes."""
+"""Commands that end in time and with this process, and locks in forked processes."""
 
 import contextlib
+import errno
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Sequence
 from typing import Any
+
+# Where there is a shell, a command runs beside a reader of a pipe that only this process writes to.
+# It has all of its session killed when the pipe closes: when this process ends, however it does.
+GUARDED = """exec 3<&0 </dev/null; (read end <&3; kill -9 0) >/dev/null 2>&1 & exec "$@" 3<&-"""
 
 
 def free_after_fork(lock: Any) -> None:
@@ -39,25 +45,36 @@ def timed(
     timeout: float,
     output: bool = True,
     cwd: str | os.PathLike[str] | None = None,
+    **environment: str,
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command, and stop it and every process that it started when its time, s, is up."""
+    """Run a command, and stop it and every process that it started when its time, s, is up, or
+    when this process ends.
+    """
     # a user's code may print without end
     if output:
         pipe = subprocess.PIPE
     else:
         pipe = subprocess.DEVNULL
+    guarded = list(command)
+    if os.name == "posix":
+        if shutil.which(guarded[0]) is None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), guarded[0])
+        guarded = ["sh", "-c", GUARDED, "sh", *command]
+    held, kept = os.pipe()
     with (
+        os.fdopen(held) as stdin,
+        os.fdopen(kept, "w"),
         subprocess.Popen(
-            command,
+            guarded,
             cwd=cwd,
-            stdin=subprocess.DEVNULL,
+            stdin=stdin,
             stdout=pipe,
             stderr=pipe,
             text=True,
             errors="replace",
-            env=os.environ | {"LC_ALL": "C"},
+            env=os.environ | {"LC_ALL": "C"} | environment,
             start_new_session=True,
-        ) as process
+        ) as process,
         # whose pipes are closed after the block, though a process that left the session may hold
         # them
     ):

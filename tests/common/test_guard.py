@@ -2,6 +2,7 @@
 sentence, and ended.
 """
 
+import contextlib
 import ctypes
 import ctypes.util
 import os
@@ -39,9 +40,6 @@ def worker(job: Mapping[str, Any], report: Callable) -> Any:
         return children
     if kind == "exit":
         os._exit(1)
-    if kind == "waits":
-        Path(job["file"]).write_text(str(os.getpid()))
-        signal.pause()
     if kind == "deep":
         raise guard.Fault(f"is wrong:\n {job['kind']}")
     return job
@@ -91,22 +89,92 @@ def test_what_a_trial_starts_ends_with_it():
     until(lambda: not any(map(alive, running)))  # the process that inherits orphans has noticed
 
 
-PARENT = """
-import sys
-from smc_mujoco.common import guard
-sys.path.insert(0, sys.argv[1])
-guard.run_isolated("test_guard", {"kind": "waits", "file": sys.argv[2]}, 60.0)
+SLEEPS = """import time
+while True:
+    time.sleep(1.0)
 """
+LAW = """import smc_mujoco as smc
+@smc.law_function()
+def own(y, gains, memory):
+    while y.t < 1e9:
+        memory[0] += 1.0
+    return 0.0, 0.0
+"""
+HANGS = """#include "smc_law.h"
+int smc_setup(void) { for (volatile int i = 0; i < 2; i = 0) { } return 0; }
+int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)
+{
+    (void)y; (void)gains; (void)memory;
+    out[0] = out[1] = 0.0;
+    return 0;
+}
+"""
+ENTRY = """name = "own"
+authors = ["A"]
+source = "here"
+licence = "MIT"
+division = "one set"
+"""
+CHILDREN = {  # what starts a process -> code that waits for it for ever
+    "worker": "guard.run_isolated('waits', {}, 600.0)",
+    "compiler": "os.environ['CC'] = './cc'; smc.exchange.law_from_c('hangs.c')",
+    "law in C": "smc.exchange.law_from_c('hangs.c', timeout=600.0)",
+    "entry": "from smc_mujoco.benchmark.enter import enter; enter('entry', instances=1)",
+    "renderer": "from smc_mujoco.common import gl; gl.probe('egl', open('waits.py').read())",
+    "command": "process.timed(['sh', '-c', 'sleep 100 & sleep 100'], 600.0, output=False)",
+}
+ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL]
 
 
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
-def test_it_ends_with_the_process_that_wanted_it_however_that_ends(how, tmp_path):
-    file = tmp_path / "process"
-    command = [sys.executable, "-c", PARENT, str(Path(__file__).parent), str(file)]
-    with subprocess.Popen(command) as parent:
-        until(lambda: file.exists() and file.read_text())
+@pytest.mark.slow
+@pytest.mark.skipif(not os.path.isdir("/proc"), reason="it reads who lives from /proc")
+@pytest.mark.parametrize("how", ENDS)
+@pytest.mark.parametrize("starts", CHILDREN)
+def test_no_child_lives_two_seconds_after_its_parent(starts, how, tmp_path):
+    """However the parent ends: a child that computes for ever was left to itself."""
+    (tmp_path / "waits.py").write_text(SLEEPS)
+    (tmp_path / "hangs.c").write_text(HANGS)
+    (tmp_path / "cc").write_text(f"#!{sys.executable}\n{SLEEPS}")
+    (tmp_path / "cc").chmod(0o755)
+    (tmp_path / "entry").mkdir()
+    (tmp_path / "entry/law.py").write_text(LAW)
+    (tmp_path / "entry/entry.toml").write_text(ENTRY)
+    code = "import os, signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += "sys.path.insert(0, '.'); import smc_mujoco as smc\n"
+    code += f"from smc_mujoco.common import guard, process\n{CHILDREN[starts]}"
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    root = str(Path(__file__).parents[2])
+    environment["PYTHONPATH"] = root
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, stderr=subprocess.DEVNULL
+    ) as parent:
+        until(lambda: sessions(parent.pid))
+        time.sleep(2.0)  # a law begins to compute
+        started = sessions(parent.pid)
+        assert started
         parent.send_signal(how)
-    until(lambda: not alive(int(file.read_text())))
+    time.sleep(2.0)
+    assert {
+        pid: words for pid, (session, _, words) in processes().items() if session in started
+    } == {}
+
+
+def processes() -> dict[int, tuple[int, int, str]]:
+    """Return process -> its session, its parent and its command, of those that live."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            words, rest = path.read_text().rsplit(")", 1)
+            state, parent, _, session = rest.split()[:4]
+            if state != "Z":
+                found[int(path.parent.name)] = int(session), int(parent), words
+    return found
+
+
+def sessions(parent: int) -> set[int]:
+    """Return the sessions that the children of a process began."""
+    own = os.getsid(parent)
+    return {session for session, starter, _ in processes().values() if starter == parent} - {own}
 
 
 def until(true: Callable[[], object]) -> None:
