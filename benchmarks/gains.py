@@ -1,6 +1,7 @@
 """The gains of the sets "tuned" and "tracking", found again: smc_mujoco/control/tuned_gains.
 
-    python benchmarks/gains.py              # those that are missing, or that another rule found
+    python benchmarks/gains.py              # those that are missing, that another rule found, or
+                                            # that miss a condition of their law's theorem
     python benchmarks/gains.py my_law       # only those of some laws
     python benchmarks/gains.py --all        # all of them
 
@@ -103,11 +104,17 @@ def write(path: Path, data: dict[str, Any]) -> None:
 
 
 def wanted(laws: list[str], again: bool) -> list[Task]:
-    """Return the tasks to do: all, or those whose gains are missing or have another rule."""
+    """Return the tasks to do: all, or those whose gains are missing, have another rule or miss a
+    condition of their law's theorem.
+    """
 
     def is_missing(task: Task) -> bool:
         record = known(gain_sets.file_of(task.gains))["plants"].get(task.plant, {}).get(task.law)
-        return record is None or "rule" in record
+        if record is None or "rule" in record:
+            return True
+        sets = range(len(record["sets"]))
+        laws = [gain_sets.law(task.plant, task.law, task.gains, i) for i in sets]
+        return any(law.source.outside for law in laws)
 
     return [
         task for task in tasks() if (again or is_missing(task)) and (not laws or task.law in laws)

@@ -211,7 +211,7 @@ def basin_of(
         decided_at=decided_at,
         unit=base.plant.unit,
         duration=base.duration,
-        source=base.law.source.kind,
+        source=base.law.source.words,
     )
 
 

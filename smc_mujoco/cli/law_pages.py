@@ -133,7 +133,10 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     call = f'"{text}", {some}' if some else f'"{text}"'
     rows = {
         "gains": "\n".join([*_gains(template), parts.gains]).strip(),
-        "conditions": "\n".join(template.conditions) or "none on the gains alone",
+        "conditions": "\n".join(
+            [*template.conditions, *(f"{words} (advice)" for words in template.advice)]
+        )
+        or "none on the gains alone",
         "degree": _degree(template),
         "family": template.family,
         "promises": _promises(template),

@@ -50,6 +50,7 @@ class Options(TypedDict, total=False):
     nonnegative: Iterable[str]
     relative_degree: int
     conditions: GainConditions | None
+    advice: GainConditions | None
     plants: Iterable[str]
     requires_model: bool
     short: str
@@ -71,6 +72,7 @@ OF_SURFACE = (
     "nonnegative",
     "relative_degree",
     "conditions",
+    "advice",
     "label",
 )
 OPTIONS = {  # kind of a component -> options of its decorator
@@ -124,14 +126,16 @@ class Component:
     def __post_init__(self):
         gains = {name: ANY_GAIN(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
-        if self.source.gains != self.gains:  # the gains were replaced
-            object.__setattr__(
-                self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains)
-            )
         if self.template and (
             self.template.function is not self.function or self.template.name != self.name
         ):
             object.__setattr__(self, "template", None)  # the function or the name was replaced
+        source = self.source
+        if source.gains != self.gains:  # the gains were replaced
+            source = Source(kind=YOURS if gains else NONE, gains=self.gains)
+        if any(part.template and part.template.unmet(part.gains) for part in self.parts):
+            source = dataclasses.replace(source, outside=True)
+        object.__setattr__(self, "source", source)
 
     def named(self, name: str) -> "Component":
         """Return the same function and gains under another name, to compare two sets of gains of
@@ -243,6 +247,7 @@ class Template:
     memory: int  # floats per channel
     relative_degree: int = 1  # of the sliding variable that a law needs, or that a surface gives
     conditions: GainConditions = dataclasses.field(default_factory=dict)
+    advice: GainConditions = dataclasses.field(default_factory=dict)
     plants: tuple[str, ...] = ()  # empty for all plants
     requires_model: bool = False
     label: str = ""  # this and the next two: "" means automatic, see `smc_mujoco.draw.style`
@@ -281,6 +286,7 @@ class Template:
             gains=own,
             memory=self.memory,
             conditions=self.conditions,
+            advice=self.advice,
             requires_model=True,
             label=f"{self.label or self.function.__name__} on computed torque",
             family=self.family,
@@ -309,12 +315,7 @@ class Template:
 
     def unmet(self, gains: Mapping[str, GainValue]) -> list[str]:
         """Return the conditions of the theorem that these gains violate, in words."""
-        channels = list(_per_channel(gains))
-        unmet = []
-        for words, test in self.conditions.items():
-            if not all(_holds(test, gains) for gains in channels):
-                unmet.append(words)
-        return unmet
+        return _unmet(self.conditions, gains)
 
     def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
@@ -340,6 +341,9 @@ class Template:
             for words in self.unmet(values):
                 told = f"{self.kind} {self.name!r} asks for {words}, but {text}"
                 warnings.warn(told, GainWarning, users_stacklevel())
+            for words in _unmet(self.advice, values):
+                told = f"{self.kind} {self.name!r} advises {words}, but {text}"
+                warnings.warn(told, errors.ScenarioWarning, users_stacklevel())
         component = Component(
             kind=self.kind,
             name=self.name,
@@ -356,6 +360,16 @@ class Template:
         if gains:
             return component
         return component.sourced(DEFAULT)
+
+
+def _unmet(conditions: GainConditions, gains: Mapping[str, GainValue]) -> list[str]:
+    """Return the conditions that gains violate in some channel, in words."""
+    channels = list(_per_channel(gains))
+    unmet = []
+    for words, test in conditions.items():
+        if not all(_holds(test, gains) for gains in channels):
+            unmet.append(words)
+    return unmet
 
 
 def _per_channel(gains: Mapping[str, GainValue]) -> Iterable[SimpleNamespace]:
@@ -464,6 +478,7 @@ def template_decorator(
     nonnegative: Iterable[str] = (),
     relative_degree: Annotated[int, Whole(low=1, high=10)] = 1,
     conditions: GainConditions | None = None,
+    advice: GainConditions | None = None,
     plants: Iterable[str] = (),
     **options: Any,
 ) -> Callable[[Callable], Template]:
@@ -506,6 +521,7 @@ def template_decorator(
             memory=memory,
             relative_degree=relative_degree,
             conditions=dict(conditions or {}),
+            advice=dict(advice or {}),
             plants=tuple(plants),
             **options,
         )

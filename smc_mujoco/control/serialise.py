@@ -1,5 +1,6 @@
 """A component as JSON data and back."""
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -33,8 +34,10 @@ def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
         made = by_channel([law(item, source) for item in data["each"]])
     else:
         made = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
-    restored = sources.Source(kind=sources.YOURS) if source is None else sources.restore(source)
-    return made.sourced(restored.kind, restored.search)
+    if source is None:
+        return made.sourced(sources.YOURS)
+    restored = dataclasses.replace(sources.restore(source), gains=made.gains)
+    return dataclasses.replace(made, source=restored)
 
 
 def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> Component:

@@ -22,6 +22,7 @@ TUNED = "tuned here"
 SHIPPED = "shipped"
 STUDY = "study"
 YOURS = "yours"
+MARK = " (outside its theorem)"  # of gains that miss a condition of their law's theorem
 KINDS = {
     NONE: "the law has no gains",
     DEFAULT: "the defaults of the law's own file",
@@ -73,27 +74,37 @@ class Source:
     kind: str = NONE  # one of KINDS
     gains: Mapping[str, Any] = dataclasses.field(default=frozen({}), repr=False)  # the set
     search: Search | None = None  # the search that the gains are the result of
+    outside: bool = False  # whether the gains miss a condition of their law's theorem
 
     def __post_init__(self):
         find("source of gains", self.kind, KINDS)
 
     def __str__(self) -> str:
         if self.search:
-            return f"{self.kind} ({self.search})"
+            return f"{self.words} ({self.search})"
+        return self.words
+
+    @property
+    def words(self) -> str:
+        """The kind, with the mark of gains outside their law's theorem."""
+        if self.outside:
+            return self.kind + MARK
         return self.kind
 
     def with_gains(self, gains: Mapping[str, Any]) -> "Source":
         """Return this source for another set of gains."""
-        return dataclasses.replace(self, gains=gains)
+        return dataclasses.replace(self, gains=gains, outside=False)
 
     def about(self) -> dict[str, Any]:
-        """Return the kind and the search as plain data. The gains are with the law."""
-        return {"kind": self.kind, "search": self.search and dataclasses.asdict(self.search)}
+        """Return it as plain data. The gains are with the law."""
+        return {"kind": self.words, "search": self.search and dataclasses.asdict(self.search)}
 
 
 def restore(data: Mapping[str, Any]) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
-    return Source(kind=data["kind"], search=data["search"] and Search(**data["search"]))
+    kind = data["kind"].removesuffix(MARK)
+    search = data["search"] and Search(**data["search"])
+    return Source(kind=kind, search=search, outside=kind != data["kind"])
 
 
 def combined(sources: Sequence[Source]) -> Source:
@@ -105,7 +116,7 @@ def combined(sources: Sequence[Source]) -> Source:
 
 def kinds(sources: Iterable[Source]) -> str:
     """Return the kinds of sources, each once, such as "shipped" or "shipped, default"."""
-    return ", ".join(dict.fromkeys(source.kind for source in sources))
+    return ", ".join(dict.fromkeys(source.words for source in sources))
 
 
 def in_words(sources: Mapping[str, Iterable[Source]]) -> str:

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.source import Source
+from smc_mujoco.control.source import restore
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
@@ -55,7 +55,9 @@ def draw(
         axes = page.subplots(down, across, squeeze=False).ravel()
         after = convergence_times(maps)
         plants = dict.fromkeys(region.plant for region in maps)
-        words, gains = pages.gain_sources([[Source(kind=region.source)] for region in maps])
+        words, gains = pages.gain_sources(
+            [[restore({"kind": region.source, "search": None})] for region in maps]
+        )
         for ax, region, source in zip(axes, maps, words, strict=False):
             plant = f", {style.plant_name(region.plant, short=True)}" * (len(plants) > 1)
             draw_map(

@@ -118,7 +118,7 @@ class Compared(Tables):
             for law, sets, _ in candidates:
                 # inf: no bound, or a number of the plant
                 best = [f"{k}={gain_text(v)}" for k, v in law.gains.items() if v != math.inf]
-                gains.append((plant, law.name, law.source.kind, f"{len(sets)}", ", ".join(best)))
+                gains.append((plant, law.name, law.source.words, f"{len(sets)}", ", ".join(best)))
             for name, time in self.times.get(plant, {}).items():
                 of_law = (number(value) for value in (time.ratio, time.median, time.high))
                 times.append((plant, name, *of_law))

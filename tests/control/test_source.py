@@ -7,6 +7,7 @@ import dataclasses
 import pickle
 
 import pytest
+from matplotlib.text import Text
 
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets, source
@@ -71,6 +72,60 @@ def test_copies_keep_the_source(kind, tmp_path):
     )
     kept.append(smc.load(trace.save(tmp_path / "trace.npz")).scenario.law)
     assert [one.source for one in kept] == [its] * len(kept)
+
+
+@law_function(gains={"k": 2.0, "c": 1.0}, conditions={"c < k": lambda g: g.c < g.k})
+def bounded(y, gains, memory):
+    return -gains.k * y.e - gains.c * y.de, y.e
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "law", [bounded, smc.law("twisting").template, smc.law("terminal").template]
+)
+def test_gains_outside_the_theorem_are_marked_wherever_their_source_is_told(law, tmp_path):
+    outside = {"bounded": {"k": 0.5}, "twisting": {"r1": 0.5}, "terminal": {"p": 0.3}}[law.name]
+    given = law(**outside)
+    name = next(iter(outside))
+    assert "outside" not in str(law().source) + str(law(**law.defaults).source)
+    trace = smc.run(smc.Scenario(plant=PLANT, law=given, duration=0.01))
+    alike = [
+        pickle.loads(pickle.dumps(given)),
+        given.named("other"),
+        dataclasses.replace(law(), gains=given.gains),
+        law(**{name: (law.defaults[name], outside[name])}),
+        by_channel([law(), given]),
+        by_channel([given, smc.law("pid")]),
+        given.on_computed_torque(),
+        smc.load(trace.save(tmp_path / "trace.npz")).scenario.law,
+    ]
+    for one in alike:
+        assert "outside its theorem" in str(one.source), one
+    assert "outside" not in str(by_channel([law(), given]).of_channel(0).source)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_tables_latex_and_figures_mark_gains_outside_the_theorem(tmp_path):
+    given = bounded(k=0.5)
+    trace = smc.run(smc.Scenario(plant=PLANT, law=given, duration=0.01))
+    table = smc.compare(
+        [given, "pid"],
+        PLANT,
+        "nominal",
+        seeds=1,
+        tune=False,
+        duration=0.02,
+        out=tmp_path / "c",
+        metrics=("itae",),
+        progress=False,
+    )
+    for told in (str(table), table.to_latex(), words(table.plot()), words(smc.figure([trace]))):
+        assert "outside its theorem" in told.replace("\n", " ")
+
+
+def words(figure):
+    return " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 def test_replaced_gains_are_the_users():

@@ -18,6 +18,9 @@ differ by more than 1 %, the search is made again in MuJoCo. Elsewhere the first
 cheap: they use Euler's method in place of RK4, or one step of another integrator a control period,
 and leave out limits and contacts that are the plant's own. Descents run as a scenario does.
 
+A set of gains that misses a condition of the law's theorem is drawn again, and the descent is drawn
+back to the nearest set on its way that does not, unless `outside_theorem` lifts the conditions.
+
 Gains are rounded to four digits, so the printed gains are those that were run. In the first two
 stages a set that was evaluated before costs no budget. `search_space` gives the box from which
 starts are drawn; a search may leave it by a decade. `Tuned.at_bound` names gains at that limit. No
@@ -80,6 +83,9 @@ FIRST_DEVIATION = 0.3  # decades: first standard deviation of the evolution; cho
 FIRST_RADIUS, LAST_RADIUS = 0.1, 0.005  # decades, of the descent's trust region; chosen
 PATIENCE = 1e-3  # a descent ends when 2 n + 2 evaluations lower J by a smaller share
 GAIN_DIGITS = 4
+DRAWS = 1000  # of a candidate, until it holds the conditions of the law's theorem; chosen
+FIRST_DRAWS = 10_000  # before a search is refused; chosen
+BISECTIONS = 20  # to the border of the theorem; chosen
 
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
@@ -110,6 +116,7 @@ def tune(
     chattering: float | None = None,
     searches: Searches = SEARCHES,
     folder: Annotated[str | os.PathLike[str], FilePath()] | None = None,
+    outside_theorem: bool = False,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
@@ -126,6 +133,7 @@ def tune(
       conditions, starts, chattering: in place of the objective's, see `Objective`.
       searches: their number. They share nothing: `Tuned.sets` has the best gains of each.
       folder: keeps each search as soon as it ends. After a kill, the same call goes on there.
+      outside_theorem: whether gains may miss the conditions of the law's theorem.
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,
@@ -144,7 +152,7 @@ def tune(
     goal = dataclasses.replace(
         goal, **{name: value for name, value in changes.items() if value is not None}
     )
-    task = _task(plant, coerce.law(law), goal, budget, seed, threads)
+    task = _task(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
@@ -175,6 +183,7 @@ class Trials:
     names: tuple[str, ...]
     # gains -> the largest values of some of them
     limit: Callable[[dict[str, float]], dict[str, float]]
+    holds: Callable[[Gains], bool]  # whether gains hold the conditions
     report: Callable[[int], None]  # called with the number of new evaluations
     screened: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
     decided: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
@@ -201,6 +210,30 @@ class Trials:
         """Return the accurate J of a candidate, given as log10 gains (gains,)."""
         return self._costs([self.gains(logs.tolist())], self.accurate, self.decided)[0]
 
+    def drawn(self, draw: Callable[[], np.ndarray], inside: np.ndarray) -> np.ndarray:
+        """Return log10 gains that hold the conditions: the first of DRAWS draws that does, else the
+        last one, drawn back towards those `inside`.
+        """
+        logs = draw()
+        for _ in range(DRAWS):
+            if self.holds(self.gains(logs.tolist())):
+                return logs
+            logs = draw()
+        return self.drawn_back(logs, inside)
+
+    def drawn_back(self, logs: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Return the log10 gains on the way from those `inside` to others, where the conditions
+        end.
+        """
+        if self.holds(self.gains(logs.tolist())):
+            return logs
+        share = 0.0
+        for k in range(1, BISECTIONS + 1):
+            further = share + 0.5**k
+            if self.holds(self.gains((inside + further * (logs - inside)).tolist())):
+                share = further
+        return inside + share * (logs - inside)
+
     def gains(self, logs: Sequence[float]) -> Gains:
         """Return the gains of a candidate, with four digits."""
         gains = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
@@ -222,17 +255,20 @@ def _rounded(gain: float) -> float:
 
 
 def _screened(
-    trials: Trials, box: Box, random: np.random.Generator, size: int
+    trials: Trials, box: Box, random: np.random.Generator, size: int, inside: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the middle
-    if size is 0.
+    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; those
+    `inside` if size is 0.
     """
     from scipy.stats.qmc import LatinHypercube
 
     low, high = np.log10(list(box.values())).T
     if not size:
-        return (low + high) / 2.0, np.inf
+        return inside, np.inf
     logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(size)
+    for i, gains in enumerate(logs):
+        if not trials.holds(trials.gains(gains.tolist())):
+            logs[i] = trials.drawn(lambda: random.uniform(low, high), inside)
     costs = trials.screen(logs)
     return logs[np.argmin(costs)], costs.min()
 
@@ -251,7 +287,9 @@ def _evolved(
     seed = int(random.integers(2**31))
     evolution = CMA(mean=logs, sigma=FIRST_DEVIATION, bounds=bounds, seed=seed)
     for _ in range(size // evolution.population_size):
-        candidates = np.array([evolution.ask() for _ in range(evolution.population_size)])
+        candidates = np.array(
+            [trials.drawn(evolution.ask, logs) for _ in range(evolution.population_size)]
+        )
         costs = trials.screen(candidates)
         evolution.tell(list(zip(candidates, costs, strict=True)))
         if costs.min() < cost:
@@ -275,7 +313,7 @@ def _descend(trials: Trials, box: Box, logs: np.ndarray, size: int) -> None:
     window = 2 * len(logs) + 2
 
     def cost(z: np.ndarray) -> float:
-        costs.append(trials.cost(np.clip(z, low, high)))
+        costs.append(trials.cost(trials.drawn_back(np.clip(z, low, high), logs)))
         if len(costs) > 2 * window and min(costs[:-window]) <= min(costs) * (1.0 + PATIENCE):
             raise _Enough
         return np.log(costs[-1])
@@ -302,6 +340,15 @@ class Task(NamedTuple):
     budget: int
     seed: int
     threads: int | None
+    inside: np.ndarray  # log10 gains in the box that hold the conditions
+    outside_theorem: bool
+
+    def holds(self, gains: Gains) -> bool:
+        """Return whether gains of the box hold the conditions of the law's theorem."""
+        template = self.law.template
+        if self.outside_theorem or template is None:
+            return True
+        return not template.unmet({**self.law.gains, **dict(zip(self.box, gains, strict=True))})
 
     @property
     def size(self) -> int:
@@ -338,6 +385,7 @@ class Task(NamedTuple):
             self.goal.describe(),
             codes,
             self.budget,
+            self.outside_theorem,
             list(self.box.items()),
         )
         path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}.json"
@@ -370,9 +418,10 @@ class Task(NamedTuple):
         def limit(gains: dict[str, float]) -> dict[str, float]:
             return search_space.force_limits(self.law, gains, self.goal.u_max or np.inf)
 
-        trials = Trials(cheap, accurate, tuple(self.box), limit, report)
+        trials = Trials(cheap, accurate, tuple(self.box), limit, self.holds, report)
         random = np.random.default_rng([self.seed, i])
-        logs, cost = _screened(trials, self.box, random, int(SCREENED_SHARE * self.size))
+        size = int(SCREENED_SHARE * self.size)
+        logs, cost = _screened(trials, self.box, random, size, self.inside)
         logs = _evolved(trials, self.searched, random, logs, cost, int(EVOLVED_SHARE * self.size))
         _descend(trials, self.searched, logs, self.size - trials.count)
         return trials
@@ -396,7 +445,13 @@ class Task(NamedTuple):
 
 
 def _task(
-    plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None
+    plant: Plant | str,
+    law: Component,
+    goal: Objective,
+    budget: int,
+    seed: int,
+    threads: int | None,
+    outside_theorem: bool,
 ) -> Task:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
     first, *others = goal.scenarios(plant, law, seed)
@@ -414,8 +469,29 @@ def _task(
         per_u = first.nominal_drive.gain
     scales = search_space.scales(first.plant, bound, reach, per_u)
     box = search_space.box(first.law, scales)
-    return Task(
-        first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads
+    low, high = np.log10(list(box.values())).T
+    task = Task(
+        law=first.law,
+        plant=first.plant,
+        goal=goal,
+        scales=scales,
+        box=box,
+        searched=search_space.widened(box),
+        budget=budget,
+        seed=seed,
+        threads=threads,
+        inside=(low + high) / 2.0,
+        outside_theorem=outside_theorem,
+    )
+    random = np.random.default_rng(0)
+    for _ in range(FIRST_DRAWS):
+        if task.holds(tuple(10.0**task.inside)):
+            return task
+        task = task._replace(inside=random.uniform(low, high))
+    raise ScenarioError(
+        f"no gains of {law.name} in the box of its search hold "
+        f"{' and '.join(first.law.template.conditions)}: "
+        "give other gains that the search holds, or outside_theorem=True"
     )
 
 
@@ -425,7 +501,7 @@ def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
     Raise BrokenLawError if it cannot even be run there.
     """
     try:
-        _task(plant, coerce.law(law), goal, BUDGET, 0, None)
+        _task(plant, coerce.law(law), goal, BUDGET, 0, None, False)
     except BrokenLawError:
         raise
     except ScenarioError as error:
@@ -479,7 +555,7 @@ def _result(task: Task, found: tuple[SearchResult, ...]) -> Tuned:
         before=np.nan,
         plant=task.plant,
         definition=task.goal,
-        rule=RULE,
+        rule=RULE + ", outside the conditions of the law's theorem" * task.outside_theorem,
         budget=task.budget,
         seed=task.seed,
         scales=task.scales,

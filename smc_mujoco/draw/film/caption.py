@@ -84,7 +84,7 @@ class Caption:
         self.title = style.cropped(title, inside - self.clock, TITLE_SIZE * s, bold=True)
         notes = [self.wide(f"{words} since {time:g} s") for time, words in self.changes.items()]
         self.note_room = min(max(notes, default=0.0) + EDGE * s, 0.4 * inside)
-        sources = [trace.scenario.law.source.kind for trace in traces]
+        sources = [trace.scenario.law.source.words for trace in traces]
         self.source = by_words(dict(zip(names, sources, strict=True)))
         if parts is None:
             parts = key(traces, scales)

@@ -309,6 +309,61 @@ def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     assert tuned.at_bound == {"lam": "upper"}
 
 
+# conditions of theorems
+
+
+@smc.law_function(
+    gains={"k": 5.0, "gamma": 1.4},
+    conditions={"1 < gamma < 2": lambda g: 1.0 < g.gamma < 2.0},
+    advice={"k < 1e-9": lambda g: g.k < 1e-9},
+)
+def narrow(y, gains, memory):
+    s = y.e + abs(y.de) ** gains.gamma * math.copysign(0.25, y.de)
+    return -math.copysign(gains.k, s), s
+
+
+CONSTRAINED = ("quasi_continuous", "twisting", "conditioned_super_twisting", narrow)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("law", CONSTRAINED, ids=str)
+@pytest.mark.parametrize("plant", ["duffing", "double_pendulum"])  # by the equation, by MuJoCo
+def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lifts_it(
+    law, plant, monkeypatch
+):
+    evaluated = []
+    costs = search.Trials._costs
+
+    def seen(trials, candidates, *rest):
+        evaluated.extend(candidates)
+        return costs(trials, candidates, *rest)
+
+    monkeypatch.setattr(search.Trials, "_costs", seen)
+    found = tune(plant, law, 24, objective=LEAN, searches=1)
+    template = found.law.template
+    names = tuple(found.bounds)
+    held = dict(found.law.gains)
+
+    def missed():
+        return [
+            bool(template.unmet(held | dict(zip(names, one, strict=True)))) for one in evaluated
+        ]
+
+    assert len(evaluated) > 20
+    assert not any(missed())
+    assert "outside its theorem" not in str(found.law.source)
+    evaluated.clear()
+    tune(plant, law, 24, objective=LEAN, searches=1, outside_theorem=True)
+    assert any(missed())
+
+
+def test_a_theorem_that_no_gains_of_the_search_hold_is_refused(refused):
+    with pytest.warns(smc.errors.GainWarning):
+        law = smc.law("terminal", p=0.3)  # held
+    refused(lambda: tune("duffing", law, 2, objective=LEAN, searches=1))
+    tune("duffing", law, 2, objective=LEAN, searches=1, outside_theorem=True)
+
+
 # runs that fail
 
 
