@@ -176,9 +176,7 @@ def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monk
     assert gl.probe("", "import os; assert os.environ['MUJOCO_GL'] == 'glfw'") is None
     monkeypatch.setattr(gl, "TIMEOUT", 0.01)
     said = gl.probe("egl", "import time; time.sleep(9)")
-    assert said is not None
-    assert said.startswith("a trial failed: ")
-    assert "timed out after 0.01 seconds" in said
+    assert said == "a trial did not end within 0.01 s"
 
 
 def test_renderers_have_mujoco_s_size_by_default_and_are_closed_at_the_end(monkeypatch):
