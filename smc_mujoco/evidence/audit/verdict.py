@@ -70,8 +70,18 @@ class Check(NamedTuple):
     sentence: str = ""  # the sentence of the claim that it is about
 
     def __str__(self) -> str:
-        limit = f"{self.relation} {measured(self.limit, self.what)}"
-        return f"{self.what} = {measured(self.value, self.what)} ({limit} asked)"
+        value, limit = self.texts
+        return f"{self.what} = {value} ({limit} asked)"
+
+    @property
+    def texts(self) -> tuple[str, str]:
+        """The value, and the relation with its limit, with as many digits as tell the two apart; a
+        value that fails because it is its limit is "equal".
+        """
+        value = measured(self.value, self.what, self.limit)
+        if self.value == self.limit and not self.holds:
+            value = f"{value}, equal"
+        return value, f"{self.relation} {measured(self.limit, self.what, self.value)}"
 
     @property
     def slack(self) -> float:
@@ -112,13 +122,18 @@ def check(what: str, value: float, relation: str, limit: float, sentence: str = 
     )
 
 
-def measured(value: float, what: str) -> str:
-    """Return three significant digits; "none" for NaN, and "never" for an infinite time."""
+def measured(value: float, what: str, *others: float) -> str:
+    """Return three significant digits, or as many as tell it from others; "none" for NaN, and
+    "never" for an infinite time.
+    """
     if math.isnan(value):
         return "none"
     if value == math.inf and "time" in what:
         return "never"
-    return f"{value:.3g}"
+    digits = 3
+    while any(f"{value:.{digits}g}" == f"{one:.{digits}g}" for one in others if one != value):
+        digits += 1
+    return f"{value:.{digits}g}"
 
 
 def ratio(value: float, reference: float) -> float:
@@ -289,7 +304,11 @@ class Claim(Statement):
         if not apart or what not in self.beside.get(gains, {}):
             return str(check)
         width = f" +- {check.limit:g}" if check.limit else ""
-        return f"{what} = {measured(self.beside[gains][what], what)} ({middle}{width} asked)"
+        ends = []
+        for end in middle.split(" to "):
+            ends += [float(end) - check.limit, float(end) + check.limit]
+        value = measured(self.beside[gains][what], what, *ends)
+        return f"{what} = {value} ({middle}{width} asked)"
 
 
 class Claims(list[Claim]):

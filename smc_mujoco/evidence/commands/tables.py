@@ -104,9 +104,7 @@ def _print_claim(claim: Claim, console: Console) -> None:
         title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
         table = plain(*columns, title=title, title_justify="left")
         for check in claim.checks(name):
-            limit = f"{check.relation} {measured(check.limit, check.what)}"
-            value = measured(check.value, check.what)
-            table.add_row(CHECKED[check.holds], Text(check.what), value, limit)
+            table.add_row(CHECKED[check.holds], Text(check.what), *check.texts)
         for what, value in claim.beside[name].items():
             table.add_row("", Text(what, "dim"), Text(measured(value, what), "dim"), "")
         console.print(Padding(table, (0, 0, 1, 2)))

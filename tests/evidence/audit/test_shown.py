@@ -127,3 +127,24 @@ def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_lim
         assert found == pytest.approx(slack, abs=1e-9)
     assert re.findall("(.) ([0-9])", summary(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
     assert re.findall("(.) ([0-9])", summary([])) == []
+
+
+PRINTED = {  # value, relation, limit -> as it is printed
+    "far apart": (0.25, "<", 1.0, "0.25 (< 1"),
+    "alike in three digits": (0.02801, ">", 0.02804, "0.02801 (> 0.02804"),
+    "alike in fifteen digits": (0.25 + 2e-16, "<=", 0.25, "0.2500000000000002 (<= 0.25"),
+    "a tie that fails": (0.028, ">", 0.028, "0.028, equal (> 0.028"),
+    "a tie that holds": (0.0, "<=", 0.0, "0 (<= 0"),
+    "never": (math.inf, "<", math.inf, "never, equal (< never"),
+}
+
+
+@pytest.mark.parametrize("case", PRINTED)
+def test_a_comparison_is_printed_so_that_it_can_be_read(case):
+    value, relation, limit, words = PRINTED[case]
+    assert str(check("time, s", value, relation, limit)) == f"time, s = {words} asked)"
+
+
+def test_a_number_outside_a_range_is_not_printed_as_its_end():
+    (one,) = [claim("1", {"slow": list(SHARE.evidence({"": 15.0004}))})]
+    assert one.decided("slow") == "share = 15.0004 (2 to 15 asked)"
