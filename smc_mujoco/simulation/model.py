@@ -44,6 +44,8 @@ SENSORS = {
     "x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS,
     "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL,
 }
+# of a tendon around a geom
+ROUND_WRAPS = mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER
 # ends of the names of a free body's sensors
 POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
@@ -196,7 +198,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
             "anchor": 3 * joint,
         }
     for field, kind in SENSORS.items():
-        sensors = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
+        sensors = np.flatnonzero((model.sensor_type == int(kind)) & (model.sensor_objid == joint))
         if not len(sensors):
             raise ScenarioError(
                 f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one"
@@ -269,32 +271,27 @@ def spec(scenario: Scenario) -> mujoco.MjSpec:
 
 
 def without_scenery(spec: mujoco.MjSpec, pushed: Collection[str] = ()) -> None:
-    """Delete cameras, lights, the geoms that touch nothing, and fixed bodies that then have
-    nothing, unless pushed.
+    """Drop cameras, lights, the geoms that touch nothing, and fixed bodies that then have nothing,
+    unless pushed.
 
-    MuJoCo computes their poses at every step, in up to 28 % of its time. What something refers to
-    stays, and so do geoms from which a moving body has its inertia.
+    MuJoCo computes their poses at every step, in up to 28 % of its time. The compiler drops the
+    geoms: deleted one by one, they take a time quadratic in their number. What something refers to
+    stays, and a moving body keeps the inertia that it has from its geoms.
     """
-    needed = set()
+    spec.compiler.discardvisual = True
+    for element in (*spec.cameras, *spec.lights, *spec.skins):
+        spec.delete(element)
+    needed = set(pushed)
     for pair in spec.pairs:
         needed |= {pair.geomname1, pair.geomname2}
     for sensor in spec.sensors:
         needed |= {sensor.objname, sensor.refname}
     for tendon in spec.tendons:
-        needed |= {wrap.target.name for wrap in tendon.path if wrap.target}
-    scenery = []
-    for geom in spec.geoms:
-        untouched = not geom.contype and not geom.conaffinity and geom.name not in needed
-        if untouched and (geom.parent.explicitinertial or _is_fixed(geom.parent)):
-            scenery.append(geom)
-    for element in (*spec.cameras, *spec.lights, *spec.skins, *scenery):
-        spec.delete(element)
-    needed.update(pushed)
+        needed |= {wrap.target.name for wrap in tendon.path if wrap.type in ROUND_WRAPS}
     for body in reversed(spec.bodies[1:]):
-        empty = not any(
-            (*body.geoms, *body.sites, *body.bodies, *body.frames, body.explicitinertial)
-        )
-        if empty and _is_fixed(body) and body.name not in needed:
+        kept = [*body.sites, *body.bodies, *body.frames, body.explicitinertial]
+        kept += [geom.contype or geom.conaffinity or geom.name in needed for geom in body.geoms]
+        if not any(kept) and _is_fixed(body) and body.name not in needed:
             spec.delete(body)
 
 

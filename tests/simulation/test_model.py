@@ -1,6 +1,7 @@
 """Models of runs: what only a picture needs is deleted, everything else stays."""
 
 import dataclasses
+import sys
 import weakref
 
 import mujoco
@@ -29,6 +30,7 @@ REFERRED = """
       <geom name="frame"/>
       <site name="from" pos="-1 0 0"/>
       <body pos="1 0 0"><joint type="slide"/><geom name="bob" mass="1"/><site name="to"/></body>
+      <body name="lump"><joint type="slide"/><geom name="shape" mass="2" pos=".1 0 0"/></body>
       <body name="cart">
         <joint name="slide" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
         <geom name="paint"/><geom name="buffer" conaffinity="1"/>
@@ -44,21 +46,72 @@ REFERRED = """
 """
 
 
-def test_what_has_mass_or_touches_or_is_referred_to_or_pushed_is_no_scenery():
+def named(model: mujoco.MjModel, kind: str) -> list[str]:
+    """Return the names of a model's bodies or geoms."""
+    count = getattr(model, f"n{kind}")
+    return [getattr(model, kind)(i).name for i in range(count)]
+
+
+def test_what_touches_or_is_referred_to_or_pushed_is_no_scenery_and_bodies_keep_their_mass():
+    whole = mujoco.MjSpec.from_string(REFERRED).compile()
     spec = mujoco.MjSpec.from_string(REFERRED)
     without_scenery(spec, {"struck"})
-    assert [geom.name for geom in spec.geoms] == [
-        "floor",
-        "wall",
-        "pulley",
-        "seen",
-        "bob",
-        "buffer",
-    ]
-    assert [body.name for body in spec.bodies] == ["world", "", "", "cart", "struck"]
-    assert len(spec.lights) == 0
-    assert len(spec.cameras) == 0
-    spec.compile()
+    bare = spec.compile()
+    assert named(bare, "geom") == ["floor", "wall", "pulley", "seen", "bob", "buffer"]
+    assert named(bare, "body") == ["world", "", "", "lump", "cart", "struck"]
+    assert bare.nlight == bare.ncam == 0
+    for name in ("body_mass", "body_inertia", "body_ipos", "body_iquat"):
+        moving = getattr(whole, name)[[2, 3, 4]]
+        np.testing.assert_array_equal(getattr(bare, name)[[2, 3, 4]], moving)
+
+
+def test_scenery_is_not_deleted_part_by_part_which_takes_a_time_quadratic_in_their_number():
+    spec = smc.plant("pendulum_network", n=60).spec()
+    deleted = []
+
+    def called(frame, event, function):
+        if event == "c_call" and function.__name__ == "delete":
+            deleted.append(function)
+
+    before = sys.getprofile()
+    sys.setprofile(called)
+    try:
+        without_scenery(spec)
+    finally:
+        sys.setprofile(before)
+    assert 0 < len(deleted) < 10
+
+
+COUPLED = 70  # joints; MuJoCo solves sparsely from 60 on
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_many_coupled_joints_move_alike_whether_the_solver_is_dense_or_sparse(seed):
+    random = np.random.default_rng(seed)
+    world = mujoco.MjSpec()
+    world.option.gravity = (0.0, 0.0, 0.0)
+    for i in range(COUPLED):
+        body = world.worldbody.add_body(pos=(0.1 * i, 0.0, 0.0))
+        body.add_joint(name=f"j{i}", type=mujoco.mjtJoint.mjJNT_SLIDE, damping=[0.1, 0.0, 0.0])
+        mass = random.choice([0.01, 0.1, 1.0, 5.0])
+        body.add_geom(size=(0.02, 0.0, 0.0), mass=mass, contype=0, conaffinity=0)
+    for _ in range(COUPLED):
+        tendon = world.add_tendon(frictionloss=0.3, limited=True, range=(-0.02, 0.02))
+        tendon.solref_limit[0] = 0.005
+        for joint in random.choice(COUPLED, 3, replace=False):
+            tendon.wrap_joint(f"j{joint}", random.choice([-1.0, 1.0, 2.0]))
+    model = world.compile()
+    speeds = random.normal(size=COUPLED)
+    ends = {}
+    for jacobian in (mujoco.mjtJacobian.mjJAC_DENSE, mujoco.mjtJacobian.mjJAC_AUTO):
+        model.opt.jacobian = jacobian
+        data = mujoco.MjData(model)
+        data.qvel[:] = speeds
+        mujoco.mj_step(model, data, 200)
+        ends[jacobian] = data.qpos.copy()
+    dense, default = ends.values()
+    assert np.abs(dense).max() > 0.1
+    np.testing.assert_allclose(default, dense, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(
