@@ -24,7 +24,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.outer_law import on_computed_torque
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
-from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
 
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 GainValue = float | tuple[float, ...]  # one number for all channels, or one for each driven channel
@@ -177,7 +177,15 @@ class Component:
                 "give one law of one channel, for all plants"
             )
         made = outer.on_computed_torque()
-        gains = {name: value for name, value in self.gains.items() if name in made.gains}
+        gains = {}
+        for name, value in self.gains.items():
+            if name in made.gains:
+                gains[name] = value
+            elif value != outer.gains[name].default:
+                raise ScenarioError(
+                    f"{self.name}'s {name} is {gain_text(value)}, and on computed torque each "
+                    "joint is e'' = v: leave it out"
+                )
         return made.bind(gains).sourced(self.source.kind, self.source.search)
 
     def of_channel(self, i: int) -> "Component":
@@ -274,10 +282,16 @@ class Template:
 
     def on_computed_torque(self) -> "Template":
         """Return the template of the law of many joints whose outer law this one is."""
-        own = {name: gain for name, gain in self.gains.items() if not gain.plant}
+        own = {}
         values = []
         for name, gain in self.gains.items():
-            values.append(f"gains.{name}[i]" if name in own else repr(gain.default))
+            if gain.plant:
+                values.append(repr(gain.default))
+            elif gain.unit == INPUT_GAIN:  # of e'' = v
+                values.append("1.0")
+            else:
+                own[name] = dataclasses.replace(gain, over=None)
+                values.append(f"gains.{name}[i]")
         function = on_computed_torque(self.function, tuple(self.gains), ", ".join(values))
         return Template(
             kind="law",
@@ -317,7 +331,7 @@ class Template:
         """Return the conditions of the theorem that these gains violate, in words."""
         return _unmet(self.conditions, gains)
 
-    def __call__(self, **gains: float | Sequence[float]) -> Component:
+    def __call__(self, /, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
         return self.bind(gains, warn=True)
 
@@ -484,8 +498,21 @@ def template_decorator(
 ) -> Callable[[Callable], Template]:
     """Return a decorator that turns a function into a Template."""
     checked = as_gains(gains)
-    if isinstance(plants, str):
-        raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
+    for option, names in {
+        "plants": plants,
+        "positive": positive,
+        "nonnegative": nonnegative,
+    }.items():
+        if isinstance(names, str) or not isinstance(names, Iterable):
+            raise ScenarioError(
+                f"{option} is {shown(names)}: give several names, such as ('a', 'b')"
+            )
+    for option, tests in {"conditions": conditions, "advice": advice}.items():
+        if not isinstance(tests, Mapping | None) or not all(map(callable, (tests or {}).values())):
+            raise ScenarioError(
+                f"{option} is {shown(tests)}: give functions of the gains by their words, such as "
+                "{'a < b': lambda g: g.a < g.b}"
+            )
     for option, keys in OPTION_KEYS.items():
         if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
             names = " and ".join(map(repr, keys))

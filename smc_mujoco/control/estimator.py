@@ -47,7 +47,7 @@ def catalogue() -> Catalogue[Template]:
     )
 
 
-def estimator(name: str, **gains: float) -> Estimator:
+def estimator(name: str, /, **gains: float) -> Estimator:
     """Return the estimator `name` with these gains. An unknown name or a gain out of range is a
     ScenarioError.
     """

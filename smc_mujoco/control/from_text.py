@@ -31,7 +31,7 @@ NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DO
 LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)
 
 
-def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
+def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
     """Return a law from a text, with these gains.
 
     `smc.law(...).named("slow")` gives it another name.
@@ -94,11 +94,13 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue
             raise ValueError
         gains: dict[str, GainValue] = {}
         for word in call.keywords:
+            if word.arg is None:
+                raise ValueError
             if isinstance(word.value, ast.Tuple | ast.List):
                 numbers = tuple(float(ast.unparse(number)) for number in word.value.elts)
             else:
                 numbers = float(ast.unparse(word.value))
-            gains[str(word.arg)] = numbers
+            gains[word.arg] = numbers
         return matched["head"], gains
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None

@@ -197,7 +197,7 @@ def checked_name(law: Law) -> Law:
     )
 
 
-def law(name: str, **gains: float | Sequence[float]) -> Law:
+def law(name: str, /, **gains: float | Sequence[float]) -> Law:
     """Return the library's law `name` with these gains: one number for all channels, or one for
     each driven channel.
     """

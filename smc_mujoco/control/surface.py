@@ -42,7 +42,7 @@ def catalogue() -> Catalogue[Template]:
     )
 
 
-def surface(name: str, **gains: float) -> Surface:
+def surface(name: str, /, **gains: float) -> Surface:
     """Return the surface `name` with these gains. An unknown name or a gain out of range is a
     ScenarioError.
     """

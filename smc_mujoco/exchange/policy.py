@@ -241,14 +241,18 @@ def policy(
         raise
     except Exception as error:  # of the object itself, when it is inspected
         raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}") from error
-    return law_function(Policy(function, name or its_name, reference, units))()
+    if name is None:
+        name = its_name
+    return law_function(Policy(function, name, reference, units))()
 
 
 def controller(act: Any, *, name: str | None = None) -> Law:
     """Return an object with opensmc's method `compute` as a law; each channel of each run has its
     own copy.
     """
-    return law_function(Controller(act, name or type(act).__name__, reference=True, units="SI"))()
+    if name is None:
+        name = type(act).__name__
+    return law_function(Controller(act, name, reference=True, units="SI"))()
 
 
 def _callable(act: Any) -> tuple[Act, str]:
@@ -268,7 +272,8 @@ def _callable(act: Any) -> tuple[Act, str]:
     name = type(act).__name__
     if control is not None and isinstance(act, control.InputOutputSystem):
         raise ScenarioError(
-            f"policy is a {name} of python-control: give smc.exchange.law_from_control(...)"
+            f"policy is a {name} of python-control: give smc.law_from a linear system, such as "
+            "control.linearize(system, x0, u0)"
         )
     predicts = callable(getattr(act, "predict", None))
     if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy

@@ -107,3 +107,25 @@ def test_gains_that_miss_a_condition_are_warned_of_in_its_words():
         smc.law("twisting", r1=2.0, r2=3.0)
     with pytest.warns(smc.errors.GainWarning, match="1/2 < p < 1"):
         smc.surface("terminal", p=0.3)
+
+
+NAMES = ("text", "name", "self", "law", "plant", "function", "kind", "gains", "value", "count")
+
+
+@pytest.mark.parametrize("gain", NAMES)
+def test_a_gain_may_have_any_name(gain):
+    @smc.law_function(gains={gain: 1.0})
+    def own(y, gains, memory):
+        return -y.e, y.e
+
+    for law in (own(**{gain: 2.0}), smc.law(own, **{gain: 2.0}), smc.law(own(), **{gain: 2.0})):
+        assert law.gains == {gain: 2.0}
+
+
+@pytest.mark.parametrize("value", [5, "k", 2.5, np.float64(3.0), {"a": 5}], ids=str)
+@pytest.mark.parametrize("option", ["positive", "nonnegative", "plants", "conditions", "advice"])
+@pytest.mark.parametrize("kind", [smc.law_function, smc.surface_function, smc.estimator_function])
+def test_an_option_of_another_type_is_refused_at_the_decorator(kind, option, value, refused):
+    if option == "plants" and (kind is not smc.law_function or isinstance(value, dict)):
+        return
+    refused(lambda: kind(gains={"k": 1.0}, **{option: value}))

@@ -127,6 +127,7 @@ TEXTS = (
     "twisting(r1=5",
     "twisting(r1=__import__('os'))",
     "twisting(r9=5)",
+    "twisting(**1)",
     "none.py",
 )
 TEXTS += ("two.py", "notes.txt", "empty.json", "bare.py", ".", "\0", 3)

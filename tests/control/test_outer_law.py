@@ -7,6 +7,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.units import INPUT_GAIN
 
 pytestmark = pytest.mark.quick
 
@@ -76,3 +78,14 @@ def test_what_has_no_one_law_of_one_channel_is_refused():
     for law in (smc.law("unit_vector"), smc.law("swing_up")):
         with pytest.raises(ScenarioError, match=rf"(?s){law.name}.*one law of one channel"):
             law.on_computed_torque()
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_a_gain_that_an_outer_law_keeps_acts_and_one_that_it_drops_is_refused(name, refused):
+    template = catalogue()[name]
+    if template.plants:
+        return
+    whole = template.on_computed_torque()
+    for gain in {*template.gains} - {*whole.gains}:
+        refused(lambda gain=gain: template(**{gain: 7.0}).on_computed_torque(), gain, 7)
+    assert not {gain for gain in whole.gains.values() if gain.unit == INPUT_GAIN}

@@ -133,3 +133,20 @@ def test_what_makes_no_law_is_refused_in_a_sentence(source, options, said):
     with pytest.raises(smc.ScenarioError, match=said) as refused:
         smc.law_from(source, **options)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", [np.ones(3), 5, "", b"x", ["a"], {}], ids=repr)
+@pytest.mark.parametrize(
+    "source", [Adaptive(), LEAD, Twin(smc.law("pid"), 1e-3, 6.0)], ids=("a", "b", "c")
+)
+def test_a_name_that_is_none_is_refused(source, name, refused):
+    refused(lambda: smc.law_from(source, name=name))
+
+
+def test_a_system_that_is_not_linear_is_refused_with_a_cure_that_works(refused):
+    control = pytest.importorskip("control")
+    system = control.NonlinearIOSystem(
+        lambda t, x, u, p: -x + u, lambda t, x, u, p: x, inputs=1, outputs=1, states=1
+    )
+    assert "control.linearize(system, x0, u0)" in refused(lambda: smc.law_from(system))
+    assert smc.law_from(control.linearize(system, 0.0, 0.0)).name == "linear_controller"

@@ -205,7 +205,12 @@ def law_from_c(
     law.set_up(len(about.gains), about.memory, name)
     words = {"requires_model": about.modelled, "joint": bool(about.joints)}
     return template_decorator(
-        "law", about.gains, about.memory, (), (), about.degree, None, plants, **words
+        "law",
+        about.gains,
+        about.memory,
+        relative_degree=about.degree,
+        plants=plants,
+        **words,
     )(law)
 
 
