@@ -18,16 +18,14 @@ import dataclasses
 import functools
 import itertools
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
@@ -506,15 +504,14 @@ def _assumptions(loop: Loop) -> Iterator[str]:
         yield "no rounding by the encoder"
 
 
-def save(
+def rows(
     scenarios: Sequence[Scenario],
     cycles: Sequence[Chattering],
     measured: Sequence[tuple[float, float]],
     changes: Sequence[StepChange],
-    path: str | os.PathLike[str],
-) -> Path:
-    """Write predicted cycles of scenarios, measured amplitudes of s and frequencies, and their
-    changes, as JSON.
+) -> list[dict[str, Any]]:
+    """Return predicted cycles of scenarios, measured amplitudes of s and frequencies, and their
+    changes, as JSON data.
     """
     rows = []
     for scenario, cycle, (amplitude, frequency), change in zip(
@@ -528,4 +525,4 @@ def save(
         row |= {"measured_amplitude": amplitude, "measured_frequency": frequency}
         row |= {"half_step_changes": vars(change), "marked": change.marked}
         rows.append(row)
-    return write_json(with_ending(path, ".json"), rows)
+    return rows

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich import box
+from rich.padding import Padding
 from rich.table import Column, Table
 from rich.text import Text
 
@@ -14,6 +15,7 @@ from smc_mujoco.analysis.apart import apart
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
 from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
@@ -285,6 +287,31 @@ def trace_summary(trace: Trace) -> list[Table]:
                 table.add_row(m.name, value, unit, Text(m.summary))
         tables.append(table)
     return tables
+
+
+def document(printed: Iterable[Any]) -> dict[str, Any]:
+    """Return what a command printed as JSON data: tables, with numbers as numbers, and notes."""
+    tables: list[Tabular] = []
+    notes: list[str] = []
+    for thing in printed:
+        shown = thing.renderable if isinstance(thing, Padding) else thing
+        if isinstance(shown, Table):
+            tables.append(_tabular(shown))
+        elif isinstance(shown, Tabular):
+            tables.append(shown)
+        elif isinstance(shown, Tables):
+            tables += shown.tables
+        elif str(shown):
+            notes.append(str(shown))
+    return {"tables": [table.about() for table in tables], "notes": notes}
+
+
+def _tabular(table: Table) -> Tabular:
+    """Return the texts of a table of rich."""
+    heads = [" ".join(str(column.header).split()) for column in table.columns]
+    rows = zip(*(map(str, column.cells) for column in table.columns), strict=True)
+    notes = [str(table.caption)] if table.caption else []
+    return Tabular(headings=heads, rows=list(rows), title=str(table.title or ""), notes=notes)
 
 
 def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:

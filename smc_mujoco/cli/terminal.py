@@ -6,10 +6,12 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.files import with_ending, writable, write_json
 from smc_mujoco.common.scripts import users_traceback
 
 
@@ -47,25 +49,41 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, which also measures its time.
+    """The console of a command, which also measures its time and can write what it printed as JSON.
 
     It prints brackets as they are, not as markup.
     """
 
-    def __init__(self):
+    def __init__(self, json: Path | None = None):
         super().__init__(markup=False, emoji=False)
         self.start = time.perf_counter()
+        self.json = json
+        self.printed: list[Any] = []
+        writable(json and with_ending(json, ".json"))
 
     @property
     def seconds(self) -> float:
         """Seconds since the console was made."""
         return time.perf_counter() - self.start
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print, and remember it for `finish`."""
+        self.printed += objects
+        super().print(*objects, **options)
+
     def note(self, text: str, style: str | None = None, wrap: bool = False) -> None:
         """Print text without coloured numbers, on one line unless `wrap`."""
-        self.print(text, style=style, soft_wrap=not wrap, highlight=False)
+        super().print(text, style=style, soft_wrap=not wrap, highlight=False)
 
     def wrote(self, *files: Path) -> None:
         """Print the names of files that were written."""
         for file in files:
             self.note(f"wrote {printable(str(file))}")
+
+    def finish(self, data: Any = None) -> None:
+        """Write the file of --json, if there is one: `data`, or else what was printed."""
+        if self.json is not None:
+            from smc_mujoco.cli.tables import document
+
+            printed = self.printed
+            self.wrote(write_json(self.json, document(printed) if data is None else data))

@@ -172,6 +172,16 @@ class Tabular:
             max_rows=MAX_HTML_ROWS,
         )
 
+    def about(self) -> dict[str, object]:
+        """Return the table as JSON data, with a list for each row; a number is a number."""
+        rows = [list(map(_value, row)) for row in self.rows]
+        return {
+            "title": self.title,
+            "columns": list(self.headings),
+            "rows": rows,
+            "notes": list(self.notes),
+        }
+
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the title and the
         notes.
@@ -253,6 +263,17 @@ def folded(name: str, width: int) -> str:
 
 def _cell(cell: Cell | str) -> Cell:
     return cell if isinstance(cell, Cell) else Cell(cell)
+
+
+def _value(cell: Cell | str) -> object:
+    """Return a cell as JSON data: a number, a text, or the parts of a cell of several lines."""
+    if isinstance(cell, Cell):
+        parts = {"text": _value(cell.text), "below": cell.below, "alarm": cell.alarm}
+        return parts | {"strong": cell.strong}
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
 
 
 def _width(text: "Text") -> int:

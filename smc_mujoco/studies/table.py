@@ -23,7 +23,7 @@ import dataclasses
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -175,6 +175,10 @@ class Table:
     def __len__(self) -> int:
         return self.data.num_rows
 
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield each row as column -> value, as pandas.DataFrame(table) reads it."""
+        return iter(self.rows())
+
     def __repr__(self) -> str:
         counts = (
             counted(len(set(self.column(name).tolist())), name)
@@ -200,7 +204,7 @@ class Table:
         return html_table(names, cells, repr(self), note, range(4, 9))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Return the rows as a stream of Arrow's C interface, as polars and pandas read it."""
+        """Return the rows as a stream of Arrow's C interface, as polars reads it."""
         return self.data.__arrow_c_stream__(requested_schema)
 
     def to_pandas(self) -> "pandas.DataFrame":

@@ -23,13 +23,12 @@ from smc_mujoco.common.constraints import of_parameters
 # command line -> the functions that it calls, of which the last does the work; not for audits
 CALLS = {
     "list pid": ["cli.law_pages.print_pages"],
-    "list --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
+    "list --needs continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
     "list law.c": ["exchange.c.load.check"],
     "run duffing": ["cli.scene.perform"],
-    "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat": [
-        "cli.scene.perform"
-    ],
+    "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat "
+    "--json r.json": ["cli.scene.perform"],
     "view duffing": ["draw.studio.view"],
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
@@ -37,7 +36,7 @@ CALLS = {
     "--worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
     "--figure f "
-    "--latex t.tex --executor dask://a:1 --traces all --seed 5 --threads 2": [
+    "--latex t.tex --executor dask://a:1 --traces all --seed 5 --json c.json --threads 2": [
         "studies.compare.compare"
     ],
     "compare --law all": ["studies.compare.compare"],
@@ -54,10 +53,12 @@ CALLS = {
     "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
-    "--relevant 0.05 --out there --defaults --seed 5 --threads 2": ["studies.which.which"],
+    "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2": [
+        "studies.which.which"
+    ],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
-    "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],
+    "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["analysis.margins.margins"],
     "margins --quick": ["analysis.margins.margins"],
     "margins duffing --law pid --kinds delay,mass --gains default --quick --condition noise --x0 "
@@ -95,7 +96,9 @@ COMMANDS = {
 }
 
 PRINTED = [  # command lines that are run to their ends
-    "show one.npz --export csv,mat",
+    "list --needs continuous,one-gain --json l.json",
+    "list classical --json l.json",
+    "show one.npz --export csv,mat --json s.json",
     "margins duffing --law classical,pid --kinds delay --quick --json m.json",
     (
         "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf "
@@ -109,10 +112,10 @@ PRINTED = [  # command lines that are run to their ends
         "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 "
         "--out c.pdf --json c.json"
     ),
-    "tune duffing classical --searches 2 --budget 32 --condition nominal --out t.json",
+    "tune duffing classical --searches 2 --budget 32 --condition nominal --out t.json --json j.json",
     "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 "
     "--duration 0.1 --out c "
-    "--figure f.pdf --latex f.tex",
+    "--figure f.pdf --latex f.tex --json t.json",
     "compare --rig simple_pendulum_ak80 --law classical --seeds 1 --duration 0.1 --out r",
     "export classical.fmu --no-binary",
 ]
@@ -347,6 +350,13 @@ def test_the_examples_of_a_command_have_options_that_it_takes(name):
     assert {
         word for _, words in examples for word in words.split() if word.startswith("--")
     } <= taken
+
+
+def test_every_command_that_prints_tables_takes_json():
+    without = {
+        name for name, (_, command) in COMMANDS.items() if "--json" not in parameters(command)
+    }
+    assert without == {"enter", "export", "report", "view"}
 
 
 # what is printed and written

@@ -269,7 +269,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         ["audit(a Paper gaber, ['5'], None, True, None", "fewer sets of gains"],
     ),
-    "claims 4 --json --quick": (
+    "claims 4 --json c.json --quick": (
         0,
         [
             "audit(a Paper gaber, ['4'], None, True, None",
@@ -376,14 +376,10 @@ def called(tmp_path, monkeypatch, capsys):
         left = []
         for path in tmp_path.glob("*.json"):
             left.append(json.dumps(json.loads(path.read_text())))
-        if said.out.startswith("{"):
-            out = json.dumps(json.loads(said.out))
-        else:
-            out = said.out
         return (
             ended.value.code or 0,
             notes,
-            f"{out}\n{said.err if notes else ''}{' '.join(left)}",
+            f"{said.out}\n{said.err if notes else ''}{' '.join(left)}",
             said.err,
         )
 

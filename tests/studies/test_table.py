@@ -207,6 +207,7 @@ def test_packages_that_speak_arrow_read_the_table_as_it_is(tmp_path):
         [field.with_type(new) if field.type == old else field for field in table.data.schema]
     )
     assert pa.RecordBatchReader.from_stream(table, wanted).schema.field("law").type == new
-    frame = table.to_pandas()
-    assert list(frame.columns) == table.data.column_names
-    assert frame["itae"].tolist() == table.column("itae").tolist()
+    pandas = pytest.importorskip("pandas")
+    for frame in (table.to_pandas(), pandas.DataFrame(table)):
+        assert list(frame.columns) == table.data.column_names
+        assert frame["itae"].tolist() == table.column("itae").tolist()

@@ -60,6 +60,7 @@ def tune(
     ] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
+    json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
@@ -78,7 +79,7 @@ def tune(
         from smc_mujoco.analysis.tuning import search
 
     options.check_files(out)
-    terminal = Terminal()
+    terminal = Terminal(json)
     start = options.starts(x0)
     tested = options.conditions(condition) or None
     folder = out and out.with_name(f"{out.stem}-searches")
@@ -99,6 +100,7 @@ def tune(
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if out:
         terminal.wrote(tuned.save(out))
+    terminal.finish()
 
 
 def margins(
@@ -135,7 +137,7 @@ def margins(
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.margins import KINDS, save
+        from smc_mujoco.analysis.margins import KINDS
         from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
@@ -143,8 +145,7 @@ def margins(
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.simulation.conditions import PLANTS
 
-    terminal = Terminal()
-    options.check_files(json)
+    terminal = Terminal(json)
     machines = []
     for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS):
         machines.append(as_plant(text))
@@ -162,8 +163,7 @@ def margins(
         f"{terminal.seconds:.0f} s"
     )
     terminal.note(words, "dim", wrap=True)
-    if json:
-        terminal.wrote(save(results, json))
+    terminal.finish([dataclasses.asdict(margin) for margin in results])
 
 
 def worst(
@@ -215,13 +215,12 @@ def worst(
     payload=0:2
     """
     with delay_ctrl_c():
-        from smc_mujoco.common.files import write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     within = _within(disturbance, bound)
-    options.check_files(json, *files(out))
+    options.check_files(None, *files(out))
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
     results = WorstCases(
         worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases
@@ -232,8 +231,7 @@ def worst(
         "dim",
         wrap=True,
     )
-    if json:
-        terminal.wrote(write_json(json, [case.about() for case in results]))
+    terminal.finish([case.about() for case in results])
     if out:
         results.figure(out)
         terminal.wrote(*files(out))
@@ -274,15 +272,14 @@ def sensitivity(
     --out breaks.png
     """
     with delay_ctrl_c():
-        from smc_mujoco.common.files import write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.studies.sensitivity import sensitivity
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     over = _within(disturbance, bound)
-    options.check_files(json, *files(out))
+    options.check_files(None, *files(out))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
@@ -293,8 +290,7 @@ def sensitivity(
         "dim",
         wrap=True,
     )
-    if json:
-        terminal.wrote(write_json(json, found.about()))
+    terminal.finish(found.about())
     if out:
         found.figure(out)
         terminal.wrote(*files(out))
@@ -382,7 +378,7 @@ def chatter(
     chatter
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.chattering import chattering, save
+        from smc_mujoco.analysis.chattering import chattering, rows
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
@@ -393,10 +389,10 @@ def chatter(
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     pictures = files(out)
     chosen = options.laws(law, gain_sets.LAWS)
-    options.check_files(json, *pictures)
+    options.check_files(None, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
     cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
@@ -414,8 +410,7 @@ def chatter(
     terminal.note(
         f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True
     )
-    if json:
-        terminal.wrote(save(cases, cycles, measured, changes, json))
+    terminal.finish(rows(cases, cycles, measured, changes))
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist
 

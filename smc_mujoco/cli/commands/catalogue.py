@@ -40,6 +40,7 @@ def list_(
             metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant."
         ),
     ] = None,
+    json: options.Json = None,
 ) -> None:
     """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in
     full.
@@ -59,21 +60,22 @@ def list_(
     Example: smc-mujoco list my_law.c
     """
     options.only_for(ctx, ("needs", "plant"), name is None, "lists: leave out NAME")
+    terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
         with delay_ctrl_c():
             loader = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {name},")
-        for line in loader.check(Path(name), None, None, "smc_law", (), C_TIME):
-            print(line)
+        terminal.print(*loader.check(Path(name), None, None, "smc_law", (), C_TIME), sep="\n")
     elif name is not None:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages
-        law_pages.print_pages(name, Terminal())
+        law_pages.print_pages(name, terminal)
     elif needs is not None or plant is not None:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages
-        law_pages.print_suitable(options.names(needs), plant, Terminal())
+        law_pages.print_suitable(options.names(needs), plant, terminal)
     else:
-        _print_all(Terminal())
+        _print_all(terminal)
+    terminal.finish()
 
 
 def _print_all(terminal: Terminal) -> None:

@@ -200,7 +200,7 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
 
 
 def check_files(json: Path | None, *others: Path | None) -> None:
-    """Check the file of --json, and the other files of a command, before minutes are spent."""
+    """Check the .json file and the other files of a command, before minutes are spent."""
     from smc_mujoco.common.files import with_ending, writable
 
     writable(json and with_ending(json, ".json"), *others)

@@ -37,6 +37,7 @@ def run(
             help="Whether to repeat runs at half the physics step, to mark what depends on it."
         ),
     ] = True,
+    json: options.Json = None,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
@@ -58,9 +59,10 @@ def run(
     scene = scenes.read(path)
     if seed is not None:
         scene = scene.seeded(seed)
-    terminal = Terminal()
+    terminal = Terminal(json)
     folder = out / path.stem
     perform(scene, folder, film, threads, terminal, endings, scenes.question(path), repeat)
+    terminal.finish()
 
 
 def show(
@@ -75,6 +77,7 @@ def show(
             metavar="FORMAT,...", help="Also write it as csv, mat or parquet, beside TRACE."
         ),
     ] = None,
+    json: options.Json = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores.
 
@@ -88,7 +91,7 @@ def show(
 
     endings = () if export is None else formats(export)
     loaded = load(trace)
-    terminal = Terminal()
+    terminal = Terminal(json)
     written = [loaded.export(trace.with_suffix(f".{ending}")) for ending in endings]
     if figure:
         from smc_mujoco.draw.figure import figure as draw
@@ -109,6 +112,7 @@ def show(
         if repeats_all(s):
             terminal.note(f"{capital(UNTRIED)}.", "dim", wrap=True)
     terminal.wrote(*written)
+    terminal.finish()
 
 
 def view(

@@ -46,6 +46,7 @@ def which(
     out: options.Folder = Path("which"),
     defaults: options.Defaults = False,
     seed: Seed = 0,
+    json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, the second, and how sure that is.
@@ -62,7 +63,7 @@ def which(
     with delay_ctrl_c():
         from smc_mujoco.studies.which import which as advise
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     advice = advise(
         plant,
         options.conditions(condition) or None,
@@ -126,6 +127,7 @@ def compare(
         str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")
     ] = "none",
     seed: Seed = 0,
+    json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is
@@ -148,7 +150,7 @@ def compare(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     start = options.starts(x0)
     if rig is not None:
         own = (plants, condition, gains != "tuned", worst, figure, latex, traces != "none", seed)
@@ -243,8 +245,9 @@ def _compare_on_rig(
 
 
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
-    """Print the number of runs and the file with all of them."""
+    """Print the number of runs and the file with all of them, and end the command."""
     failed = len(table) - table.data["failure"].null_count
     runs = f"{counted(len(table), 'run')}, {failed} of them failed"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
+    terminal.finish()

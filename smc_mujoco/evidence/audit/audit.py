@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
-from smc_mujoco.common.files import to_json, with_ending, write_json
+from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import Entry, Paper, failed
 from smc_mujoco.evidence.audit.paper import paper as find_paper
@@ -173,12 +173,9 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
     return names
 
 
-def document(claims: Sequence[Claim]) -> str:
-    """Return claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
-    return to_json(
-        {"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]},
-        indent=1,
-    )
+def document(claims: Sequence[Claim]) -> dict[str, Any]:
+    """Return claims as JSON data: {"smc_mujoco": version, "claims": [...]}."""
+    return {"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}
 
 
 def measure(entry: Entry, runs: Runs) -> Evidence:

@@ -47,6 +47,7 @@ def certify(
         Path | None,
         typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again."),
     ] = None,
+    json: options.Json = None,
 ) -> None:
     """Prove what a law does on a plant: from where it comes to rest, and how far a bounded
     disturbance pushes it.
@@ -68,7 +69,7 @@ def certify(
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.simulation.run import run
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     pictures = files(figure)
     options.check_files(out, *pictures)
     scenario = worst_run = None
@@ -100,6 +101,7 @@ def certify(
             traces = ()
         made.figure(figure, traces, worst_run.tried if worst_run else 0)
         terminal.wrote(*pictures)
+    terminal.finish()
 
 
 def _certified(

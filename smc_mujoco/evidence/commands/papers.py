@@ -31,9 +31,7 @@ def claims(
         str | None,
         typer.Option(metavar="NAME|FOLDER", help="A paper of --papers; default Gaber's."),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON document instead of tables.")
-    ] = False,
+    json: options.Json = None,
     evidence: Annotated[
         Path | None,
         typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
@@ -73,32 +71,26 @@ def claims(
     Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json
     """
     if papers or new or check:
-        audited = ("ids", "gains", "quick", "paper", "json", "evidence", "mutants", "threads")
+        audited = ("ids", "gains", "quick", "paper", "evidence", "mutants", "threads")
         options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
-        _papers(papers, new, check)
+        _papers(papers, new, check, Terminal(json))
         return
     with delay_ctrl_c():
-        from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
 
-    terminal = Terminal()
+    terminal = Terminal(json)
     about = find_paper(paper or DEFAULT_PAPER)
     sets = None if gains is None else options.names(gains)
-    if mutants and json:
-        raise ScenarioError("--mutants prints sentences: leave out --json")
     writable(evidence and with_ending(evidence, ".json"))
     asked = about, ids or None, sets, quick, threads
     with bar("claims", counted=True) as drawn:
         done = audit(*asked, report=drawn.reached)
     if evidence:
         evidence = done.save(evidence)
-    if json:
-        print(document(done.claims))
-        return
     tables.print_claims(done.claims, terminal, full=bool(ids))
     kept = mutants and _kept(done, asked, terminal)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
@@ -106,6 +98,7 @@ def claims(
         terminal.note("quick: coarser grids than the claims say, and fewer sets of gains", "dim")
     if evidence:
         terminal.wrote(evidence)
+    terminal.finish(document(done.claims))
     if kept:
         raise SystemExit(1)
 
@@ -131,13 +124,12 @@ def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
     return bool(kept)
 
 
-def _papers(listed: bool, new: Path | None, check: Path | None) -> None:
+def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Terminal) -> None:
     """Begin a paper of one's own, check evidence, or list the papers."""
     with delay_ctrl_c():
         from smc_mujoco.cli import tables
         from smc_mujoco.evidence.audit import evidence, paper
 
-    terminal = Terminal()
     if new:
         terminal.wrote(*paper.new(new))
     if check:
@@ -151,3 +143,4 @@ def _papers(listed: bool, new: Path | None, check: Path | None) -> None:
             line = f"{known.authors}: {known.title} ({known.contents})"
             rows.append((name, tables.with_package(line, paper.catalogue().package(name))))
         terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
+    terminal.finish()

@@ -4,7 +4,7 @@ records.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -78,9 +78,7 @@ def rig(
         int, typer.Option(min=1, help="Fit: how many sets the search may start from.")
     ] = 4,
     seed: Annotated[int, typer.Option(min=0, help="Fit: seed of these starts.")] = 0,
-    json: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Fit: also write the result to a file.")
-    ] = None,
+    json: options.Json = None,
 ) -> None:
     """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to
     records.
@@ -110,23 +108,27 @@ def rig(
         not fit,
         "a record beside its twin: leave out --fit",
     )
-    options.only_for(ctx, ("quantities", "given", "starts", "seed", "json"), fit, "--fit")
-    if name is None or (not files and not fit):
-        if fit:
-            raise ScenarioError("--fit without a rig: give one, or a plant")
-        _tell(name or "", figure)
-        return
-    files, named = files or [], options.pairs(columns, "columns", "theta=arm_angle,t=time")
+    options.only_for(ctx, ("quantities", "given", "starts", "seed"), fit, "--fit")
+    terminal = Terminal(json)
+    data = None
+    named = options.pairs(columns, "columns", "theta=arm_angle,t=time")
     if fit:
+        if name is None:
+            raise ScenarioError("--fit without a rig: give one, or a plant")
         values = options.numbers(given, "--set", "M=5,b=8")
-        _fit(name, files, named, options.names(quantities), values, starts, seed, figure, json)
-        return
-    if len(files) != 1:
+        wanted = options.names(quantities)
+        data = _fit(name, files or [], named, wanted, values, starts, seed, figure, terminal)
+    elif name is None or not files:
+        _report(name or "", figure, terminal)
+    elif len(files) > 1:
         raise ScenarioError(f"{len(files)} records: give one, or --fit")
-    _repeat(name, files[0], named, options.names(sets), start, duration, figure, film)
+    else:
+        wanted = options.names(sets)
+        _repeat(name, files[0], named, wanted, start, duration, figure, film, terminal)
+    terminal.finish(data)
 
 
-def _tell(name: str, figure: Path | None) -> None:
+def _report(name: str, figure: Path | None, terminal: Terminal) -> None:
     """Show what twins said of public records, of one machine or of all."""
     with delay_ctrl_c():
         from smc_mujoco.common.files import writable
@@ -136,7 +138,6 @@ def _tell(name: str, figure: Path | None) -> None:
         from smc_mujoco.evidence.rigs.rig import rig as find_rig
 
     writable(figure)
-    terminal = Terminal()
     rows = twin_figures.rows(name)
     if not rows:
         raise ScenarioError(
@@ -162,9 +163,9 @@ def _fit(
     starts: int,
     seed: int,
     figure: Path | None,
-    json: Path | None,
-) -> None:
-    """Find quantities of a rig, and print them."""
+    terminal: Terminal,
+) -> dict[str, Any]:
+    """Find quantities of a rig, print them, and return them as JSON data."""
     with delay_ctrl_c():
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.identify import identify as find
@@ -173,12 +174,10 @@ def _fit(
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
-    terminal = Terminal()
-    named = columns
-    options.check_files(json, figure)
+    options.check_files(None, figure)
     identified = find(
         as_plant(rig) if rig not in rigs() and (rig in plants() or ":" in rig) else rig,
-        [load(file, named) for file in files],
+        [load(file, columns) for file in files],
         quantities or None,
         start=start,
         starts=starts,
@@ -190,10 +189,9 @@ def _fit(
     for note in identified.notes:
         terminal.note(note, wrap=True)
     terminal.note(f"{identified.evaluations} parameter sets, seed {seed}, {terminal.seconds:.0f} s")
-    if json:
-        terminal.wrote(identified.save(json))
     if figure:
         terminal.wrote(*identified.figure(figure))
+    return identified.about()
 
 
 def _repeat(
@@ -205,6 +203,7 @@ def _repeat(
     duration: float | None,
     figure: Path | None,
     film: Path | None,
+    terminal: Terminal,
 ) -> None:
     """Show a record beside the runs of the rig's twins."""
     with delay_ctrl_c():
@@ -216,7 +215,6 @@ def _repeat(
         from smc_mujoco.simulation.run import run
         from smc_mujoco.simulation.trace import Trace
 
-    terminal = Terminal()
     twin = find_rig(rig)
     writable(figure, film and with_ending(film, ".mp4"))
     record = load(file, columns)

@@ -132,8 +132,8 @@ class Identified:
             values.append(f"{name} = {value:.4g} ± {self.errors[name]:.1g}")
         return f"identified({self.rig.name!r}, {', '.join(values)})"
 
-    def save(self, path: str | Path) -> Path:
-        """Write values, errors, correlations and fits to a JSON file. Return its path."""
+    def about(self) -> dict[str, Any]:
+        """Return values, errors, correlations and fits as JSON data."""
         quantities = {}
         for name, value in self.values.items():
             quantities[name] = {
@@ -153,7 +153,11 @@ class Identified:
                 about[key].append(
                     {name: str(value) for name, value in fit.items()} if falls else fit
                 )
-        return write_json(Path(path), about)
+        return about
+
+    def save(self, path: str | Path) -> Path:
+        """Write `about` to a JSON file. Return its path."""
+        return write_json(Path(path), self.about())
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:
         """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and

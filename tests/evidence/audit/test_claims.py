@@ -10,6 +10,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import critical_delay
+from smc_mujoco.common.files import to_json
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, measure
@@ -227,7 +228,7 @@ def test_if_all_checks_hold_the_nearest_to_its_limit_decides(only):
 
 def test_claims_are_json_without_loss(only):
     only(entry(found=[check("a", math.inf, "<", 1.0), check("b", math.nan, "<", -math.inf), ASIDE]))
-    text = audit.document(claims(gains="study"))
+    text = to_json(audit.document(claims(gains="study")))
     told = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))[
         "claims"
     ][0]
