@@ -15,6 +15,8 @@ import os
 import shutil
 import tempfile
 import time
+import types
+import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw.session import Session, law_for, laws_of
+from smc_mujoco.draw.studio_door import SCRIPT, Door
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import listed_laws
@@ -37,8 +40,8 @@ MAX_FRAME_TIME = 0.1  # s, simulated in a frame at most, so that slow runs still
 FEWER_PIXELS = """<head><script>{
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  if (names && /swiftshader|llvmpipe|basic
-    render/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)))
+  const renderer = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  if (/swiftshader|llvmpipe|basic render/i.test(renderer))
     Object.defineProperty(window, "devicePixelRatio", { value: 0.6 });
 }</script>"""
 
@@ -55,7 +58,8 @@ def view(
 
     The second law's machine is the transparent one. The panel "Laws" has the laws, their gains,
     what acts on the runs, u, s and e, and "save as scene". Double-click a body, hold Ctrl and drag
-    with the right mouse button: it is pushed when you let go. The tab needs MuJoCo 4.
+    with the right mouse button: it is pushed when you let go. The tab needs MuJoCo 4. Only this
+    machine can open its address, which holds a secret word; keep it to yourself.
 
     Args:
       scenario: a Scenario or two, a plant, or "arm.xml:shoulder+elbow".
@@ -73,19 +77,22 @@ def view(
         raise ScenarioError(
             f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'"
         )
-    from mujoco.studio import app, launch_web, viewer_protocol
+    from mujoco.studio import app, launch_web, viewer_protocol, web_viewer
     from mujoco.studio.web import web_server
 
     from smc_mujoco.draw.studio_panel import Panel
 
-    bind = web_server.bind_public_socket
-    if bind.__module__ == __name__:
+    if hasattr(web_server.bind_public_socket, "__self__"):
         raise ScenarioError(
             "no view: this process had one already, and Studio crashes in a second: restart Python"
         )
-    web_server.bind_public_socket = lambda host, port: bind(
-        "127.0.0.1", port
-    )  # Studio would serve the whole network
+    door = Door(web_server)
+    web_server.bind_public_socket = door.bind
+    web_server.serve = door.serve
+    web_viewer._print_url_banner = lambda host, port: print(door.address, flush=True)
+    web_viewer.webbrowser = types.SimpleNamespace(
+        open=lambda url, new: webbrowser.open(door.address, new)
+    )
     config = viewer_protocol.ViewerConfig(
         title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser
     )
@@ -101,11 +108,12 @@ def view(
 
 
 def put_page(original: Path, folder: Path) -> None:
-    """Let Studio serve a copy of its page that has `FEWER_PIXELS`."""
+    """Let Studio serve a copy of its page that has `FEWER_PIXELS` and asks at the door."""
     shutil.copytree(original, folder, dirs_exist_ok=True)
     page = folder / "index.html"
     page.write_text(
-        page.read_text(encoding="utf-8").replace("<head>", FEWER_PIXELS, 1), encoding="utf-8"
+        page.read_text(encoding="utf-8").replace("<head>", FEWER_PIXELS + SCRIPT, 1),
+        encoding="utf-8",
     )
     os.environ["MUJOCO_WEB_VIEWER_DIST"] = str(folder)
 

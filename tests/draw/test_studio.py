@@ -4,6 +4,7 @@ It needs MuJoCo 4, Chromium, playwright.
 """
 
 import io
+import re
 import shutil
 import signal
 import subprocess
@@ -23,6 +24,16 @@ SWITCHES = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
+# What a page of another origin gets that somehow knows the address.
+FOREIGN = """async address => {
+  const socket = new WebSocket(address.replace("http", "ws") + "state?sid=other");
+  const opened = await new Promise(done => {
+    socket.onopen = () => done("open");
+    socket.onerror = () => done("closed");
+  });
+  const got = await fetch(address + "model").then(answer => answer.status, () => "nothing");
+  return [opened, got];
+}"""
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium: apt-get install chromium")
@@ -50,12 +61,20 @@ def test_a_browser_shows_the_machine(port, words):
     ) as view:
         try:
             assert view.stdout
+            before = ""
             while "Model changed" not in (line := view.stdout.readline()):
                 assert line, "the view ended before it showed a model"
+                before += line
+            (address,) = re.findall(rf"http://127.0.0.1:{port}/\S+/", before)
             with sync.sync_playwright() as play:
-                page = play.chromium.launch(executable_path=BROWSER, args=SWITCHES).new_page()
-                page.goto(f"http://127.0.0.1:{port}/")
+                browser = play.chromium.launch(executable_path=BROWSER, args=SWITCHES)
+                page = browser.new_page()
+                page.goto(address)
                 page.wait_for_timeout(8000)
+                other = browser.new_page()
+                without = other.goto(f"http://127.0.0.1:{port}/").status
+                other.goto("data:text/html,<p>other</p>")
+                knows = other.evaluate(FOREIGN, address)
                 fewer = page.evaluate("document.getElementById('canvas').width / innerWidth")
                 picture = np.asarray(Image.open(io.BytesIO(page.screenshot()))).astype(int)
         finally:
@@ -64,4 +83,6 @@ def test_a_browser_shows_the_machine(port, words):
     assert view.returncode == 0, said
     assert "Traceback" not in said
     assert picture.std() > 20  # not one colour
+    assert without == 403
+    assert knows in (["closed", 403], ["closed", "nothing"])
     assert fewer == 0.6  # a processor draws

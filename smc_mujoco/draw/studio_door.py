@@ -1,0 +1,76 @@
+"""Who may use the page of `smc.view`: whoever has its address, which holds a secret word.
+
+A browser sends what any page in it asks for. So each request must name this machine as its host,
+come from no page of another origin, and begin with the secret word. Others get 403, before Studio
+reads them. So does an upload of a model: a model may include other files of this machine.
+"""
+
+# pyright: reportMissingImports=false
+# (MuJoCo 3, which the lock has, lacks Studio)
+import secrets
+from typing import Any
+
+SECRET_BYTES = 16
+UPLOAD = "/drop"
+REFUSED = "Forbidden: open the address that smc.view prints.\n"
+# The page asks for some things by paths without the secret word.
+SCRIPT = """<script>{
+  const [Socket, get] = [WebSocket, fetch];
+  window.WebSocket = class extends Socket {
+    constructor(url, ...rest) {
+      super(url.replace(location.host, location.host + location.pathname.slice(0, -1)), ...rest);
+    }
+  };
+  window.fetch = (url, ...rest) =>
+    get(typeof url === "string" ? url.replace(/^[/]/, location.pathname) : url, ...rest);
+}</script>"""
+
+
+class Door:
+    """The way to Studio's page: `bind` and `serve` stand for those of its server."""
+
+    def __init__(self, server: Any):
+        self.server_bind = server.bind_public_socket
+        self.server_serve = server.serve
+        self.secret = "/" + secrets.token_urlsafe(SECRET_BYTES)
+        self.hosts: tuple[str, ...] = ()  # once it is bound
+
+    @property
+    def address(self) -> str:
+        """The address of the page."""
+        return f"http://{self.hosts[0]}{self.secret}/"
+
+    def bind(self, host: str, port: int) -> Any:
+        """Return the socket, of this machine alone: Studio would serve the whole network."""
+        bound = self.server_bind("127.0.0.1", port)
+        port = bound.getsockname()[1]
+        self.hosts = f"127.0.0.1:{port}", f"localhost:{port}"
+        return bound
+
+    def serve(self, handler: Any, *, process_request: Any, **options: Any) -> Any:
+        """Serve, with refusals before all else."""
+
+        def admit(connection: Any, request: Any) -> Any:
+            path = self.inside(request.path, request.headers)
+            if path is None:
+                return connection.respond(403, REFUSED)
+            request.path = path
+            return process_request(connection, request)
+
+        return self.server_serve(handler, process_request=admit, **options)
+
+    def inside(self, path: str, headers: Any) -> str | None:
+        """Return the path behind the secret word; None where a request is refused."""
+        hosts = headers.get_all("Host")
+        word = self.secret.encode()
+        begins = path[: len(self.secret)].encode()
+        inside = path[len(self.secret) :]
+        if len(hosts) != 1 or hosts[0] not in self.hosts:
+            return None
+        if set(headers.get_all("Origin")) - {f"http://{hosts[0]}"}:
+            return None
+        if not secrets.compare_digest(begins, word) or not inside.startswith("/"):
+            return None
+        if inside.partition("?")[0] == UPLOAD:
+            return None
+        return inside
