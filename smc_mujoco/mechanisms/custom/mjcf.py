@@ -7,6 +7,7 @@ hundredths of a second.
 """
 
 import dataclasses
+import glob
 import hashlib
 import os
 import re
@@ -41,6 +42,7 @@ RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 
 _passed: set[str] = set()  # hashes of models that passed
+_known: dict[str, Path] = {}  # hash of a file that this process has read -> where it was
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
 process.free_after_fork(_lock)
 
@@ -160,7 +162,27 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
         there = False
     if not there:
         raise ScenarioError(f"no model at {path}: give the path of an MJCF file (.xml)")
-    return Source(str(path), digest(path))
+    made = Source(str(path), digest(path))
+    _known[made.sha256] = path
+    return made
+
+
+def found(name: str, sha256: str) -> Source:
+    """Return the source of a file that a record names without its folder: where this process has
+    read it, else in the present folder or in one within it.
+    """
+    places = [Path(name), *sorted(Path().glob(f"*/{glob.escape(name)}"))]
+    if sha256 in _known:
+        places.insert(0, _known[sha256])
+    there = [place for place in places if place.is_file()]
+    for place in there:
+        if digest(place) == sha256:
+            return source(place)
+    if there:
+        raise ScenarioError(
+            f"its model {there[0]}, or a file that it names, has changed since the run: put it back"
+        )
+    raise ScenarioError(f"its model {name} is not there: put it back, or run in its folder")
 
 
 def _of_text(text: str, assets: Mapping[str, Any]) -> Source:

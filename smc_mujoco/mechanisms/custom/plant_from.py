@@ -20,7 +20,6 @@ import dataclasses
 import math
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -104,7 +103,7 @@ class UserModel:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
         data = {
-            "path": self.source.path,
+            "path": self.source.path and self.source.label,  # without the folder, which is a user's
             "sha256": self.source.sha256,
             "keyframe": self.keyframe,
             "channels": channels,
@@ -314,13 +313,5 @@ def restored(data: Mapping, name: str) -> Plant:
         assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
         source = mjcf.source(data["text"], assets)
     else:
-        model = Path(data["path"])
-        if not model.is_file():
-            raise ScenarioError(f"its model {model} is not there: put it back")
-        source = mjcf.source(model)
-        if source.sha256 != data["sha256"]:
-            raise ScenarioError(
-                f"its model {model}, or a file that it names, has changed since the run: "
-                "put it back"
-            )
+        source = mjcf.found(data["path"], data["sha256"])
     return _plant(source, own.coerce(data["channels"]), name, data["keyframe"], data.get("tip"))

@@ -7,6 +7,7 @@ import gc
 import importlib.util
 import math
 import pickle
+import shutil
 from pathlib import Path
 
 import mujoco
@@ -18,10 +19,12 @@ import smc_mujoco as smc
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.envs import episode, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
+from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import run_key
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
@@ -1066,8 +1069,30 @@ def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
     ):
         smc.load(path)
     (tmp_path / "arm.xml").unlink()
-    with pytest.raises(smc.ScenarioError, match=rf"{words} is not there: put it back$"):
+    with pytest.raises(smc.ScenarioError, match=rf"{words} is not there: put it back, or run"):
         smc.load(path)
+
+
+def test_no_record_of_a_model_knows_its_folder(arm, tmp_path, monkeypatch):
+    """Two people who have one file in two folders write the same, and read each other's."""
+    original = arm().build.source.path
+    records = []
+    for name in ("anna", "others/bert"):
+        folder = tmp_path / name / "models"
+        folder.mkdir(parents=True)
+        path = shutil.copy(original, folder)
+        scenario = smc.Scenario(plant=smc.plant_from(path, ["shoulder"]), law="pid", duration=0.1)
+        about = serialise.describe(scenario)
+        records.append((run_key.row(scenario), run_key.portable_key(scenario), about))
+    assert records[0] == records[1]
+    assert str(tmp_path) not in str(records)
+    monkeypatch.setattr(mjcf, "_known", {})  # as in another process
+    monkeypatch.chdir(tmp_path / "anna")
+    assert serialise.restore(about).plant.build.source.path == str(Path("models/arm.xml").resolve())
+    monkeypatch.chdir(tmp_path / "others")
+    monkeypatch.setattr(mjcf, "_known", {})
+    with pytest.raises(smc.ScenarioError, match=r"arm.xml is not there: put it back, or run in"):
+        serialise.restore(about)
 
 
 def test_a_plant_of_one_s_own_goes_to_another_process(arm):
