@@ -3,13 +3,17 @@
     results/smc-30@1/soft relay/runs.parquet  # a row a run
     results/smc-30@1/soft relay/result.json   # the entry, failed runs, time a sample, versions
 
+Until both are there, a folder of parts keeps the runs of each problem that is done.
+
 The law runs in another process, so that one that crashes, never ends or fills the memory ends in a
 sentence. That process is no sandbox.
 """
 
+import functools
 import hashlib
 import os
 import platform
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,6 +22,7 @@ from smc_mujoco.benchmark import entry as entries
 from smc_mujoco.benchmark import runs, suite
 from smc_mujoco.benchmark.problem import Problem, problem
 from smc_mujoco.common import guard
+from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
@@ -28,6 +33,7 @@ RUN_TIME = 1.0  # s a run, thirty times what a compiled law takes; chosen
 FAILURES = 3  # that a result shows
 TABLE = "runs.parquet"
 RESULT = "result.json"
+PARTS = "parts"
 
 
 @constrained
@@ -58,15 +64,17 @@ def enter(
     problems = [problem(cell) for cell in suite.suite(name)]
     count = instances or problems[0].visible
     target = Path(out) / suite.folder(name, seed) / slug(entry.name)
-    if (target / RESULT).exists():
-        other = read_json(target / RESULT)["entry"]["name"]
-        if other != entry.name:
+    if (target / RESULT).exists() and not verify:
+        other = read_json(target / RESULT)["entry"]
+        if other["digest"] != entry.digest:
             raise ScenarioError(
-                f"{target} is the result of {shown(other)}: give the entry another name"
+                f"{target} is the result of another entry, {shown(other['name'])}: "
+                "give this one another name, or remove that folder"
             )
     with scratch() as temporary:
         table = temporary / TABLE
-        report = _isolated(folder, problems, count, seed, table)
+        parts = temporary if verify else target / PARTS
+        report = _isolated(folder, problems, count, seed, table, parts)
         content = table.read_bytes()
     if verify:
         with reading(target / TABLE, "table of runs", "enter the law first") as file:
@@ -77,7 +85,6 @@ def enter(
                 "versions"
             )
         return target
-    target.mkdir(parents=True, exist_ok=True)
     with replacing(target / TABLE) as file:
         file.write_bytes(content)
     about = {
@@ -90,6 +97,7 @@ def enter(
         "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
     }
     write_json(target / RESULT, about | report)
+    shutil.rmtree(target / PARTS)
     return target
 
 
@@ -105,14 +113,18 @@ def _isolated(
     instances: int,
     seed: int,
     table: Path,
+    parts: Path,
 ) -> dict[str, Any]:
-    """Run an entry in another process, which writes the table; return its report."""
+    """Run an entry in another process, which keeps the runs of each problem, and writes the table
+    at the end; return its report.
+    """
     job = {
         "folder": os.path.abspath(folder) if os.path.isdir(folder) else str(folder),
         "problems": [one.id for one in problems],
         "instances": instances,
         "seed": seed,
         "table": str(table),
+        "parts": os.path.abspath(parts),
     }
     runs_in_all = instances * sum(one.budget for one in problems)
     limit = START_TIME + RUN_TIME * runs_in_all
@@ -138,14 +150,23 @@ def worker(job: Mapping[str, Any], report: Callable[[str], None]) -> dict[str, A
     instances = range(job["instances"])
     failures = list[str]()
 
+    def made(one: Problem) -> tuple[list[runs.Row], list[str]]:
+        report(f"making its law for {one.plant}")
+        law = entry.law(one.plant)
+        report(f"running {one.id}")
+        return runs.rows(one, one.scenarios(law, instances, job["seed"]), instances)
+
     def groups() -> Iterator[list[runs.Row]]:
         for name in job["problems"]:
-            one = problem(name)
-            report(f"making its law for {one.plant}")
-            law = entry.law(one.plant)
-            report(f"running {name}")
-            scenarios = one.scenarios(law, instances, job["seed"])
-            yield runs.rows(one, scenarios, instances, failures)
+            rows, failed = cached(
+                Path(job["parts"], f"{slug(name)}.json"),
+                [name, entry.digest, job["instances"], job["seed"]],
+                functools.partial(made, problem(name)),
+                lambda part, path: write_json(path, part),
+                read_json,
+            )
+            failures.extend(failed)
+            yield rows
 
     runs.write(Path(job["table"]), groups())
     report("timing its law")

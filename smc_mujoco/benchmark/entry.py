@@ -109,7 +109,7 @@ def read(folder: str | os.PathLike[str]) -> Entry:
     with reading(folder / ABOUT, ABOUT, f"write {', '.join(TEXTS)} and authors in it") as file:
         text = file.read_bytes()
         try:
-            about = tomllib.loads(text.decode())
+            about = tomllib.loads(text.decode("utf-8-sig"))
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError(f"it is not TOML: {error}") from None
         fields = _fields(about)

@@ -9,6 +9,7 @@ import smc_mujoco as smc
 from smc_mujoco.benchmark import enter as entering
 from smc_mujoco.benchmark import entry, results, runs, suite
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import read_json, write_json
 
 LAW = """import math
 
@@ -97,8 +98,6 @@ def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_pat
     )
     with pytest.raises(ScenarioError, match="seed 7"):
         found.compare(smc.results(visible.parent))
-    with pytest.raises(ScenarioError, match="'own law': give the entry another name"):
-        entering.enter(written(tmp_path / "same_folder", name="Own law"), out=out, instances=2)
     archive = shutil.make_archive(str(tmp_path / "packed"), "zip", target.parent)
     assert str(found.compare(smc.results(archive))).count("0 worse, 0 better") == 4
     written(tmp_path / "entry", gains="[gains.all]\nk = 2.0")
@@ -107,6 +106,62 @@ def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_pat
     shutil.copy(visible / "runs.parquet", target)
     with pytest.raises(ScenarioError, match="not the table that its result was written for"):
         smc.results(target.parent)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"name": "Own law"},  # whose result would be in the same folder
+        {"authors": ["B"]},
+        {"code": LAW % "-gains.k * y.e"},
+        {"gains": "[gains.all]\nk = 2.0"},
+    ],
+)
+def test_no_entry_replaces_another_of_its_name(other, tmp_path):
+    target = tmp_path / "results" / "smc-30@1" / "own_law"
+    first = entry.read(written(tmp_path / "first"))
+    write_json(target / "result.json", {"entry": first.about})
+    with pytest.raises(ScenarioError, match="another entry, 'own law': give this one another name"):
+        entering.enter(written(tmp_path / "second", **other), out=tmp_path / "results")
+    assert read_json(target / "result.json")["entry"]["digest"] == first.digest
+
+
+def test_a_file_about_an_entry_may_begin_with_a_byte_order_mark(tmp_path):
+    folder = written(tmp_path / "entry")
+    about = (folder / "entry.toml").read_bytes()
+    (folder / "entry.toml").write_bytes(b"\xef\xbb\xbf" + about)
+    assert entry.read(folder).name == "own law"
+
+
+def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, small, monkeypatch):
+    """What is done is not computed twice, unless the law or the instances are others."""
+    whole = entering.enter(written(tmp_path / "entry"), out=tmp_path / "whole", instances=2)
+    assert sorted(path.name for path in whole.iterdir()) == ["result.json", "runs.parquet"]
+    table, parts = tmp_path / "runs.parquet", tmp_path / "parts"
+    job = {"problems": PROBLEMS, "instances": 2, "seed": 0, "table": table, "parts": parts}
+    job["folder"] = tmp_path / "entry"
+    computed = []
+    runs_of = runs.rows
+
+    def rows(one, *arguments):
+        if len(computed) == 1 and not table.exists():
+            raise KeyboardInterrupt
+        computed.append(one.id)
+        return runs_of(one, *arguments)
+
+    monkeypatch.setattr(runs, "rows", rows)
+    with pytest.raises(KeyboardInterrupt):
+        entering.worker(job, lambda stage: None)
+    assert computed == [PROBLEMS[0]]
+    table.touch()
+    entering.worker(job, lambda stage: None)
+    assert computed == [*PROBLEMS]
+    assert table.read_bytes() == (whole / "runs.parquet").read_bytes()
+    for changed in ({"instances": 1}, {"seed": 7}):
+        entering.worker(job | changed, lambda stage: None)
+        assert computed[-2:] == [*PROBLEMS]
+        assert len(computed) % 2 == 0
+    assert len(computed) == 6
 
 
 @pytest.mark.slow
