@@ -120,8 +120,8 @@ RECORDED = {  # condition -> the machine's figures under the linear law
 
 
 def start(seed):
-    """Return where the pendulum is let go, rad: 0.5 to 1 degrees from upright, so that the firmware
-    engages near 2.
+    """Return where the pendulum is let go as the firmware engages, rad: 0.5 to 1 degrees from
+    upright.
     """
     random = np.random.default_rng(seed)
     return 0.0, math.radians(random.uniform(0.5, 1.0)) * random.choice((-1, 1))
@@ -176,7 +176,7 @@ def _replayed(t, theta, alpha, target, gains):
     """Return what the firmware shows at each tick of measured angles, rad: alpha, its rate, theta,
     its rate; deg.
     """
-    memory = np.zeros(15)
+    memory = np.zeros(14)
     rows = np.zeros((len(t), 4))
     for i in range(len(t)):
         _firmware(Seen(t[i], theta[i], alpha[i], target[i]), gains, memory)

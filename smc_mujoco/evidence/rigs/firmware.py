@@ -4,8 +4,8 @@ moves and falls.
 One function, as on the machine, 200 times a second; the gain `kind` chooses the law. It counts in
 degrees and steps. It returns the acceleration of the arm that a `Stepper` sums to the firmware's
 own speed, in rad/s^2, and its sliding variable, deg/s (0 of the linear law). Source:
-Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa, as read there; what it does before it engages and
-after a fall is simpler here.
+Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa, as read there. A run begins when the firmware
+engages: until then a hand holds the pendulum. What it does after a fall is simpler here.
 """
 
 import math
@@ -30,9 +30,6 @@ SLOPE, OLD_RATE, MAX_RATE = (
     0.0588,
     300.0,
 )  # filter of rates: 1/s, share of the old one, deg/s
-ENGAGE_TICKS = 20.0
-ENGAGE_ANGLE = 3.0
-ENGAGE_RATE = 20.0
 RAMP_TIME, GATE_TIME = 0.1, 0.2  # s after engaging
 FALL_ARM = 80.0
 STOP_ARM = 78.0
@@ -55,7 +52,6 @@ TRIM_RATE, TRIM_ANGLE, TRIM_SPEED, MAX_TRIM = 0.2, 3.0, 50.0, 1.5  # 1/s, deg, d
     ALPHA_RATE,
     THETA,
     THETA_RATE,
-    READY,
     ENGAGED,
     TRIM,
     SPEED,
@@ -64,7 +60,7 @@ TRIM_RATE, TRIM_ANGLE, TRIM_SPEED, MAX_TRIM = 0.2, 3.0, 50.0, 1.5  # 1/s, deg, d
     FALLEN,
     TILTED,
     FAST,
-) = range(15)  # of the memory
+) = range(14)  # of the memory
 
 
 @register_jitable
@@ -80,7 +76,7 @@ def measure(y, m):
     theta = DEGREES * y.x
     passed = TICK
     if m[STARTED] == 0.0:
-        m[STARTED], m[ALPHA], m[THETA] = 1.0, alpha, theta
+        m[STARTED], m[ALPHA], m[THETA], m[ENGAGED] = 1.0, alpha, theta, y.t
     else:
         passed = y.t - m[TIME]
     m[ALPHA_RATE] = clip(SLOPE * (alpha - m[ALPHA]) - OLD_RATE * m[ALPHA_RATE], MAX_RATE)
@@ -154,7 +150,7 @@ def acceleration(kind, alpha, m, since, ref_acceleration):
         "top": Gain(20e3, positive=True, held=True),
         "speed": Gain(15e3, positive=True, held=True),
     },
-    memory=15,
+    memory=14,
     label="Firmware of the stepper's pendulum",
 )
 def firmware(y, gains, memory):
@@ -170,9 +166,8 @@ def firmware(y, gains, memory):
     before = m[SPEED]
     alpha = m[ALPHA] - m[TRIM]
     since = y.t - m[ENGAGED]
-    if m[READY] < ENGAGE_TICKS or m[FALLEN] != 0.0:
-        calm = abs(alpha) < ENGAGE_ANGLE and abs(m[ALPHA_RATE]) < ENGAGE_RATE
-        m[READY], m[ENGAGED], m[SPEED] = m[READY] + 1.0 if calm else 0.0, y.t, 0.0
+    if m[FALLEN] != 0.0:
+        m[SPEED] = 0.0
         return -before / passed / STEPS / DEGREES, 0.0
     calm = abs(alpha) < NEAR and abs(m[ALPHA_RATE]) < MOVE_RATE
     target = DEGREES * y.r

@@ -49,6 +49,19 @@ def test_the_cable_takes_energy_from_a_turn_and_hardly_any_from_a_fall():
     assert step_error(none) > 0.1
 
 
+def test_the_ensemble_spreads_as_the_standard_errors_say():
+    errors = {}
+    for quantity in smc.rig("qube_servo_3").about.split(": ", 1)[1].split(". ")[0].split(", "):
+        name, error = quantity.split()
+        errors[name] = float(error)
+    own = smc.rig("qube_servo_3")
+    assert errors.keys() == set(own.free)
+    away = []
+    for values in own.ensemble:
+        away.append([(values[name] - own.values[name]) / errors[name] for name in own.free])
+    assert 0.7 < np.sqrt(np.mean(np.square(away))) < 1.4
+
+
 def test_a_motor_that_brakes_damps_falls_more():
     rig = smc.rig("qube_servo_3")
     a = []
