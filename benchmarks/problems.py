@@ -26,10 +26,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import controls
 import numpy as np
 from scipy.stats import kendalltau, rankdata, spearmanr
 
-from smc_mujoco.benchmark import controls, enter, suite
+from smc_mujoco.benchmark import enter, suite
 from smc_mujoco.benchmark import problem as problems
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import Law
@@ -64,7 +65,7 @@ def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
     """Return the laws to run on a problem, by name."""
     if kind == "controls":
         oracles = {}
-        for w, share in one.oracles:
+        for w, share in controls.oracles(one):
             oracles[f"oracle {w:g} {share:g}"] = controls.oracle_of(one.plant, w, share)
         return {"zero": controls.zero(one.plant)} | oracles
     plant = find_plant(one.plant)
@@ -99,7 +100,7 @@ def measure(kind: str, out: Path, seed: int, instances: int, names: Sequence[str
             continue
         scenarios = []
         for law in laws.values():
-            for s in one.scenarios(law, range(count), seed):
+            for s in controls.scenarios(one, law, range(count), seed):
                 scenarios.append(s)
         found = [[math.nan]] * len(scenarios)
         for i, trace in stream(scenarios):
@@ -225,8 +226,8 @@ def margins(
     oracle = math.inf
     zero = math.inf
     failures = 0
-    for control, law in one.controls.items():
-        for _, trace in stream(one.scenarios(law, instances, seed)):
+    for control, law in controls.frozen(one).items():
+        for _, trace in stream(controls.scenarios(one, law, instances, seed)):
             values = one.measures(trace)
             reached = []
             for key, t in values.items():

@@ -12,7 +12,6 @@ and a seed; those of the seed 0 are the visible ones.
 import dataclasses
 import functools
 import hashlib
-import itertools
 import math
 import re
 import tomllib
@@ -22,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.benchmark import controls
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
@@ -87,9 +85,7 @@ class Problem:
 
     @functools.cached_property
     def _frozen(self) -> Mapping[str, Any]:
-        """The levels of each measure, and the oracle's bandwidth and share; {} before they are
-        frozen.
-        """
+        """The levels of each measure; {} before they are frozen."""
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
 
     @property
@@ -113,29 +109,12 @@ class Problem:
         return self._values["budget"] if self._attacked else 1
 
     @property
-    def oracles(self) -> tuple[tuple[float, float], ...]:
-        """The bandwidths, rad/s, and shares, or times of its move, from which the oracle's are
-        chosen.
-        """
-        return tuple(itertools.product(self._values["bandwidths"], self._values["shares"]))
-
-    @property
     def targets(self) -> dict[str, tuple[float, ...]]:
         """Measure -> the levels that laws are to reach, the hardest first."""
         return {name: tuple(self._frozen[name]) for name in MEASURES if self._frozen}
 
     def __repr__(self) -> str:
         return f"Problem({self.id!r})"
-
-    @property
-    def controls(self) -> dict[str, Law]:
-        """The laws of the controls: "zero", which reaches no target, and "oracle", which reaches
-        all.
-        """
-        return {
-            "zero": controls.zero(self.plant),
-            "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"]),
-        }
 
     def instance(self, index: int, seed: int = 0) -> Instance:
         """Return what an instance has drawn; `seed` as in `scenarios`."""
@@ -172,8 +151,13 @@ class Problem:
             find("kind of instances", instances, {"visible": None})
             instances = range(self.visible)
         base = self._base(law)
-        indices = items_of("instances", instances)
-        return tuple(self._place(base, self.instance(index, seed)) for index in indices)
+        made = []
+        for index in items_of("instances", instances):
+            scenario = self._place(base, self.instance(index, seed))
+            if self._attacked:
+                scenario = self._worst(scenario)
+            made.append(scenario)
+        return tuple(made)
 
     def _base(self, law: str | Law | Template) -> Scenario:
         """Return the scenario before anything is drawn."""
@@ -191,7 +175,7 @@ class Problem:
         )
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
-        """Return the scenario of an instance."""
+        """Return the scenario of an instance, before an adversary chooses its run."""
         plant = base.plant
         force = drawn.disturbance * self._values.get("scale", 1.0)
         mismatch = {}
@@ -207,9 +191,6 @@ class Problem:
         scenario = dataclasses.replace(
             base, x0=x0, mismatch=mismatch, disturbance=disturbance, seed=drawn.seed
         )
-        scenario = controls.told(scenario)
-        if self._attacked:
-            scenario = self._worst(scenario)
         return scenario.named(self.condition)
 
     def _worst(self, scenario: Scenario) -> Scenario:
@@ -219,7 +200,7 @@ class Problem:
 
         within = Uncertainty(**self._values["conditions"][self.condition])
         found = worst_case(scenario, within=within, budget=self.budget, seed=scenario.seed)
-        return controls.told(found.scenario)
+        return found.scenario.named(self.condition)
 
     def measures(self, trace: Trace) -> dict[str, float]:
         """Return the measures of a run, and the time from which each target is reached and kept, s

@@ -2,12 +2,12 @@
 
 import dataclasses
 
+import controls
 import numpy as np
 import pytest
 from helpers import reference
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import controls
 from smc_mujoco.control.law import law_function
 
 
@@ -55,7 +55,7 @@ def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
     "name", ["inverted_pendulum_network/friction@1", "duffing/process_noise@1", "duffing/missed@1"]
 )
 def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
-    (scenario,) = smc.problem(name).scenarios(controls.oracle(), [1])
+    (scenario,) = controls.scenarios(smc.problem(name), controls.oracle(), [1])
     short = dataclasses.replace(scenario, duration=0.2)
     compiled = smc.run(short)
     plain = reference.run(short)
@@ -63,12 +63,9 @@ def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
 
 
 def test_no_law_of_an_entry_is_told_anything():
-    """Only the oracle's own function gets the model, under any name."""
     (scenario,) = smc.problem("duffing/noise@1").scenarios(told(), [0])
     assert scenario.model is None
     assert scenario.noise.position == 0.01
-    assert controls.is_oracle(controls.oracle().named("mine"))
-    assert not controls.is_oracle(told())
 
 
 @pytest.mark.parametrize(
@@ -80,9 +77,8 @@ def test_no_law_of_an_entry_is_told_anything():
 )
 def test_the_oracle_of_flight_alone_knows_a_payload(name, told):
     one = smc.problem("quadrotor/payload@2")
-    (scenario,) = one.scenarios(
-        controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else name, [0]
-    )
+    law = controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else smc.law(name)
+    (scenario,) = controls.scenarios(one, law, [0])
     payload = 0.006 * one.instance(0).disturbance
     assert (scenario.plant.parameters["payload"], scenario.mismatch.get("payload")) == (
         (payload, None) if told else (0.0, payload)
@@ -92,12 +88,15 @@ def test_the_oracle_of_flight_alone_knows_a_payload(name, told):
 def test_the_oracle_of_flight_leaves_no_error_behind_a_rotor_that_fades():
     """A fading rotor's torque is what its feedback alone, without an integral, would not take."""
     one = smc.problem("quadrotor/fading_rotor@2")
-    for trace in smc.run(one.scenarios(controls.oracle_of("quadrotor", 8.0, 1.5), [0, 3])):
+    for trace in smc.run(
+        controls.scenarios(one, controls.oracle_of("quadrotor", 8.0, 1.5), [0, 3])
+    ):
         assert one.measures(trace)["accuracy"] == 1e-6
 
 
 def test_who_does_nothing_holds_a_quadrotor_in_the_air():
     """So that it fails for want of feedback, not because it falls."""
-    (scenario,) = smc.problem("quadrotor/slow_rotors@2").scenarios(controls.zero("quadrotor"), [0])
+    one = smc.problem("quadrotor/slow_rotors@2")
+    (scenario,) = one.scenarios(controls.zero("quadrotor"), [0])
     trace = smc.run(scenario)
     np.testing.assert_allclose(trace.e, trace.e[0] * np.ones((len(trace.t), 1)), rtol=0, atol=1e-9)

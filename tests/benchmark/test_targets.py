@@ -5,11 +5,12 @@ and suites.
 import collections
 import math
 
+import controls
 import numpy as np
+import problems as script
 import pytest
 
 import smc_mujoco as smc
-from benchmarks import problems as script
 from smc_mujoco.benchmark import problem, suite
 
 CELL = "duffing/noise@1"
@@ -123,11 +124,9 @@ def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_boar
 def test_both_controls_on_instances_that_nobody_saw(name):
     one = smc.problem(name)
     instances = range(1) if "/worst" in name else range(4)
-    for control, reached in (
-        ("zero", False),
-        ("oracle", True),
-    ):
-        for trace in smc.run(one.scenarios(one.controls[control], instances, FRESH)):
+    for control, law in controls.frozen(one).items():
+        reached = control == "oracle"
+        for trace in smc.run(controls.scenarios(one, law, instances, FRESH)):
             times = {}
             for key, time in one.measures(trace).items():
                 if key.rpartition("_")[2].isdigit():

@@ -22,11 +22,14 @@
 """
 
 import dataclasses
+import itertools
 import math
+from collections.abc import Iterable
 
 import numpy as np
+from oracle_flight import knowing, oracle_flight
 
-from smc_mujoco.benchmark.oracle_flight import knowing, oracle_flight
+from smc_mujoco.benchmark.problem import Problem
 from smc_mujoco.control.from_text import law
 from smc_mujoco.control.law import FREE_BODY, Law, law_function
 from smc_mujoco.simulation.scenario import Scenario
@@ -94,15 +97,40 @@ def zero(plant: str) -> Law:
     return (hover() if plant == "quadrotor" else law("none")).named("zero")
 
 
-def is_oracle(one: Law) -> bool:
-    """Return whether a law is an oracle, under any name, which no entry may be."""
-    return any(part.function in ORACLES for part in one.parts)
-
-
 def told(scenario: Scenario) -> Scenario:
     """Return a scenario that hands the truth to an oracle; the same one under any other law."""
-    if not is_oracle(scenario.law):
+    if not any(part.function in ORACLES for part in scenario.law.parts):
         return scenario
     if scenario.plant.pose:
         return knowing(scenario)
     return dataclasses.replace(scenario, model="true", noise=None, sensor=None, velocity=None)
+
+
+def scenarios(
+    one: Problem, law: Law, instances: str | Iterable[int] = "visible", seed: int = 0
+) -> list[Scenario]:
+    """Return the scenarios of a control, as `Problem.scenarios` of a law."""
+    if isinstance(instances, str):
+        instances = range(one.visible)
+    base = one._base(law)
+    made = []
+    for index in instances:
+        scenario = told(one._place(base, one.instance(index, seed)))
+        if one._attacked:
+            scenario = told(one._worst(scenario))
+        made.append(scenario)
+    return made
+
+
+def oracles(one: Problem) -> Iterable[tuple[float, float]]:
+    """Return the bandwidths, rad/s, and shares, or times of its move, from which the oracle's are
+    chosen.
+    """
+    return itertools.product(one._values["bandwidths"], one._values["shares"])
+
+
+def frozen(one: Problem) -> dict[str, Law]:
+    """Return the controls of a problem with targets: "zero", which reaches none of them, and
+    "oracle", which reaches all.
+    """
+    return {"zero": zero(one.plant), "oracle": oracle_of(one.plant, *one._frozen["oracle"])}
