@@ -7,8 +7,8 @@ At the first stage of a control sample, for each channel:
 A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of
 the sample before. At the first stage of a physics step, the command whose delay has passed goes to
 ctrl, through lags and rate limits. At every stage, disturbance(t) goes to xfrc_applied. Then a
-friction by a formula goes to ctrl; its steps have one stage. Coulomb friction on joints that move
-alone goes to qfrc_applied, at every stage of RK4. Each sample is logged with the mean forces since
+friction by a formula goes to ctrl; its steps have one stage. Dry friction on joints that move alone
+goes to qfrc_applied, at every stage of RK4. Each sample is logged with the mean forces since
 the last one.
 
 The controller counts its calls, because mjData.time does not tell the last stage of a step from the
@@ -31,9 +31,9 @@ from numba import njit
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms import rotation
-from smc_mujoco.mechanisms.hardware import stepper
+from smc_mujoco.mechanisms.hardware import drives, stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled
-from smc_mujoco.mechanisms.hardware.friction import coulomb_step
+from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.rotors import DRAG_AXES, rotor_at, speed_for, spun, thrust_at
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
@@ -101,25 +101,28 @@ def control(address, sim, data):  # noqa: PLR0912
         failure = _apply_disturbances(
             address, sim, data, k * sim.period + (within + fraction) * sim.step, sample
         )
-    if sim.frictions != 0 and failure == record.FINE:  # an integrator of one stage
+    # an integrator of one stage
+    if sim.frictions != 0 and sim.exact_friction == 0 and failure == record.FINE:
         failure = _apply_friction(address, sim, data)
+    if failure == record.FINE:
+        if stage == 0 and within == 0:
+            _log(sim, data, k)
+        failure = _apply_to_joints(address, sim, data, stage)
     if failure != record.FINE:
         sim.failure = failure
         sim.failed_step = step
+        _remove_exact_friction(sim, data)
         _zero_inputs(sim, data)
-        return
-    if stage == 0 and within == 0:
-        _log(sim, data, k)
-    _apply_to_joints(sim, data, stage)
 
 
 @njit(error_model="numpy", inline="always")
-def _apply_to_joints(sim, data, stage):
-    """Give the joints what stepper motors and Coulomb friction exert at a stage."""
+def _apply_to_joints(address, sim, data, stage):
+    """Give the joints what stepper motors and exact friction exert at a stage."""
     if sim.motors != 0:
         _apply_steppers(sim, data, stage)
     if sim.exact_friction != 0:
-        _apply_exact_friction(sim, data, stage)
+        return _apply_exact_friction(address, sim, data, stage)
+    return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
@@ -909,6 +912,15 @@ def _generalised_disturbance(data, channel):
     return d
 
 
+@njit(error_model="numpy", inline="always")
+def _evaluate_friction(address, sim, i):
+    """Write the friction by a formula of channel i into the record. Return 1 if it raised, or 0."""
+    sim.seen.i = i
+    function = function_at(sim.frictions, i)
+    at = record.AT
+    return _call(function, 0, address + at.friction_input, address + at.friction_output)
+
+
 @njit(error_model="numpy")
 def _apply_friction(address, sim, data):
     """Give every joint its friction by a formula for a physics step, see hardware/sliding.py."""
@@ -917,7 +929,6 @@ def _apply_friction(address, sim, data):
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
-        function = function_at(sim.frictions, i)
         x = data.qpos[channel.qpos]
         v = data.qvel[channel.qvel]
         joint = channel.qvel
@@ -925,18 +936,12 @@ def _apply_friction(address, sim, data):
         inputs.motor = data.actuator_force[channel.force] if channel.force >= 0 else 0.0
         inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
         inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
-        sim.seen.i = i
-        if (
-            _call(
-                function, 0, address + record.AT.friction_input, address + record.AT.friction_output
-            )
-            != 0
-        ):
+        if _evaluate_friction(address, sim, i) != 0:
             return record.RAISED
         f = outputs.f
         low = outputs.low
         high = outputs.high
-        bristle = pointer(function.memory)
+        bristle = pointer(function_at(sim.frictions, i).memory)
         if state.stuck == 0.0:
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(state.speed)
             if slows or v * state.speed < 0.0:
@@ -962,12 +967,14 @@ def _remove_exact_friction(sim, data):
         data.qfrc_applied[channel_at(sim.channels, i).qvel] = 0.0
 
 
-_coulomb_step = njit(error_model="numpy")(coulomb_step)
+_dry_step = njit(error_model="numpy")(dry_step)
+_torque = njit(error_model="numpy", inline="always")(drives.torque)
 
 
 @njit(error_model="numpy")
-def _apply_exact_friction(sim, data, stage):
-    """Give every joint its Coulomb friction at a stage of RK4: the moments of `coulomb_step`.
+def _apply_exact_friction(address, sim, data, stage):
+    """Give every joint its dry friction at a stage of RK4: by its formula while it slides, else the
+    moments of `dry_step`.
 
     While it holds the joint, it takes up what the other forces change within the step, too.
     """
@@ -975,29 +982,30 @@ def _apply_exact_friction(sim, data, stage):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
         joint = channel.qvel
-        drive = data.ctrl[channel.ctrl] if channel.ctrl >= 0 else 0.0
-        level = data.dof_frictionloss[joint]
+        v = data.qvel[joint]
+        drive = _torque(sim.torque, data.ctrl[channel.ctrl], v) if channel.ctrl >= 0 else 0.0
         others = (
             data.qfrc_passive[joint]
             - data.qfrc_bias[joint]
             + _generalised_disturbance(data, channel)
         )
+        if sim.frictions != 0:
+            inputs = sim.friction_input
+            inputs.v = v
+            inputs.motor = drive
+            inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
+            inputs.load += _generalised_disturbance(data, channel)
         if stage == 0:
             state.smooth = others + (state.middle if sim.drive_step.rise_first != 0.0 else drive)
-            v = data.qvel[joint]
-            mobility = data.qLDiagInv[joint]
-            state.friction, state.friction_rise, held = _coulomb_step(
-                v, state.smooth, level, mobility, sim.step
-            )
-            sliding = 1.0 - held / sim.step
-            if held > 0.0:
-                state.holding = 1.0 - sliding * sliding
-            else:
-                state.holding = 0.0
-            state.held += held
-        force = min(
-            max(state.friction - state.holding * (others + drive - state.smooth), -level), level
-        )
+            if _begin_friction(address, sim, data, i) != 0:
+                return record.RAISED
+        if state.slides != 0.0:
+            if _evaluate_friction(address, sim, i) != 0:
+                return record.RAISED
+            force = -sim.friction_output.f
+        else:
+            holding = state.friction - state.holding * (others + drive - state.smooth)
+            force = min(max(holding, state.low), state.high)
         weight = 3.0
         if stage % 3 == 0:  # the first stage, or the last
             if stage == 0:
@@ -1007,6 +1015,70 @@ def _apply_exact_friction(sim, data, stage):
             weight = 6.0
         data.qfrc_applied[joint] += force
         state.reaction += force / weight
+    return record.FINE
+
+
+@njit(error_model="numpy")
+def _begin_friction(address, sim, data, i):
+    """Decide what the dry friction of channel i does in a step, under `smooth`, the other forces.
+
+    Return 1 if its formula raised, or 0.
+    """
+    channel = channel_at(sim.channels, i)
+    state = state_at(sim.states, i)
+    v = data.qvel[channel.qvel]
+    mobility = data.qLDiagInv[channel.qvel]
+    smooth = state.smooth
+    state.slides = 0.0
+    if sim.frictions == 0:
+        high = data.dof_frictionloss[channel.qvel]
+        low = -high
+        sliding = -math.copysign(high, v)
+        starting = -math.copysign(high, smooth)
+    else:
+        inputs = sim.friction_input
+        found = sim.friction_output
+        if _evaluate_friction(address, sim, i) != 0:
+            return 1
+        low = found.low
+        high = found.high
+        sliding = -found.f
+        slow = abs(v) < STICKING_SPEED and (state.stuck != 0.0 or abs(v) <= abs(state.speed))
+        state.speed = v
+        stops = abs(v) <= -math.copysign(sim.step * mobility, v) * (smooth + sliding)
+        if not low < high or not (slow or stops or v == 0.0):
+            state.slides = 1.0
+            state.stuck = 0.0
+            state.friction_rise = 0.0
+            return 0
+        if slow:
+            sliding = -high if v > 0.0 else -low
+        else:
+            inputs.v = 0.5 * v
+            if _evaluate_friction(address, sim, i) != 0:
+                return 1
+            sliding = -found.f
+        inputs.v = math.copysign(STICKING_SPEED, smooth)
+        if _evaluate_friction(address, sim, i) != 0:
+            return 1
+        starting = -found.f
+        # friction that holds less than it exerts in motion would start no joint
+        if smooth * (smooth + starting) <= 0.0:
+            low = min(low, smooth)
+            high = max(high, smooth)
+    state.friction, state.friction_rise, held = _dry_step(
+        v, smooth, sliding, starting, low, high, mobility, sim.step
+    )
+    slid = 1.0 - held / sim.step
+    if held > 0.0:
+        state.holding = 1.0 - slid * slid
+    else:
+        state.holding = 0.0
+    state.held += held
+    state.low = min(-high, sliding, starting)
+    state.high = max(-low, sliding, starting)
+    state.stuck = held
+    return 0
 
 
 @njit(error_model="numpy", inline="always")

@@ -378,6 +378,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "drive_step": drives._asdict() if drives else {},
         "stepper": pulsing(s.stepper)._asdict() if s.stepper else {},
         "exact_friction": s.exact_friction,
+        "torque": s.torque._asdict(),
         "seed": s.seed,
         "sigma_x": s.noise.position,
         "sigma_v": s.noise.velocity,

@@ -29,7 +29,13 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive_step
+from smc_mujoco.mechanisms.hardware.drives import (
+    DCMotor,
+    DriveStep,
+    Lag,
+    Torque,
+    drive_step,
+)
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
 from smc_mujoco.mechanisms.hardware.part import (
@@ -342,20 +348,27 @@ class Scenario:
 
     @property
     def exact_friction(self) -> bool:
-        """Whether the callback gives RK4 the moments of Coulomb friction in each step, see
-        `friction.coulomb_step`.
+        """Whether the callback gives RK4 the moments of dry friction in each step, see
+        `friction.dry_step`.
 
-        It knows all other forces on joints that move alone, behind no drive but lags and rate
-        limits. In other scenarios Coulomb friction is MuJoCo's.
+        It knows all other forces on joints that move alone: behind lags and rate limits, and for
+        friction by a formula also behind a DC motor without cogging and ripple. In other scenarios
+        Coulomb friction is MuJoCo's, and joints with a formula stick by bristles.
         """
-        parts = {type(part) for part in self.friction}
-        if not Coulomb in parts <= {Coulomb, Viscous} or self.integrator not in (None, "RK4"):
+        dry = [part for part in self.friction if not isinstance(part, Viscous)]
+        if len(dry) == 0 or self.integrator not in (None, "RK4"):
+            return False
+        if dry != [self.formula_friction] and not all(isinstance(part, Coulomb) for part in dry):
             return False
         if self.contact.kind != "none" or self.mechanism != "equation":
             return False
         if any(isinstance(d, Push) for d in self.disturbance):
             return False
-        return all(part.in_callback for part in self.actuator) and moves_alone(self.plant)
+        for part in self.actuator:
+            even = isinstance(part, DCMotor) and part.even and self.formula_friction is not None
+            if not (part.in_callback or even):
+                return False
+        return moves_alone(self.plant)
 
     @property
     def voltage_motor(self) -> DCMotor | None:
@@ -447,6 +460,14 @@ class Scenario:
     def formula_friction(self) -> Sliding | None:
         """The friction by a formula, which the callback evaluates; None without one."""
         return next((part for part in self.friction if isinstance(part, Sliding)), None)
+
+    @property
+    def torque(self) -> Torque:
+        """What MuJoCo's actuator makes of its control in a step with `exact_friction`."""
+        for part in self.actuator:
+            if isinstance(part, DCMotor):
+                return part.torque(self.resolved.physics_step, True)
+        return Torque()
 
     @property
     def drive_step(self) -> DriveStep | None:
@@ -835,7 +856,8 @@ def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
     at any time.
     """
-    if s.integrator == "RK4" and (states := [p for p in s.friction if p.bristles]):
+    states = [part for part in s.friction if part.bristles]
+    if s.integrator == "RK4" and states and not s.exact_friction:
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the "
             "integrator out"

@@ -17,7 +17,7 @@ from smc_mujoco.common.jit import floats, record_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import ARRAYS, HANDLE
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware.drives import DriveStep
+from smc_mujoco.mechanisms.hardware.drives import DriveStep, Torque
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, Pulsing
 from smc_mujoco.mechanisms.plant import SEEN
 
@@ -85,16 +85,18 @@ CHANNEL = np.dtype(
 #   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
 # middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage, see
 # `DriveStep`
-# friction, friction_rise: mean of Coulomb friction in a step of RK4, and its rise to the last stage
+# friction, friction_rise: mean of dry friction in a step of RK4, and its rise to the last stage
+# low, high: bounds of that friction in the step; slides: whether a formula gives it at every stage
 # smooth, holding: the other forces for which these are right, and the share of their change that
 # friction takes up
 #   held: s of a control period for which friction held the joint
-# stuck, stuck_at, speed: whether a friction by a formula sticks, where, and the speed at the step
-# before
+# stuck, stuck_at, speed: above 0 if a friction by a formula sticks, where its bristle is unbent,
+# and the speed at the step before
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
-RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
+RUBBED = "friction", "friction_rise", "smooth", "holding", "held", "low", "high", "slides"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
 DRIVE_STEP = floats(DriveStep._fields)
+TORQUE = floats(Torque._fields)
 PULSING = floats(Pulsing._fields)
 MOTOR = floats(GENERATOR)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
@@ -188,8 +190,10 @@ SIMULATION = np.dtype(
         ("stepper", PULSING),
         ("motors", "i8"),
         ("motor_stride", "i8"),
-        # whether the callback gives the joints their Coulomb friction
+        # whether the callback gives the joints the moments of their dry friction, and what it knows
+        # of the actuator
         ("exact_friction", "i8"),
+        ("torque", TORQUE),
         # the sensor: noise, encoder
         ("seed", "f8"),
         ("sigma_x", "f8"),

@@ -13,8 +13,8 @@ import numpy as np
 
 from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
-from smc_mujoco.mechanisms.hardware.drives import rippled
-from smc_mujoco.mechanisms.hardware.friction import coulomb_step
+from smc_mujoco.mechanisms.hardware.drives import rippled, torque
+from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
@@ -112,8 +112,9 @@ class Loop:
             self.numbers = [record(*(formula.parameters(i) or [0.0])) for i in range(n)]
         self.stuck_at = [math.nan] * n  # positions of joints that stick, or NaN
         self.speed = [0.0] * n  # at the step before
-        # of Coulomb friction, see `apply_exact_friction`
-        self.rubbing = np.zeros((n, 4))
+        # of dry friction, see `apply_exact_friction`: None while a formula gives it at every stage
+        self.rubbing: list[tuple | None] = [None] * n
+        self.stuck = [False] * n
         self.held = np.zeros(n)
         self.motors = []
         if scenario.stepper is not None:
@@ -154,7 +155,7 @@ class Loop:
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.d = self.apply_disturbances(data, t)
-            if self.scenario.formula_friction:
+            if self.scenario.formula_friction and not self.scenario.exact_friction:
                 self.apply_friction(data, d, self.scenario.formula_friction)
             if stage == 0 and within == 0:
                 x = data.qpos[self.channels["qpos"]]
@@ -408,35 +409,76 @@ class Loop:
             self.speed[i], data.ctrl[at["friction_ctrl"][i]] = v, -friction
 
     def apply_exact_friction(self, data: mujoco.MjData, d: np.ndarray, stage: int) -> None:
-        """Give the joints the moments of their Coulomb friction at a stage of RK4; d are the
-        disturbances, (n,).
+        """Give the joints their dry friction at a stage of RK4, by its formula or by its moments in
+        the step; d are the disturbances, (n,).
         """
         at = self.channels
-        h = self.scenario.physics_step
+        formula = self.scenario.formula_friction
         for i, dof in enumerate(at["qvel"]):
+            v = float(data.qvel[dof])
             if self.driven[i]:
-                drive = float(data.ctrl[at["ctrl"][i]])
+                drive = torque(self.scenario.torque, float(data.ctrl[at["ctrl"][i]]), v)
             else:
                 drive = 0.0
-            level = float(self.model.dof_frictionloss[dof])
+            load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof]) + d[i]
             others = float(data.qfrc_passive[dof] - data.qfrc_bias[dof] + d[i])
             if stage == 0:
                 if self.drive_step and self.drive_step.rise_first:
-                    middle = self.middle[i]
+                    smooth = others + self.middle[i]
                 else:
-                    middle = drive
-                smooth = others + middle
-                v = float(data.qvel[dof])
-                mobility = float(data.qLDiagInv[dof])
-                mean, rise, held = coulomb_step(v, smooth, level, mobility, h)
-                sliding = 1.0 - held / h
-                self.rubbing[i] = mean, rise, smooth, 1.0 - sliding * sliding if held > 0.0 else 0.0
-                self.held[i] += held
-            mean, rise, smooth, holding = self.rubbing[i]
-            force = min(max(mean - holding * (others + drive - smooth), -level), level)
-            force += (-rise, 0.0, 0.0, rise)[stage]
+                    smooth = others + drive
+                self.rubbing[i] = self.begin_friction(data, i, smooth, drive, load)
+            moments = self.rubbing[i]
+            if moments is None:
+                force = -evaluate_friction(formula, self.numbers[i], v, drive, load)[0]
+            else:
+                mean, rise, smooth, holding, low, high = moments
+                force = min(max(mean - holding * (others + drive - smooth), low), high)
+                force += (-rise, 0.0, 0.0, rise)[stage]
             data.qfrc_applied[dof] = force + (d[i] if self.scenario.plant.direct else 0.0)
             self.forces[1, i] += force / (6.0, 3.0, 3.0, 6.0)[stage]
+
+    def begin_friction(
+        self, data: mujoco.MjData, i: int, smooth: float, drive: float, load: float
+    ) -> tuple | None:
+        """Return the moments of a joint's dry friction in a step, and its bounds; None if its
+        formula acts at every stage.
+        """
+        formula = self.scenario.formula_friction
+        dof = self.channels["qvel"][i]
+        h = self.scenario.physics_step
+        mobility = float(data.qLDiagInv[dof])
+        v = float(data.qvel[dof])
+        if formula is None:
+            high = float(self.model.dof_frictionloss[dof])
+            low = -high
+            sliding = -math.copysign(high, v)
+            starting = -math.copysign(high, smooth)
+        else:
+
+            def force(v: float) -> list[float]:
+                return evaluate_friction(formula, self.numbers[i], v, drive, load)
+
+            f, low, high = force(v)
+            slow = abs(v) < STICKING_SPEED and (self.stuck[i] or abs(v) <= abs(self.speed[i]))
+            self.speed[i] = v
+            stops = abs(v) <= -math.copysign(h * mobility, v) * (smooth - f)
+            if low >= high or not (slow or stops or v == 0.0):
+                self.stuck[i] = False
+                return None
+            if slow:
+                sliding = -high if v > 0.0 else -low
+            else:
+                sliding = -force(0.5 * v)[0]
+            starting = -force(math.copysign(STICKING_SPEED, smooth))[0]
+            if smooth * (smooth + starting) <= 0.0:
+                low, high = min(low, smooth), max(high, smooth)
+        mean, rise, held = dry_step(v, smooth, sliding, starting, low, high, mobility, h)
+        self.held[i] += held
+        self.stuck[i] = held > 0.0
+        slid = 1.0 - held / h
+        bounds = min(-high, sliding, starting), max(-low, sliding, starting)
+        return mean, rise, smooth, 1.0 - slid * slid if held > 0.0 else 0.0, *bounds
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and

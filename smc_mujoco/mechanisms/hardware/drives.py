@@ -213,6 +213,24 @@ class DCMotor(Actuator):
         """The largest torque that voltage and current allow at rest, N m (N)."""
         return min(self.voltage * self.constant / self.resistance, self.constant * self.current)
 
+    @property
+    def even(self) -> bool:
+        """Whether it has neither cogging nor ripple."""
+        return not (self.cogging or self.ripple)
+
+    def torque(self, step: float, rk4: bool) -> "Torque":
+        """Return what MuJoCo computes of an even motor in a physics step, s."""
+        gain = self.constant / self.resistance
+        share, voltage = self._share(step, rk4)
+        return Torque(gain, share * gain * self.constant, voltage, self.constant * self.current)
+
+    def _share(self, step: float, rk4: bool) -> tuple[float, float]:
+        """Return the share of the drag that MuJoCo gets, and the bound on the voltage there."""
+        if self.delay:  # the callback simulates the winding, and bounds its voltage
+            return winding_step(step / self.delay, rk4)[1], math.inf
+        # `rippled` bounds it before the ripple
+        return 1.0, math.inf if self.ripple else self.voltage
+
     def edit(self, spec: mujoco.MjSpec) -> None:
         kind = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE)
         constants = (self.constant, self.constant)
@@ -226,12 +244,8 @@ class DCMotor(Actuator):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
         torque = self.constant * self.current
-        # `rippled` bounds it before the ripple
-        share, voltage = (1.0, math.inf if self.ripple else self.voltage)
-        if self.delay:  # the callback simulates the winding, and bounds its voltage
-            rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
-            share = winding_step(model.opt.timestep / self.delay, rk4)[1]
-            voltage = math.inf
+        rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+        share, voltage = self._share(model.opt.timestep, rk4)
         yield Field(
             "actuator_gainprm", (ids, WINDING), (share * self.resistance, share * self.constant)
         )
@@ -249,6 +263,21 @@ class DCMotor(Actuator):
         if self.inductance > MIN_WINDING_TIME * self.resistance:
             return self.inductance / self.resistance
         return 0.0
+
+
+class Torque(NamedTuple):
+    """The force of MuJoCo's actuator on a joint at a control; the default is that of a force."""
+
+    gain: float = 1.0
+    drag: float = 0.0  # N m s/rad (N s/m)
+    most: float = math.inf  # bound on the control
+    limit: float = math.inf  # N m (N)
+
+
+def torque(drive, control, v):
+    """Return the force of an actuator, N m (N), on a joint at the speed v, rad/s (m/s)."""
+    force = drive.gain * min(max(control, -drive.most), drive.most) - drive.drag * v
+    return min(max(force, -drive.limit), drive.limit)
 
 
 class DriveStep(NamedTuple):

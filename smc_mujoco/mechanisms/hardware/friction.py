@@ -1,8 +1,7 @@
 """Friction on every channel's joint: viscous, Coulomb, and LuGre, which sticks without creep.
 
 MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor`
-actuator. Under RK4 the callback simulates Coulomb friction on joints that move alone, see
-`coulomb_step`.
+actuator. Under RK4 the callback simulates dry friction on joints that move alone, see `dry_step`.
 """
 
 import dataclasses
@@ -82,7 +81,7 @@ class Coulomb(Friction):
         yield Field("dof_solimp", dofs, HARD_SOLIMP)
 
 
-def coulomb_step(v, smooth, level, mobility, h):
+def dry_step(v, smooth, sliding, starting, low, high, mobility, h):
     """Return what dry friction does to a joint that moves alone, in a step of h s in which no other
     force changes.
 
@@ -91,7 +90,10 @@ def coulomb_step(v, smooth, level, mobility, h):
     Args:
       v: speed at the start of the step, rad/s (m/s).
       smooth: sum of the other forces on the joint, N m (N).
-      level: of the friction, N m (N).
+      sliding: friction on the joint while it moves as at v, N m (N).
+      starting: friction on it when it then moves as `smooth` pushes, N m (N); with `smooth` out of
+        the bounds it must be less than that.
+      low, high: bounds of the `smooth` that friction holds at rest, N m (N).
       mobility: 1 over the joint's inertia, 1/(kg m^2) (1/kg).
       h: s.
 
@@ -107,11 +109,11 @@ def coulomb_step(v, smooth, level, mobility, h):
     while left > 0.0:
         force = -smooth
         span = left
-        if v == 0.0 and abs(smooth) <= level:
+        if v == 0.0 and low <= smooth <= high:
             held = left
         else:
+            force = sliding if v != 0.0 else starting
             direction = math.copysign(1.0, v if v != 0.0 else smooth)
-            force = -level * direction
             slowing = -direction * (smooth + force) * mobility
             if abs(v) < slowing * left:
                 span = abs(v) / slowing

@@ -4,19 +4,27 @@ evaluates it.
 A formula gives the force F that resists a joint sliding at the speed v, and the bounds [low, high]
 of the force that holds the joint at rest. The bounds are needed because a fit to records of moving
 joints is a smooth F with F(0) = 0. By F alone, a joint under a load would never rest: it would
-creep at the speed at which F equals the load. So a joint slides or sticks:
+creep at the speed at which F equals the load. So a joint slides or sticks.
+
+On joints that move alone the callback gives RK4's stages F itself while the joint slides, and in a
+step in which it stops, rests or turns back the moments of `friction.dry_step`. A joint whose speed
+falls below STICKING_SPEED is stopped by the bound of the force that holds it at rest. See
+`Scenario.exact_friction`.
+
+On all others:
 
     slides:  friction = -F(v, motor, load)
     sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high),
              like a LuGre bristle that does not slip
 
-A joint sticks when its speed changes sign or is small (STICKING_SPEED). x_s is then such that the
-spring carries the joint's load, within the bounds: the joint rests where it stops. For a joint at
-rest from the start of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves
-the bounds. So friction is F to the last bit while a joint slides, and a stuck joint does not creep,
-because its friction depends on its position. Under a new load a stuck joint turns by
-load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower if other joints move
-with it. A joint that slides keeps sliding at the speed at which F equals the load.
+A joint sticks when its speed changes sign or is small. x_s is then such that the spring carries the
+joint's load, within the bounds: the joint rests where it stops. For a joint at rest from the start
+of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves the bounds. So a
+stuck joint does not creep, because its friction depends on its position. Under a new load it turns
+by load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower if other joints
+move with it.
+
+A joint that slides keeps sliding at the speed at which F equals the load.
 
 Limit: bristles are critically damped for each joint alone. Stuck joints that move together have
 less damping. A sudden load makes them overshoot, and may tear a joint loose below the limit that
@@ -25,8 +33,8 @@ holds it at rest. Rigid dry friction would hold. With M at the pose and D the in
 to 13, so a sudden load in that mode tears a joint loose from 71 % of its limit on. A load that
 rises within 0.5 s does not, up to 97 %.
 
-The callback writes the friction as the control of an actuator `passive:<joint>`, held over each
-physics step.
+The callback writes the bristles' friction as the control of an actuator `passive:<joint>`, held
+over each physics step.
 """
 
 import dataclasses
@@ -59,7 +67,7 @@ class Sliding(Friction):
     one for each channel.
     """
 
-    bristles = True  # their force is held over each physics step
+    bristles = True  # of joints that do not move alone
 
     @property
     def names(self) -> tuple[str, ...]:

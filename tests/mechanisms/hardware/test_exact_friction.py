@@ -1,8 +1,11 @@
-"""Coulomb friction on joints that move alone: at 1 ms the motion of an integration by events that
-shares no code.
+"""Dry friction on joints that move alone: at 1 ms the motion of integrations that share no code, by
+events and in tiny steps.
 """
 
 import dataclasses
+import math
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -10,7 +13,8 @@ from helpers import reference
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
-from smc_mujoco.mechanisms.hardware.friction import coulomb_step
+from smc_mujoco.mechanisms.hardware.friction import dry_step
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
 
 PERIOD = 1e-3
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
@@ -70,6 +74,117 @@ def by_events(scenario, u, level, d=lambda t: 0.0):
     return np.array(rows).T
 
 
+class Formula(NamedTuple):
+    """A friction by a formula, and the motor it is behind."""
+
+    friction: Sliding
+    motor: smc.DCMotor | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Stribeck(Sliding):
+    """Friction that falls with speed, from `stiction` to `coulomb`, and is stronger backwards."""
+
+    coulomb: float = 0.1
+    stiction: float = 0.2
+    speed: float = 0.05
+    backwards: float = 1.0
+    viscous: float = 0.0
+
+    @staticmethod
+    def value(v, motor, load, p):
+        f = p.coulomb + (p.stiction - p.coulomb) * math.exp(-((v / p.speed) ** 2))
+        if v < 0.0:
+            f = -f * p.backwards
+        return f + p.viscous * v, -p.backwards * p.stiction, p.stiction
+
+
+FORMULAS = {
+    "Coulomb": Formula(Stribeck(0.2, 0.2)),
+    "Coulomb and viscous": Formula(Stribeck(0.1, 0.1, viscous=0.3)),
+    "Stribeck": Formula(Stribeck()),
+    "stronger backwards": Formula(Stribeck(backwards=2.0)),
+    "behind a motor": Formula(Stribeck(), smc.DCMotor(inductance=0.0)),
+}
+for model in ("m1", "m3", "m5", "m6"):
+    made = smc.hardware.servo("mx64", model)
+    FORMULAS[f"servo {model}"] = Formula(made.friction, made.motor)
+
+
+@smc.law_function(gains={"kp": 1.0, "kd": 1.0})
+def pd(y, gains, memory):
+    """A PD loop of its own: `pid` filters the rate."""
+    return -gains.kp * y.e - gains.kd * y.de, 0.0
+
+
+def by_tiny_steps(friction, motor, kp, kd, sine, duration):
+    """Positions of the default inverted pendulum at the samples, (K + 1,), under a PD from 0.2 rad,
+    in steps of 40 us, each of which ends in friction's set.
+    """
+    parts = 25
+    h = PERIOD / parts
+    p = smc.plant("inverted_pendulum").values({})
+    inertia = p.m * p.l**2
+    numbers = SimpleNamespace(**dict(zip(friction.names, friction.parameters(0), strict=True)))
+    gain = 1.0
+    voltage = math.inf
+    drag = 0.0
+    if motor is not None:
+        inertia += motor.gear**2 * motor.rotor_inertia
+        gain = motor.constant / motor.resistance
+        drag = gain * motor.constant
+        voltage = motor.voltage
+    x = 0.2
+    v = 0.0
+    found = [x]
+    for k in range(round(duration / PERIOD)):
+        r = sine.amplitude * math.sin(sine.omega * k * PERIOD)
+        dr = sine.amplitude * sine.omega * math.cos(sine.omega * k * PERIOD)
+        u = min(max(-kp * (x - r) - kd * (v - dr), -6.0), 6.0)
+        for _ in range(parts):
+            push = gain * min(max(u / gain, -voltage), voltage) - drag * v
+            load = p.m * p.grav * p.l * math.sin(x)
+            f, low, high = friction.value(v, push, load, numbers)
+            if v >= 0.0:
+                high = f if v > 0.0 else high
+            if v <= 0.0:
+                low = f if v < 0.0 else low
+            stops = inertia * v / h + push + load - p.b * v
+            speed = h * (stops - min(max(stops, low), high)) / inertia
+            x += 0.5 * h * (v + speed)
+            v = speed
+        found.append(x)
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("kp", "kd", "sine"),
+    [(80.0, 5.0, smc.Sine(0.0, 0.0)), (20.0, 2.0, smc.Sine(0.05, 6.0))],
+    ids=["rest", "sine"],
+)
+@pytest.mark.parametrize("name", FORMULAS)
+def test_rest_and_turns_under_a_formula_are_those_of_tiny_steps(name, kp, kd, sine):
+    """Bristles rested 5 % off without a motor, and 10 to 18 % where a sine turns back."""
+    friction, motor = FORMULAS[name]
+    scenario = smc.Scenario(
+        plant="inverted_pendulum",
+        law=pd(kp=kp, kd=kd),
+        x0=0.2,
+        duration=1.0,
+        friction=friction,
+        actuator=motor,
+        reference=sine,
+    )
+    trace = smc.run(scenario)
+    assert scenario.resolved.physics_step == PERIOD
+    exact = by_tiny_steps(friction, motor, kp, kd, sine, 1.0)
+    late = slice(-400, None)
+    r = sine.amplitude * np.sin(sine.omega * trace.t)
+    bound = np.abs(trace.x[:, 0] - r)[late].max()
+    assert bound == pytest.approx(np.abs(exact - r)[late].max(), rel=0.01)
+    assert np.abs(trace.x[:, 0] - exact).max() < 2e-4 * np.ptp(trace.x)
+
+
 CASES = [
     ("inverted_pendulum", "classical", 1e-3, 0.1, None),
     ("inverted_pendulum", "adaptive", 0.02, 0.4, smc.Sine(amplitude=0.6, omega=40.0)),
@@ -126,7 +241,8 @@ def test_a_step_of_constant_forces_has_the_mean_and_first_moment_of_its_friction
         forces[j] = np.clip(stops, -level, level)
         v += (smooth + forces[j]) * mobility * h / parts
     moment = np.mean(forces * (1.0 - (np.arange(parts) + 0.5) / parts))
-    mean, rise, held = coulomb_step(v0, smooth, level, mobility, h)
+    levels = -np.copysign(level, v0), -np.copysign(level, smooth)
+    mean, rise, held = dry_step(v0, smooth, *levels, -level, level, mobility, h)
     assert mean == pytest.approx(forces.mean(), abs=3e-4)
     assert rise == pytest.approx(6.0 * (forces.mean() / 2.0 - moment), abs=1e-3)
     assert held == pytest.approx(h * np.mean(np.abs(smooth + forces) < 1e-9), abs=h * 2e-4)

@@ -241,6 +241,7 @@ def test_stuck_joints_are_critically_damped():
     part = smc.hardware.Sigmoid(P1[0], P2[0], P3[0])
     fields = {
         "disturbance": smc.Constant(load),
+        "integrator": "implicitfast",
         "duration": 0.4,
         "control_period": 5e-4,
     }
@@ -435,6 +436,7 @@ def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
         "plant": plant,
         "friction": servo.friction,
         "feedforward": smc.Constant(1.5),
+        "integrator": "implicitfast",
         "law": "none",
     }
     start = {
