@@ -23,6 +23,9 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
+import numpy as np
+
+from smc_mujoco.common import libmujoco
 
 CALLBACKS = (
     "control",
@@ -36,8 +39,6 @@ CALLBACKS = (
 )
 
 _lock = threading.RLock()  # held while callbacks are replaced
-# the callbacks of the with blocks of `installed`, the innermost last
-_given: list[dict[str, Any]] = []
 # MuJoCo warns of a model with each of its many compilations: once is enough, when a plant is made
 # of it
 warnings.filterwarnings("ignore", category=UserWarning, module=re.escape(__name__), append=True)
@@ -68,19 +69,20 @@ def installed(control: Any) -> Iterator[None]:
         ours = dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()}
         try:
             _install(ours)
-            _given.append(ours)
             yield
         finally:
-            _given.pop()
             _install(before)
 
 
-def replaced() -> str:
-    """Return the name of a callback that other code has set since `installed`, in its with block;
-    "" for none.
-    """
-    now = _callbacks()
-    return next((name for name, callback in _given[-1].items() if now[name] is not callback), "")
+@functools.cache
+def slots() -> np.ndarray:
+    """Return the addresses of MuJoCo's variables for the callbacks that a run has not, int64."""
+    addresses = []
+    for name in CALLBACKS:
+        if name not in ("control", "time"):
+            slot = ctypes.c_void_p.in_dll(libmujoco.library(), f"mjcb_{name}")
+            addresses.append(ctypes.addressof(slot))
+    return np.array(addresses)
 
 
 @functools.cache

@@ -28,7 +28,8 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.jit import call, pointer
+from smc_mujoco.common.jit import call, integers, pointer
+from smc_mujoco.common.mjcb import slots
 from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware import drives, stepper
@@ -51,6 +52,7 @@ from smc_mujoco.simulation.state import (
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
 LAST_STAGE = 1.0 - 1e-8
+OTHER_CALLBACKS = len(slots())
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
@@ -83,7 +85,7 @@ def control(address, sim, data):  # noqa: PLR0912
         _sum_forces(sim, data)
         if _diverged(sim, data):
             failure = record.DIVERGED
-        elif k >= sim.samples:  # the simulation is stepped beyond its end
+        elif k >= sim.samples or _interfered(sim):  # or the simulation is stepped beyond its end
             failure = record.INTERRUPTED
         else:
             failure = _sample(address, sim, data, k, within)
@@ -177,6 +179,16 @@ def _diverged(sim, data):
             return True
     for i in range(sim.nv):  # noqa: SIM110  # numba knows no generator
         if not abs(data.qvel[i]) < MAX_STATE:
+            return True
+    return False
+
+
+@njit(error_model="numpy", inline="always")
+def _interfered(sim):
+    """Return whether other code has set a callback of MuJoCo's, perhaps in another thread."""
+    slots = integers(sim.slots)
+    for i in range(OTHER_CALLBACKS):
+        if integers(slots[i])[0] != 0:
             return True
     return False
 

@@ -18,6 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
 from smc_mujoco.common.jit import NotCompilable, Uncompiled
 from smc_mujoco.control import joint_law
@@ -222,6 +223,7 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
         values |= {"actuators": len(rows), "mixer": state.address(rows)}
     values["keeps_torques"] = keeps_torques(rows)
     values |= {"rotors": has_rotors(mechanism.model)}
+    values |= {"slots": state.address(mjcb.slots())}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(

@@ -13,6 +13,7 @@ import ctypes
 import functools
 import os
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Annotated, overload
@@ -20,7 +21,7 @@ from typing import Annotated, overload
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import guard, mjcb
+from smc_mujoco.common import fingerprint, guard
 from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, users_stacklevel
 from smc_mujoco.common.progress import bar
@@ -46,29 +47,20 @@ SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
 # has diverged
 USER_MODEL_STEPS = 200
 PYTHON_STEPS = 20_000  # in a slice where a function is called in Python
+PATIENCE = 5.0  # s that a slice may still take after Ctrl-C; chosen: it lasts about a second
 FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 DRY_FRICTION = "dof_frictionloss", "tendon_frictionloss"  # fields of a model
 LOST_CONTACTS = (
     "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
 )
 
+INTERRUPTED = (
+    "other code set a callback of MuJoCo's during the run, or took its control callback away, so "
+    "that its law was not called: call mujoco.set_mjcb_control and its like before or after the "
+    "run, or restore what mujoco.get_mjcb_control() returned"
+)
 DISTURBANCE_NOT_FINITE = "the disturbance became NaN or inf"
 PLANT_DIVERGED = f"{PLANT_DIVERGED_SHORT} (|x| or |v| above {MAX_STATE:g}, or NaN)"
-
-
-def interrupted(name: str) -> str:
-    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the
-    control callback.
-    """
-    so = ""
-    if name in ("", "control"):
-        name = "control"
-        so = ", so that its law was not called"
-    return (
-        f"other code replaced MuJoCo's {name} callback during the run{so}: call "
-        f"mujoco.set_mjcb_{name} before or after the run, or restore what mujoco.get_mjcb_{name}() "
-        "returned"
-    )
 
 
 def check_arithmetic() -> None:
@@ -116,8 +108,8 @@ def run(
       ScenarioError: not a Scenario, or threads below 1.
 
     MuJoCo's eight callbacks are global to the process. During a run no other callback is called,
-    and a run fails if other code has set one at its end, or has taken its control callback away
-    meanwhile.
+    and a run fails if other code sets one, or takes its control callback away. Ctrl-C is heard
+    within seconds; a compiled law of yours that never returns then computes on until Python ends.
     """
     if isinstance(scenarios, str):
         raise ScenarioError(
@@ -284,8 +276,9 @@ class ScenarioBatch:
         self.put_initial_states()
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
-        self.replaced = ""  # the name of a callback of MuJoCo's that other code set during the runs
         self.calls = 0  # callbacks that each simulation should have had by now
+        # whether a law may never return: a user's, compiled
+        self.endless = not (python or prepared[0].why_not or all(map(_of_package, scenarios)))
         self.set_parameters(0, range(count))
 
     def may_have_constraints(self) -> bool:
@@ -421,11 +414,13 @@ class ScenarioBatch:
         called = []
         for packed in self.packed:
             called += packed.python
-        other = mjcb.replaced()
         check_arithmetic()
         try:
-            with python_functions.hearing_ctrl_c(called):
-                action(alive)
+            if self.endless:
+                self.apply_in_thread(action, alive)
+            else:
+                with python_functions.hearing_ctrl_c(called):
+                    action(alive)
         except SimulationError as error:
             for i in error.ids:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
@@ -434,16 +429,40 @@ class ScenarioBatch:
         except (ValueError, mujoco.UnexpectedError) as error:
             if "allocate memory" in str(error):
                 raise
-            # another Python callback replaced ours; the comparison shows it below
+            # another Python callback replaced ours: the number of calls shows it
         check_arithmetic()
-        other = other or mjcb.replaced()
-        self.replaced = self.replaced or other
         interrupted = []
         for i in alive:
-            if i not in self.errors and (other or records["calls"][i] != self.calls):
+            if i not in self.errors and records["calls"][i] != self.calls:
                 interrupted.append(i)
         records["failure"][interrupted] = state.INTERRUPTED
         records["failed_step"][interrupted] = before // self.scenarios[0].stages
+
+    def apply_in_thread(self, action: Callable[[np.ndarray], None], alive: np.ndarray) -> None:
+        """Apply an action in a thread, so that Ctrl-C is heard while a law computes for ever.
+
+        That thread cannot be stopped: it computes until the process ends, in the memory of this
+        batch, which is never freed.
+        """
+        raised = []
+        done = threading.Event()
+
+        def apply() -> None:
+            try:
+                action(alive)
+            except Exception as error:
+                raised.append(error)
+            done.set()
+
+        threading.Thread(target=apply, daemon=True).start()
+        try:
+            done.wait()
+        except BaseException:
+            if not done.wait(PATIENCE):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))
+            raise
+        for error in raised:
+            raise error
 
     def trace(self, i: int) -> Trace:
         """Return the Trace of simulation i."""
@@ -468,7 +487,7 @@ class ScenarioBatch:
         """Return the failure of simulation i in words."""
         known = {
             state.DIVERGED: self.errors.get(i, PLANT_DIVERGED),
-            state.INTERRUPTED: interrupted(self.replaced),
+            state.INTERRUPTED: INTERRUPTED,
             state.DISTURBANCE_NOT_FINITE: DISTURBANCE_NOT_FINITE,
         }
         if code in known:
@@ -524,6 +543,11 @@ class ScenarioBatch:
             return ""
         u, sliding = commands[:, channel % width].tolist()
         return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {channel}"
+
+
+def _of_package(scenario: Scenario) -> bool:
+    """Return whether the law's functions are of this package."""
+    return all(fingerprint.ours(part.function) for part in scenario.law.parts)
 
 
 def told(error: BaseException, channel: int) -> str:

@@ -134,6 +134,8 @@ DISTURBANCE = np.dtype(
 
 SIMULATION = np.dtype(
     [
+        # address of the addresses of MuJoCo's other callbacks, which nobody may set meanwhile
+        ("slots", "i8"),
         # what has happened so far: calls of the callback, a failure and its physics step
         ("calls", "i8"),
         ("failure", "i8"),

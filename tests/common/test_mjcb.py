@@ -2,6 +2,7 @@
 waits forever.
 """
 
+import ctypes
 import dataclasses
 import itertools
 import os
@@ -17,7 +18,8 @@ from helpers.commands import python
 from numba import types
 
 import smc_mujoco as smc
-from smc_mujoco.common import mjcb
+from smc_mujoco.common import libmujoco, mjcb
+from smc_mujoco.common.jit import integers
 from smc_mujoco.envs.gymnasium_env import PlantEnv
 from smc_mujoco.envs.tasks import tasks, toppling
 from smc_mujoco.envs.vector_env import BatchEnv
@@ -310,7 +312,7 @@ def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monke
             mujoco.set_mjcb_control(control)
 
     for i, trace in smc.stream(two, report=report):
-        assert "replaced MuJoCo's control callback" in (trace.failure or "")
+        assert "took its control callback away" in (trace.failure or "")
         assert trace.diverged_at == pytest.approx(at * 1e-3)
         np.testing.assert_array_equal(trace.u[:at], whole[i].u[:at])
         for array in (trace.x, trace.u, trace.d, trace.reaction):
@@ -347,10 +349,42 @@ def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkey
     else:
         ((_, trace),) = smc.stream([scenario], report=set_it)
     assert getattr(mujoco, f"get_mjcb_{name}")() is None
-    assert (trace.failure or "").startswith(
-        f"other code replaced MuJoCo's {name} callback during the run: call mujoco."
-    )
+    assert (trace.failure or "").startswith("other code set a callback of MuJoCo's during the run")
     assert smc.run(scenario).failure is None
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+@pytest.mark.parametrize("name", ["passive", "act_gain", "contactfilter"])
+def test_a_callback_that_is_set_and_cleared_within_a_slice_fails_the_run(name, integrator):
+    """As a thread that does not wait for the run may do: at both ends of the slice there is none."""
+    slots = {}
+    for one in ("passive", name):
+        slots[one] = ctypes.c_void_p.in_dll(libmujoco.library(), f"mjcb_{one}")
+    addresses = {one: ctypes.addressof(slot) for one, slot in slots.items()}
+    calls = np.zeros(1, np.int64)
+    at, passive, other = calls.ctypes.data, addresses["passive"], addresses[name]
+
+    @numba.cfunc(types.void(types.intp, types.intp))
+    def gone_after_ten_calls(model, data):
+        integers(at)[0] += 1
+        if integers(at)[0] == 10:
+            integers(passive)[0] = integers(other)[0] = 0
+
+    asked = itertools.count()
+
+    def act(observation):
+        if next(asked) == 3:
+            slots[name].value = lets_touch.address
+            slots["passive"].value = gone_after_ten_calls.address
+        return [0.0]
+
+    law = smc.policy(act)
+    run = smc.Scenario(plant="duffing", law=law, duration=0.05, integrator=integrator)
+    trace = smc.run(run)
+    assert calls[0] == 10
+    assert [slot.value for slot in slots.values()] == [None] * len(slots)
+    assert (trace.failure or "").startswith("other code set a callback of MuJoCo's during the run")
+    assert trace.diverged_at == pytest.approx(0.004)
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
@@ -371,6 +405,6 @@ def test_a_law_that_clears_the_callback_fails_its_run(integrator):
             integrator=integrator,
         )
     )
-    assert "replaced MuJoCo's control callback" in (trace.failure or "")
+    assert "took its control callback away" in (trace.failure or "")
     assert trace.diverged_at == 0.0  # of its slice
     assert np.isnan(trace.x).all()

@@ -6,6 +6,7 @@ import json
 import math
 import signal
 import sys
+import threading
 import time
 
 import mujoco
@@ -15,6 +16,7 @@ from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
+from smc_mujoco.common.jit import integers
 from smc_mujoco.simulation import callback
 from smc_mujoco.simulation import run as runs
 
@@ -377,6 +379,38 @@ def test_a_callback_that_was_installed_is_put_back():
     assert calls == []
     assert same(trace, smc.run(scenario()))
     assert same(plain, plainly(scenario(made(with_json, {"k": 2.0}))))
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
+@pytest.mark.parametrize("heard", [KeyboardInterrupt, RuntimeError])
+def test_ctrl_c_is_heard_while_a_compiled_law_computes_for_ever(heard, monkeypatch):
+    shared = np.zeros(2, np.int64)  # whether the law is to stop, and whether it has begun
+    at = shared.ctypes.data
+
+    def endless(y, gains, memory):
+        integers(at)[1] = 1
+        while integers(at)[0] == 0:
+            memory[0] += 1.0
+        return 0.0, 0.0
+
+    def interrupt(signum, frame):
+        if shared[1]:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            raise heard
+
+    monkeypatch.setattr(runs, "PATIENCE", 0.1)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
+    try:
+        with pytest.raises(heard):
+            smc.run(scenario(made(endless, memory=1)))
+        assert smc.run(scenario()).failure is None
+    finally:
+        shared[0] = 1
+        signal.signal(signal.SIGALRM, before)
+        for thread in threading.enumerate():
+            if thread.name.endswith("(apply)"):
+                thread.join()
 
 
 @pytest.mark.parametrize(
