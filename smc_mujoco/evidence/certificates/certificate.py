@@ -35,6 +35,7 @@ CONDITIONS = {
     "reaching": ("F", "k > |phi + (M c - D) v| + d0"),
     "integral": ("F/s", "k2 > d'"),
     "slope": ("F/s", "|delta'| <= L"),
+    "clamp": ("F", "|w| <= w_max"),
 }
 THEOREMS = {  # theorem -> what it proves where its conditions hold
     "saturated PD": "without d every start comes to rest at 0",

@@ -163,7 +163,8 @@ def equation(plant):
 
 def feedback(law, u_max):
     """Return sigma: its kind, largest value K (None: unbounded), slope a at 0 (None: it switches),
-    slope c of s; gains; `room`, the force to spare and the size of the terms that it sums.
+    slope c of s; gains; its `force` before the actuator; `room`, the force to spare and the size of
+    the terms that it sums.
     """
     g = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None})
     name = law["name"]
@@ -175,7 +176,8 @@ def feedback(law, u_max):
         k2 = (g.a2 + (g.a2 * g.a2 + 2 * g.b * k1 + g.b * g.b * g.q2 / g.r).sqrt()) / g.b
         K = u_max and arb(u_max)  # the actuator's bound is part of a linear law
         room = arb(0), 0
-        return Space(kind="sat", K=K, a=k2, c=k1 / k2, g=g, room=room, theorems=theorems)
+        c = k1 / k2
+        return Space(kind="sat", K=K, a=k2, c=c, g=g, force=k2, room=room, theorems=theorems)
     if name == "terminal":
         need(g.b > 0 and g.bound >= 0 and bool(0.5 < g.p < 1), "1/2 < p < 1 on v + b [x]^p")
         f = Space(kind="sgn", K=g.k, a=None, c=arb(1), theorems={"saturated PD", "reaching"})
@@ -191,6 +193,7 @@ def feedback(law, u_max):
         f = Space(kind="sgn", K=g.k, a=None, c=g.c, theorems=theorems | {"reaching"})
         force = g.k
     f.g = g
+    f.force = force
     f.room = arb(0), 0
     if u_max is not None:
         f.room = u_max - force, abs(force)
@@ -240,7 +243,7 @@ def saturated(doc, part, e, f):
     """Check:
 
     V = M v^2/2 + int_0^x (sigma(c y) - phi(y)) dy + springs has V' <= 0, so that 0 attracts every
-    state.
+    state. Its term of sigma is force / c times the integral of sigma / force over c y.
 
     V' = -D v^2 - v (sigma(v + c x) - sigma(c x)), sigma never falls, and LaSalle's theorem leaves
     the origin alone if (1 - m) sigma(c x) >= phi(x) for x > 0, m > 0. On s = v + b [x]^p the same
@@ -248,12 +251,14 @@ def saturated(doc, part, e, f):
     """
     V = {
         "v^2": e.M / 2,
-        "sigma": 1 / f.c,
+        "sigma": f.force / f.c,
         "cos x - 1": e.A,
         "x^2": -e.B / 2,
         "x^4": -e.C / 4,
         "springs": e.kc / 2,
     }
+    if "p" in vars(f.g):  # a terminal surface
+        V |= {"b": f.g.b, "p": f.g.p}
     need(part["V"].keys() == V.keys(), "the terms of V")
     for name, value in V.items():
         equal(part["V"][name], value, f"the coefficient of {name} in V")
@@ -481,14 +486,15 @@ def super_twisting(doc, part, e, f):
     top = arb(0)
     if doc["u_max"] is not None:
         top = (doc["u_max"] - w - g.k1 * z1).lower()
-    if "w_max" in vars(g):
-        top = top.min((g.w_max - w).lower())
     slack = (L - abs(rate) * v - fast - doc["slope"]).lower()
-    return {
+    derived = {
         "integral": (g.k2 - doc["slope"], abs(g.k2) + doc["slope"]),
         "slope": (slack, L),
         "actuator": (top, w + g.k1 * z1),
     }
+    if "w_max" in vars(g):
+        derived["clamp"] = (g.w_max - w).lower(), w
+    return derived
 
 
 def seal(doc):

@@ -185,7 +185,7 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
 
     if law.name == "super_twisting":
         return [_super_twisting(document, loop, law, judge)]
-    parts = [_saturated(document, loop, terms, judge)]
+    parts = [_saturated(document, loop, terms, law, judge)]
     if document["plant"]["n"] > 1:
         return parts
     if scenario.plant.unit == "rad":
@@ -222,17 +222,26 @@ def _judged(theorem: str, data: dict, judge: Judge) -> dict:
     return _part(theorem, judge(theorem, data) or {}, **data)
 
 
-def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:
+def _saturated(
+    document: dict, loop: Loop, terms: list[float], law: SimpleNamespace, judge: Judge
+) -> dict:
     """Return the theorem of a saturated PD law: V and its conditions."""
     A, B, C, _, _ = terms
+    force = loop.steep  # of a law without a bound of its own
+    if law.name == "observer_free":
+        force = law.lam
+    elif law.name != "lqr":
+        force = law.k + getattr(law, "bound", 0.0)
     V = {
         "v^2": loop.M / 2.0,
-        "sigma": 1.0 / loop.c,
+        "sigma": force / loop.c,
         "cos x - 1": A,
         "x^2": -B / 2.0,
         "x^4": -C / 4.0,
     }
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
+    if law.name == "terminal":
+        V |= {"b": law.b, "p": law.p}
     for told in _restoring(loop, terms):
         if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
             part = _part("saturated PD", margins | {"restoring": told["margin"]}, V=V)

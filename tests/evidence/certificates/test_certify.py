@@ -339,6 +339,42 @@ def test_the_checker_refuses_a_mutant_with_a_new_seal(name):
     assert refused(data)
 
 
+CHANGED = {  # case -> plant, law, gains; u_max is 6
+    "observer_free": ("duffing", "observer_free", {"lam": 5.0, "k1": 2.0}),
+    "observer_free, clipped": ("duffing", "observer_free", {"lam": 9.0, "k1": 2.0}),
+    "boundary_layer": ("duffing", "boundary_layer", {"k": 5.0, "c": 2.0, "phi": 0.3}),
+    "boundary_layer of a network": ("pendulum_network", "boundary_layer", {"k": 9.0}),
+    "lqr": ("duffing", "lqr", {"q1": 30.0, "a1": 0.5, "a2": -0.2}),
+    "classical": ("duffing", "classical", {"k": 5.0, "c": 2.0}),
+    "classical, clipped": ("duffing", "classical", {"k": 9.0, "c": 2.0}),
+    "classical of a network": ("pendulum_network", "classical", {"k": 9.0, "c": 2.0}),
+    "terminal": ("duffing", "terminal", {"k": 3.0, "b": 2.0, "p": 0.6, "bound": 1.0}),
+    "terminal of a network": ("pendulum_network", "terminal", {"k": 3.0, "bound": 1.0}),
+    "super_twisting": ("duffing", "super_twisting", {"k1": 3.0, "k2": 2.0, "c": 1.5}),
+    "super_twisting, clamped": (
+        "inverted_pendulum",
+        "super_twisting",
+        {"k1": 2.025, "k2": 8.678, "c": 9.658, "w_max": 50.0},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CHANGED)
+def test_a_gain_changed_in_a_certificate_is_refused_under_a_new_seal(case):
+    plant, law, gains = CHANGED[case]
+    made = smc.audits.certify(smc.Scenario(plant=plant, law=smc.law(law, **gains)))
+    whole: Any = made.data
+    for gain, value in whole["law"]["gains"].items():
+        for other in (1.001, 0.5, 1e9):
+            data = copy.deepcopy(whole)
+            data["law"]["gains"][gain] = other * (1.0 if value is None else value or 1e-6)
+            assert refused(data), (gain, other)
+    for unread in ("tau", "tt", "ki"):
+        data = copy.deepcopy(whole)
+        data["law"]["gains"][unread] = 1e9
+        assert refused(data), unread
+
+
 def numbers(value, path=()):
     """The places of all numbers in a certificate."""
     if isinstance(value, dict | list):
@@ -355,9 +391,7 @@ def scaled(data, factor):
     data["law"]["gains"]["k"] *= factor
     data["u_max"] *= factor
     (saturated,) = data["parts"] = [part(data, SATURATED)]
-    saturated["V"] = {
-        term: value * (1.0 if term == "sigma" else factor) for term, value in saturated["V"].items()
-    }
+    saturated["V"] = {term: value * factor for term, value in saturated["V"].items()}
     for condition in saturated["conditions"]:
         if condition["name"] == "restoring":
             condition["margin"] *= 1.0
