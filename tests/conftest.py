@@ -138,15 +138,12 @@ def refused() -> Callable[..., str]:
 
 @pytest.fixture
 def coarse_grid(monkeypatch):
-    """Seek limit cycles on a sixth of the grid's points, and gains at a quarter of the speeds.
+    """Seek limit cycles on a sixth of the grid's points.
 
     What is found there is refined as ever; a law with several cycles may lose one.
     """
     monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_FREQUENCIES", 23)
     monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_AMPLITUDES", 14)
-    monkeypatch.setattr(
-        "smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6))
-    )
 
 
 @pytest.fixture

@@ -151,7 +151,7 @@ def check_page(generator, template):
         for gain, (meaning, unit) in generator.meanings(template).items()
         if not (meaning and unit)
     } == set()
-    for clause in generator.notation.clauses(law_pages.entry(template).formula):
+    for clause in generator.notation.clauses(generator.entry(template).formula):
         latex = generator.notation.formula(clause, template.gains)
         assert latex.count("{") == latex.count("}")
         assert latex.count(r"\left") == latex.count(r"\right")

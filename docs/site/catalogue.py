@@ -16,17 +16,17 @@ from collections.abc import Iterator, Mapping
 
 import figures
 import notation
+from docstring import SOURCE, entry
 
 from smc_mujoco.cli.law_pages import DEGREES
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.text import capital
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.docstring import SOURCE, entry
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Measurement, law
 from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.control.properties import PROPERTIES, families, reads, searched
+from smc_mujoco.control.properties import PROPERTIES, reads, searched
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.draw import style
 from smc_mujoco.exchange.c.export import law_to_c
@@ -54,6 +54,14 @@ class Page:
     path: str
     title: str
     text: str
+
+
+def families() -> dict[str, list[str]]:
+    """Return family -> the names of its laws; those that name no family are "other"."""
+    members: dict[str, list[str]] = {}
+    for name, template in laws().items():
+        members.setdefault(template.family or "other", []).append(name)
+    return dict(sorted(members.items()))
 
 
 def pages() -> dict[str, dict[str, list[Page]]]:

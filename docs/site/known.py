@@ -13,7 +13,6 @@ import catalogue
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import joint_catalogue as joint_laws
-from smc_mujoco.control.properties import families
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.verdict import DERIVED, MARKS, OURS, PAPER, VERDICTS, WHOSE_WORDS
@@ -47,7 +46,6 @@ OTHERS = {  # title -> names of modules that are no public names
     envs.flight_env.FlightEnv
     studies.which.Advice
     analysis.tuning.result.Tuned
-    analysis.gains_for.Design
     evidence.rigs.identify.Identified
     evidence.accuracy.accuracy.AccuracyTable
     analysis.chattering.Chattering
@@ -126,7 +124,7 @@ def machines() -> Iterator[str]:
 def kinds() -> Iterator[str]:
     """Yield a table of the laws by family."""
     yield "| family | laws |\n|---|---|"
-    for family, names in (families() | {"many joints": list(joint_laws())}).items():
+    for family, names in (catalogue.families() | {"many joints": list(joint_laws())}).items():
         yield _row(style.in_words(family), ", ".join(f"`{name}`" for name in names))
 
 

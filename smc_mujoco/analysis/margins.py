@@ -29,7 +29,7 @@ import numpy as np
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.files import read_json, reading, with_ending, write_json
+from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
@@ -205,7 +205,10 @@ def _with_mass(base: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or
     by its own name.
     """
-    mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
+    if base.plant.mass in base.mismatch:
+        mass = base.plant.mass
+    else:
+        mass = "mass"
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
 
 
@@ -396,16 +399,7 @@ def margins_of(
 
 
 def save(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
-    """Write margins to a .json file that `load` reads.
-
-    NaN and infinity are words there, see `files.plain`.
-    """
+    """Write margins to a .json file. NaN and infinity are words there, see `files.plain`."""
     return write_json(
         with_ending(path, ".json"), [dataclasses.asdict(margin) for margin in margins]
     )
-
-
-def load(path: str | os.PathLike[str]) -> list[Margin]:
-    """Read the margins that `save` wrote."""
-    with reading(path, "file of margins", "give a .json file that margins.save wrote") as file:
-        return [Margin(**entry) for entry in read_json(file)]

@@ -1,6 +1,6 @@
 """Laws, surfaces and velocity estimators in the terminal: a line for each, or a page about one.
 
-Everything comes from the templates and their docstrings, see `smc_mujoco.control.docstring`.
+Everything comes from the templates and their docstrings.
 """
 
 import inspect
@@ -16,7 +16,6 @@ from smc_mujoco.cli.tables import catalogue, listed, plain
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
@@ -73,14 +72,17 @@ def print_pages(name: str, console: Console) -> None:
 def print_plant(plant: Plant, console: Console) -> None:
     """Print what the file of a plant says, its parameters, and other sets of them."""
     console.print(Text.assemble((plant.name, "bold cyan"), ("  plant", "dim")))
-    said = LINES.sub(" ", inspect.getdoc(inspect.getmodule(plant.build)) or "")
-    console.print(Padding(Text(said), (1, 0, 1, 2)))
+    _print_docstring(inspect.getdoc(inspect.getmodule(plant.build)) or "", console)
     rows = {"parameters": _values(plant.parameters)}
     for name, values in plant.sets.items():
         changed = {key: value for key, value in values.items() if value != plant.parameters[key]}
         rows[f"set {name}"] = _values(changed) or "the default"
     rows["use"] = f'smc.plant("{plant.name}")'
     _print_rows(rows, console)
+
+
+def _print_docstring(text: str, console: Console) -> None:
+    console.print(Padding(Text(LINES.sub(" ", text)), (1, 0, 1, 2)))
 
 
 def _values(values: Mapping[str, float]) -> str:
@@ -122,17 +124,12 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     """Print everything about a law, surface or estimator of a package, "" for this one; `text` is
     its name or file.
     """
-    parts = entry(template)
-    console.print(
-        Text.assemble(
-            (template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")
-        )
-    )
-    console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))
+    console.print(Text.assemble((template.name, "bold cyan"), (f"  {template.kind}", "dim")))
+    _print_docstring(template.doc, console)
     some = _values(dict(list(template.defaults.items())[:2]))
     call = f'"{text}", {some}' if some else f'"{text}"'
     rows = {
-        "gains": "\n".join([*_gains(template), parts.gains]).strip(),
+        "gains": "\n".join(_gains(template)),
         "conditions": "\n".join(
             [*template.conditions, *(f"{words} (advice)" for words in template.advice)]
         )
@@ -140,9 +137,6 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
         "degree": _degree(template),
         "family": template.family,
         "promises": _promises(template),
-        "discretisation": parts.discretisation,
-        "known": parts.known,
-        "source": parts.source,
         "package": package,
         "use": CALL_TEMPLATES[template.kind].format(call),
     }

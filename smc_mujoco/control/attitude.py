@@ -17,19 +17,33 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.control.joint_law import tanh
+from smc_mujoco.control.units import ACCELERATION, RATE, RATE2, TIME, Gain, Unit
 from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
 
+compiled = njit(error_model="numpy")  # a division by 0 gives inf or NaN, as in C
 # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
 BANDWIDTH = 20.0
 # least thrust over weight: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
 LEAST = 0.127
+# gains of the position: in laws that feed back its error, and in those that slide
+FEEDBACK = {
+    "kx": Gain(2.0, RATE2, positive=True),
+    "kv": Gain(2.0, RATE, positive=True),
+}
+SLIDING = {
+    "c": Gain(1.25, RATE, positive=True),
+    "Kx": Gain(5.0, ACCELERATION, positive=True),
+    "rhox": Gain(1.0, Unit(position=-1, time=1), positive=True),
+    "lam": Gain(8.0, RATE, positive=True, turns=True),
+}
+LAG = Gain(0.0625, TIME, nonnegative=True, held=True, turns=True)  # of the Crazyflie's rotors
 STEERING = 2  # slots of a law's memory, the first ones, which `steer` keeps
 MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
 # chosen: sine of the angle between thrust and heading; below it the heading says nothing
 MIN_SINE = 1e-6
 
 
-@njit(error_model="numpy")
+@compiled
 def of_thrust(F, r):
     """Return the attitude whose third axis is along the force F, (3,), and whose first is nearest
     to the heading.
@@ -50,7 +64,7 @@ def of_thrust(F, r):
     return _of_axes(_cross(y, z), y, z)
 
 
-@njit(error_model="numpy")
+@compiled
 def rate_of(wanted, F, dF, r, dr):
     """Return the rate of the attitude `wanted` by `of_thrust`, in its axes, as F and r change by dF
     and dr a second.
@@ -73,7 +87,7 @@ def rate_of(wanted, F, dF, r, dr):
     return -_dot(y, dz), _dot(x, dz), -yaw
 
 
-@njit(error_model="numpy")
+@compiled
 def _ahead(z, heading):
     """Return the axis that is the heading for `of_thrust`, in those of the quaternion `heading`."""
     y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
@@ -82,17 +96,17 @@ def _ahead(z, heading):
     return (0.0, 0.0, -1.0)
 
 
-@njit(error_model="numpy")
+@compiled
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(error_model="numpy")
+@compiled
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(error_model="numpy")
+@compiled
 def _of_axes(x, y, z):
     """Return the quaternion of a rotation matrix with these columns, by the largest of its four
     numbers.
@@ -122,7 +136,7 @@ def _of_axes(x, y, z):
     return c / root, e / root, f / root, 0.25 * root
 
 
-@njit(error_model="numpy")
+@compiled
 def slide(y, c, K, rho):
     """Return s = e' + c e of the position, v = -c e' - K tanh(rho s), its stiffness and its
     damping, (3,) each.
@@ -135,7 +149,7 @@ def slide(y, c, K, rho):
     return s, -c * y.de[:3] - K * reached, c * slope, c + slope
 
 
-@njit(error_model="numpy")
+@compiled
 def steer(y, v, stiffness, damping, memory):
     """Return the force for the acceleration v of the position's error, and how far the body is off
     its attitude.
@@ -167,7 +181,7 @@ def steer(y, v, stiffness, damping, memory):
     return F, error, (y.v[3] - moving[0], y.v[4] - moving[1], y.v[5] - moving[2]), moving
 
 
-@njit(error_model="numpy")
+@compiled
 def shorter(error, turning):
     """Return 2 sgn(q0) qv of an error quaternion, and its rate at a relative angular velocity;
     sgn(0) = 1.
@@ -187,7 +201,7 @@ def shorter(error, turning):
     return angle, change
 
 
-@njit(error_model="numpy")
+@compiled
 def wrench(y, F, v, moving):
     """Return a law's command, (6,): the share of F along the body's third axis, and the torque for
     the acceleration v.

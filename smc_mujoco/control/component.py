@@ -28,6 +28,7 @@ from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
 
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 GainValue = float | tuple[float, ...]  # one number for all channels, or one for each driven channel
+FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channels are a pose
 ANY_GAIN = Each(one=Number(infinite=True))
 FINITE_TIME = ("", "s", "e")  # values of the option: what a law brings to 0 in finite time
 AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a function of the gains
@@ -65,21 +66,6 @@ class Options(TypedDict, total=False):
     joint: bool
 
 
-OF_SURFACE = (
-    "gains",
-    "memory",
-    "positive",
-    "nonnegative",
-    "relative_degree",
-    "conditions",
-    "advice",
-    "label",
-)
-OPTIONS = {  # kind of a component -> options of its decorator
-    "law": tuple(Options.__optional_keys__),
-    "surface": OF_SURFACE,
-    "estimator": tuple(name for name in OF_SURFACE if name != "relative_degree"),
-}
 # option that is a mapping -> its possible keys
 OPTION_KEYS = {"accuracy": ("s", "e"), "admits": ("d", "d'")}
 
@@ -124,7 +110,9 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
-        gains = {name: ANY_GAIN(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
+        gains = {}
+        for name, gain in self.gains.items():
+            gains[name] = ANY_GAIN(f"{self.name}'s {name}", gain)
         object.__setattr__(self, "gains", frozen(gains))
         if self.template and (
             self.template.function is not self.function or self.template.name != self.name
@@ -196,7 +184,9 @@ class Component:
             return self
         if self.each:
             return self.each[min(i, len(self.each) - 1)]
-        gains = {name: gain_at(value, i) for name, value in self.gains.items()}
+        gains = {}
+        for name, value in self.gains.items():
+            gains[name] = gain_at(value, i)
         return dataclasses.replace(self, gains=gains, source=self.source.with_gains(gains))
 
     def of_channels(self, n: int) -> "list[Component]":
@@ -407,7 +397,10 @@ def by_channel(laws: "Sequence[Component]") -> Component:
         gains = {}
         for name in first.gains:
             values = tuple(law.gains[name] for law in laws)
-            gains[name] = values if len(set(values)) > 1 else values[0]
+            if len(set(values)) > 1:
+                gains[name] = values
+            else:
+                gains[name] = values[0]
         return dataclasses.replace(first, gains=gains, source=source.with_gains(gains))
     gains = {}
     for i, law in enumerate(laws):
@@ -458,7 +451,10 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
             raise ScenarioError(
                 f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'"
             )
-        gain = value if isinstance(value, Gain) else Gain(value)
+        if isinstance(value, Gain):
+            gain = value
+        else:
+            gain = Gain(value)
         default = ANY_GAIN(f"default of gain {key}", gain.default)
         checked[key] = dataclasses.replace(gain, default=default)
         if not (gain.unit is None or isinstance(gain.unit, Unit) or callable(gain.unit)):
@@ -475,8 +471,8 @@ def decorated(
     kind: str, function: Callable | None, options: Mapping
 ) -> "Callable[[Callable], Template] | Template":
     """Return the Template of a function, or its decorator if the function is None."""
-    if foreign := options.keys() - OPTIONS[kind]:
-        raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind])
+    for option in options:
+        find(f"option of {kind}_function", option, Options.__annotations__)
     decorate = template_decorator(kind, **options)
     if function is None:
         return decorate
@@ -529,6 +525,9 @@ def template_decorator(
     for name in nonnegative:
         gain = find("gain that is nonnegative", name, checked)
         checked[name] = dataclasses.replace(gain, nonnegative=True)
+    plants = tuple(plants)
+    if FREE_BODY in plants:  # whose gains are of no single axis
+        checked = {name: dataclasses.replace(gain, shared=True) for name, gain in checked.items()}
 
     def decorate(function: Callable) -> Template:
         if not callable(function):
@@ -549,7 +548,7 @@ def template_decorator(
             relative_degree=relative_degree,
             conditions=dict(conditions or {}),
             advice=dict(advice or {}),
-            plants=tuple(plants),
+            plants=plants,
             **options,
         )
 

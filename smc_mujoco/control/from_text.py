@@ -10,7 +10,6 @@ wrote is restored by serialise.py, which runs no files.
 """
 
 import ast
-import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -29,6 +28,8 @@ from smc_mujoco.control.law import Law, known_laws
 NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
 # slow: pid(kp=50)
 LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)
+
+UNREADABLE = SyntaxError, ValueError, RecursionError, MemoryError
 
 
 def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
@@ -89,21 +90,27 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue
     """Return the part of a text before its brackets, and the gains in the brackets."""
     try:
         matched = NAME_AND_GAINS.fullmatch(text.strip())
-        call = matched and ast.parse(f"f({matched['gains'] or ''})", mode="eval").body
-        if not matched or not isinstance(call, ast.Call) or call.args:
+        if not matched:
             raise ValueError
-        gains: dict[str, GainValue] = {}
-        for word in call.keywords:
-            if word.arg is None:
-                raise ValueError
-            if isinstance(word.value, ast.Tuple | ast.List):
-                numbers = tuple(float(ast.unparse(number)) for number in word.value.elts)
-            else:
-                numbers = float(ast.unparse(word.value))
-            gains[word.arg] = numbers
-        return matched["head"], gains
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return matched["head"], _gains(matched["gains"] or "")
+    except UNREADABLE:
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
+
+
+def _gains(text: str) -> dict[str, GainValue]:
+    """Return the gains in a text such as "kp=50, ki=(1, 2)"; one of UNREADABLE for another text."""
+    call = ast.parse(f"f({text})", mode="eval").body
+    if not isinstance(call, ast.Call) or call.args:
+        raise ValueError
+    gains: dict[str, GainValue] = {}
+    for word in call.keywords:
+        if word.arg is None or word.arg in gains:
+            raise ValueError
+        if isinstance(word.value, ast.Tuple | ast.List):
+            gains[word.arg] = tuple(float(ast.unparse(number)) for number in word.value.elts)
+        else:
+            gains[word.arg] = float(ast.unparse(word.value))
+    return gains
 
 
 def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
@@ -185,20 +192,15 @@ def _reader(text: str) -> Callable[[str], list[Any]] | None:
     return READERS.get(suffix)
 
 
-def parsed_gains(text: str, what: str) -> dict[str, Any]:
+def parsed_gains(text: str, what: str) -> dict[str, GainValue]:
     """Return the gains in a text such as "lam=6,k1=3 5", where k1 is 3 and 5 for two joints. Errors
     call it `what`.
     """
-    parsed: dict[str, GainValue] = {}
-    for part in filter(None, (p.strip() for p in text.split(","))):
-        name, _, value = (word.strip() for word in part.partition("="))
-        try:
-            values = tuple(map(float, value.split()))
-        except ValueError:
-            values = ()
-        if not values or not name.isidentifier() or name in parsed or any(map(math.isnan, values)):
-            raise ScenarioError(
-                f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3"
-            )
-        parsed[name] = values[0] if len(values) == 1 else values
-    return parsed
+    numbers = re.compile(r"=\s*([^\s,]+(?:\s+[^\s,]+)+)")
+    listed = numbers.sub(lambda found: f"=({','.join(found[1].split())})", text.strip(" ,"))
+    try:
+        return _gains(listed)
+    except UNREADABLE:
+        raise ScenarioError(
+            f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3"
+        ) from None

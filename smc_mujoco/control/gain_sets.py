@@ -153,16 +153,7 @@ class TunedGains:
     objectives: tuple[float, ...]
     evaluations: int  # number of sets of gains that the searches evaluated
     seed: int
-    # gain -> "lower" or "upper", for those of the best gains at a bound of the search
-    at_bound: Mapping[str, str]
-    # gain -> its range in sets within 3 % of their search's best
-    near: Mapping[str, tuple[float, float]]
-    # tracking in s^2 and variation in 1/s, Pareto front of the first search
-    front: tuple[tuple[float, float], ...]
-    # tracking and variation of the first search's best gains, which are on the front
-    first: tuple[float, float]
     rule: str  # the search, in words
-    versions: Mapping[str, str]  # of the packages that the numbers depend on
 
     @property
     def objective(self) -> float:
@@ -191,13 +182,10 @@ def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
     name = ALIASES.get(name, name)
     if (stored := _stored(plant.name, name, gains)) is not None:
         return stored
-    example = next(iter(find_law(name).gains), "k")
-    tune = ""
-    if not plant.unscaled:
-        tune = f", or tune them (smc-mujoco tune {plant.argument} {name} --out FILE.json)"
+    find_law(name)  # raises if there is none
     raise ScenarioError(
         f"no gains in set {gains!r} for {name} on {plant.name}: give the law's gains yourself, "
-        f"as {name}({example}=...){tune}, or take the defaults (--gains default)"
+        "tune them (smc-mujoco tune), or take the defaults (--gains default)"
     )
 
 
@@ -230,7 +218,8 @@ def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
         code.append(known_plant.build)
     for folder in (Path(inspect.getfile(function)).parent for function in code):
         if (path := folder / "tuned_gains" / gains / f"{plant}-{name}.json").is_file():
-            return _from_record(read_json(path)["record"])
+            record = read_json(path)["record"]
+            return _from_record(record, record["rule"])
     return None
 
 
@@ -239,21 +228,18 @@ def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     """Return the gains of a set in this package, by plant and law."""
     data = read_json(file_of(gains))
     return {
-        (plant, name): _from_record({"rule": data["rule"]} | record)
+        (plant, name): _from_record(record, record.get("rule", data["rule"]))
         for plant, laws in data["plants"].items()
         for name, record in laws.items()
     }
 
 
-def _from_record(record: Mapping[str, Any]) -> TunedGains:
+def _from_record(record: Mapping[str, Any], rule: str) -> TunedGains:
     """Return the gains that `Tuned.record` described."""
-    fields = dict(record)
-    names = fields.pop("gains")
-    fields["sets"] = tuple(dict(zip(names, values, strict=True)) for values in fields["sets"])
-    fields |= {
-        "front": tuple(map(tuple, fields["front"])),
-        "first": tuple(fields["first"]),
-        "objectives": tuple(fields["objectives"]),
-        "near": {name: tuple(ends) for name, ends in fields["near"].items()},
-    }
-    return TunedGains(**fields)
+    return TunedGains(
+        sets=tuple(dict(zip(record["gains"], values, strict=True)) for values in record["sets"]),
+        objectives=tuple(record["objectives"]),
+        evaluations=record["evaluations"],
+        seed=record["seed"],
+        rule=rule,
+    )

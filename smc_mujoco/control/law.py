@@ -24,14 +24,13 @@ from numba import njit
 from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.control import estimator, surface
-from smc_mujoco.control.component import Component, Options, Template, decorated
+from smc_mujoco.control.component import FREE_BODY, Component, Options, Template, decorated
 from smc_mujoco.control.measurement import Measurement  # noqa: F401
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 Law = Component
-FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channels are a pose
 
 
 @njit
@@ -61,6 +60,28 @@ def command(y, v):
 def input_gain(y):
     """Return g as the law knows it: nominal with the model, 1 without."""
     return y.g if y.model != 0.0 else 1.0
+
+
+@njit
+def assumed(y, b):
+    """Return the input gain and the known acceleration of an observer: g and f - r'' with the
+    model, b and 0 without.
+    """
+    if y.model == 0.0:
+        return b, 0.0
+    return y.g, y.f - y.ddr
+
+
+@njit
+def clipped(y, u):
+    """Return u within its bounds."""
+    return min(max(u, -y.limit), y.limit)
+
+
+@njit
+def excess(y, u):
+    """Return the acceleration that the bounds of u take away, g (sat(u) - u)."""
+    return input_gain(y) * (clipped(y, u) - u)
 
 
 @njit

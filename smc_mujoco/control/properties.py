@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import Measurement, catalogue, known_laws, laws
+from smc_mujoco.control.law import Measurement, known_laws, laws
 from smc_mujoco.mechanisms.plant import Plant
 
 # fields of the measurement that a velocity sensor or an estimator gives
@@ -53,28 +53,16 @@ def searched(law: Template) -> list[str]:
 
 PROPERTIES: Mapping[str, Property] = {
     "no-velocity": Property("need no velocity", lambda law: not reads(law) & VELOCITY),
-    "no-acceleration": Property("need no acceleration", lambda law: "a" not in reads(law)),
     "no-model": Property("need no model of the plant", lambda law: not law.requires_model),
     "continuous": Property("have a continuous u", lambda law: law.continuous),
     "finite-time": Property(
         "bring the error to 0 in finite time", lambda law: law.finite_time == "e"
-    ),
-    "finite-reaching": Property(
-        "bring s or the error to 0 in finite time", lambda law: law.finite_time != ""
     ),
     "one-gain": Property("have one gain to choose", lambda law: len(searched(law)) == 1),
     "two-gains": Property(
         "have at most two gains to choose", lambda law: len(searched(law)) in (1, 2)
     ),
 }
-
-
-def families() -> dict[str, list[str]]:
-    """Return family -> the names of its laws; those that name no family are "other"."""
-    members: dict[str, list[str]] = {}
-    for name, law in catalogue().items():
-        members.setdefault(law.family or "other", []).append(name)
-    return dict(sorted(members.items()))
 
 
 def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> list[Template]:

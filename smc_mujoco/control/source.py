@@ -131,21 +131,6 @@ def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
     return by_words(words)
 
 
-def untuned_laws(words: Mapping[str, str]) -> list[str]:
-    """Return a list of one sentence if laws with default gains are compared with tuned ones.
-
-    Otherwise the list is empty. `words` maps a law to where its gains come from, see `kinds`.
-    """
-    default = [law for law, kind in words.items() if DEFAULT in kind.split(", ")]
-    tuned = [law for law, kind in words.items() if kind in (TUNED, SHIPPED)]
-    if not default or not tuned:
-        return []
-    return [
-        f"default gains: {joined(default)}; tuned: {joined(tuned)}. "
-        "Tune all of them (smc-mujoco tune)"
-    ]
-
-
 def by_words(words: Mapping[str, str]) -> str:
     """Return "gains: shipped", or "gains: a and b default, c yours", from law -> its gains' source.
 

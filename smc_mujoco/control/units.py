@@ -87,6 +87,28 @@ class Gain:
         return self.unit
 
 
+SLOPE = Gain(2.5, RATE, nonnegative=True)  # c of the surface s = de + c e
+ASSUMED_B = Gain(3.0, INPUT_GAIN, positive=True)  # of e'' = b u + d, for an observer
+# the plant e'' = a1 e + a2 de + b u; a scenario puts in its plant's
+LINEAR_PLANT = {
+    "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
+    "a2": Gain(math.inf, RATE, held=True, plant="a2"),
+    "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
+}
+# weights of e and de
+WEIGHTS = {
+    "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
+    "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
+}
+OBSERVER_FREE = {"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)}
+SUPER_TWISTING = {
+    "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
+    "k2": Gain(4.4, FORCE_RATE, positive=True),
+    "c": SLOPE,
+}
+REACHED = {"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2}  # by super-twisting
+
+
 def force_per(exponent: str) -> Formula:
     """Return the unit of k in the force k [s]^exponent; the exponent is a gain of that name."""
     return lambda g: Unit(force=1, position=-getattr(g, exponent), time=getattr(g, exponent))

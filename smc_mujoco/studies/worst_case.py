@@ -24,7 +24,6 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.control.source import untuned_laws
 from smc_mujoco.draw.style import law_colour, law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
@@ -179,12 +178,7 @@ class WorstCases(Tables, list[WorstCase]):
             tau = []
         laws = {case.nominal.law.name: case for case in self}
         beyond = [f"{law}: {case.outside}" for law, case in laws.items() if case.outside]
-        return [
-            *key,
-            *tau,
-            *beyond,
-            *untuned_laws({law: case.nominal.law.source.kind for law, case in laws.items()}),
-        ]
+        return [*key, *tau, *beyond]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst runs of all laws, or of one law beside the given run; arguments as in

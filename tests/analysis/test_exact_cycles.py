@@ -120,20 +120,6 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
     assert (np.sum(held, axis=0) >= 18).all()
 
 
-@pytest.mark.slow  # test_gains_for.py compares such gains with runs
-@pytest.mark.usefixtures("coarse_grid")
-@pytest.mark.parametrize("name", ["classical, two lags", "classical, 10 ms, 1 ms"])
-def test_gains_for_an_amplitude_keep_the_machine_below_it(name):
-    loop, amplitude, _ = VECTORS[name]
-    base = scenario(loop)
-    wanted = 0.5 * amplitude
-    fields = {"actuator": base.actuator, "control_period": loop.period, "u_max": math.inf}
-    design = smc.design.gains_for(base.law, base.plant, amplitude=wanted, **fields)
-    gains = tuple(design.law.gains[gain] for gain in GAINS[loop.kind])
-    realised, _ = ExactLoop(loop.kind, gains, loop.period, loop.lags).cycle()
-    assert 0.3 * wanted < realised <= wanted
-
-
 def test_a_run_whose_cycle_depends_on_the_step_is_marked():
     """implicitfast moves positions ahead by half a step."""
     coarse = {"physics_step": 1e-3, "integrator": "implicitfast"}

@@ -286,8 +286,6 @@ def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
 
 def test_margins_survive_their_file(found, tmp_path):
     path = margins.save([*found, ROUGH], tmp_path / "margins.json")
-    *again, rough = margins.load(path)
-    assert again == found
-    assert math.isnan(rough.value)
-    assert rough.theory == math.inf
-    json.loads(path.read_text(), parse_constant=pytest.fail)
+    *again, rough = json.loads(path.read_text(), parse_constant=pytest.fail)
+    assert [margins.Margin(**entry) for entry in again] == found
+    assert (rough["value"], rough["theory"]) == ("NaN", "Infinity")

@@ -175,7 +175,10 @@ class _Equations:
         self.slots = _that_fit(prepared, threads)
         self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
         self.put = [_putter(one.prepared, names, one.record[0], one.packed) for one in self.runs]
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        if threads > 1:
+            self.pool = ThreadPoolExecutor(threads)
+        else:
+            self.pool = None
 
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
         made: list[Costs] = []
@@ -305,7 +308,10 @@ def objectives(
       threads: as in `run`.
       halved: whether the runs have half their physics step.
     """
-    numbers = range(len(laws)) if instances is None else instances
+    if instances is None:
+        numbers = range(len(laws))
+    else:
+        numbers = instances
     if len(numbers) != len(laws):
         raise ScenarioError(
             f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law"

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,6 @@ from smc_mujoco.simulation import serialise
 COMPARED_FIELDS = "rule", "plant", "definition", "budget", "seed", "versions"
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
-NEAR = 0.03  # of the best J: gains within it are as good
-
-Ranges = dict[str, tuple[float, float]]  # gain -> lowest, highest
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -42,17 +39,6 @@ class SearchResult:
     def chosen(self) -> Evaluation:
         """The best gains, as evaluated by the engine."""
         return min(self.history, key=lambda one: one.objective)
-
-    def near(self, names: Iterable[str]) -> Ranges:
-        """Return the ranges of the gains whose J is within 3 % of the best one."""
-        near = []
-        for one in self.history:
-            if one.objective <= self.chosen.objective * (1.0 + NEAR):
-                near.append(one.gains)
-        columns = zip(*near, strict=True)
-        return {
-            name: (min(values), max(values)) for name, values in zip(names, columns, strict=True)
-        }
 
     def save(self, path: Path) -> Path:
         """Write a .json file that `load_found` reads back."""
@@ -174,19 +160,6 @@ class Tuned(Tables):
         return search_space.at_bound(self.gains, self.searched) | full
 
     @property
-    def near(self) -> Ranges:
-        """Gain -> its lowest and highest value in sets whose J is within 3 % of the best one of
-        their search.
-        """
-        of_searches = []
-        for found in self.searches:
-            of_searches.append(found.near(self.bounds))
-        return {
-            n: (min(one[n][0] for one in of_searches), max(one[n][1] for one in of_searches))
-            for n in self.bounds
-        }
-
-    @property
     def evaluations(self) -> int:
         """Number of sets of gains that all searches evaluated, cheaply or accurately."""
         return sum(found.evaluations for found in self.searches)
@@ -219,17 +192,12 @@ class Tuned(Tables):
 
     def record(self) -> dict[str, Any]:
         """Return what `control.gain_sets` stores of it, without the history."""
-        first = self.searches[0].chosen
         return {
             "gains": list(self.bounds),
             "sets": [one.gains for one in self.sets],
-            "objectives": [_short(one.objective) for one in self.sets],
+            "objectives": [float(f"{one.objective:.6g}") for one in self.sets],
             "evaluations": self.evaluations,
             "seed": self.seed,
-            "at_bound": self.at_bound,
-            "near": {name: tuple(map(_short, ends)) for name, ends in self.near.items()},
-            "front": [(_short(one.tracking), _short(one.variation)) for one in self.front],
-            "first": (_short(first.tracking), _short(first.variation)),
             "rule": self.rule,
             "versions": self.versions,
         }
@@ -264,10 +232,6 @@ def load(path: str | os.PathLike[str], plant: Plant | None = None) -> Tuned:
             plant=scenario.plant,
             definition=restore(data["definition"]),
         )
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.6g}")
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:

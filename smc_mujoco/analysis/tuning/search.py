@@ -83,8 +83,7 @@ FIRST_DEVIATION = 0.3  # decades: first standard deviation of the evolution; cho
 FIRST_RADIUS, LAST_RADIUS = 0.1, 0.005  # decades, of the descent's trust region; chosen
 PATIENCE = 1e-3  # a descent ends when 2 n + 2 evaluations lower J by a smaller share
 GAIN_DIGITS = 4
-DRAWS = 1000  # of a candidate, until it holds the conditions of the law's theorem; chosen
-FIRST_DRAWS = 10_000  # before a search is refused; chosen
+DRAWS = 1000  # of gains that hold the conditions of the law's theorem, before it gives up; chosen
 BISECTIONS = 20  # to the border of the theorem; chosen
 
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
@@ -183,8 +182,9 @@ class Trials:
     names: tuple[str, ...]
     # gains -> the largest values of some of them
     limit: Callable[[dict[str, float]], dict[str, float]]
-    holds: Callable[[Gains], bool]  # whether gains hold the conditions
     report: Callable[[int], None]  # called with the number of new evaluations
+    # whether gains hold the conditions of the law's theorem
+    holds: Callable[[Gains], bool] = lambda gains: True
     screened: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
     decided: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
 
@@ -210,27 +210,27 @@ class Trials:
         """Return the accurate J of a candidate, given as log10 gains (gains,)."""
         return self._costs([self.gains(logs.tolist())], self.accurate, self.decided)[0]
 
+    def within(self, logs: np.ndarray) -> bool:
+        """Return whether log10 gains hold the conditions of the law's theorem."""
+        return self.holds(self.gains(logs.tolist()))
+
     def drawn(self, draw: Callable[[], np.ndarray], inside: np.ndarray) -> np.ndarray:
-        """Return log10 gains that hold the conditions: the first of DRAWS draws that does, else the
-        last one, drawn back towards those `inside`.
-        """
-        logs = draw()
+        """Return the first of DRAWS draws within the theorem, else `inside`."""
         for _ in range(DRAWS):
-            if self.holds(self.gains(logs.tolist())):
+            if self.within(logs := draw()):
                 return logs
-            logs = draw()
-        return self.drawn_back(logs, inside)
+        return inside
 
     def drawn_back(self, logs: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        """Return the log10 gains on the way from those `inside` to others, where the conditions
-        end.
+        """Return the log10 gains on the way from those `inside` to others, where the theorem
+        ends.
         """
-        if self.holds(self.gains(logs.tolist())):
+        if self.within(logs):
             return logs
         share = 0.0
         for k in range(1, BISECTIONS + 1):
             further = share + 0.5**k
-            if self.holds(self.gains((inside + further * (logs - inside)).tolist())):
+            if self.within(inside + further * (logs - inside)):
                 share = further
         return inside + share * (logs - inside)
 
@@ -267,7 +267,7 @@ def _screened(
         return inside, np.inf
     logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(size)
     for i, gains in enumerate(logs):
-        if not trials.holds(trials.gains(gains.tolist())):
+        if not trials.within(gains):
             logs[i] = trials.drawn(lambda: random.uniform(low, high), inside)
     costs = trials.screen(logs)
     return logs[np.argmin(costs)], costs.min()
@@ -418,7 +418,7 @@ class Task(NamedTuple):
         def limit(gains: dict[str, float]) -> dict[str, float]:
             return search_space.force_limits(self.law, gains, self.goal.u_max or np.inf)
 
-        trials = Trials(cheap, accurate, tuple(self.box), limit, self.holds, report)
+        trials = Trials(cheap, accurate, tuple(self.box), limit, report, self.holds)
         random = np.random.default_rng([self.seed, i])
         size = int(SCREENED_SHARE * self.size)
         logs, cost = _screened(trials, self.box, random, size, self.inside)
@@ -451,7 +451,7 @@ def _task(
     budget: int,
     seed: int,
     threads: int | None,
-    outside_theorem: bool,
+    outside_theorem: bool = False,
 ) -> Task:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
     first, *others = goal.scenarios(plant, law, seed)
@@ -484,7 +484,7 @@ def _task(
         outside_theorem=outside_theorem,
     )
     random = np.random.default_rng(0)
-    for _ in range(FIRST_DRAWS):
+    for _ in range(DRAWS):
         if task.holds(tuple(10.0**task.inside)):
             return task
         task = task._replace(inside=random.uniform(low, high))
@@ -501,7 +501,7 @@ def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
     Raise BrokenLawError if it cannot even be run there.
     """
     try:
-        _task(plant, coerce.law(law), goal, BUDGET, 0, None, False)
+        _task(plant, coerce.law(law), goal, BUDGET, 0, None)
     except BrokenLawError:
         raise
     except ScenarioError as error:
@@ -549,13 +549,16 @@ def _only_limits(case: Scenario) -> bool:
 
 
 def _result(task: Task, found: tuple[SearchResult, ...]) -> Tuned:
+    rule = RULE
+    if task.outside_theorem:
+        rule += ", outside the conditions of the law's theorem"
     tuned = Tuned(
         law=task.law,
         searches=found,
         before=np.nan,
         plant=task.plant,
         definition=task.goal,
-        rule=RULE + ", outside the conditions of the law's theorem" * task.outside_theorem,
+        rule=rule,
         budget=task.budget,
         seed=task.seed,
         scales=task.scales,

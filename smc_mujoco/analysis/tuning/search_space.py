@@ -83,17 +83,6 @@ def without_unit(law: Component) -> dict[str, float]:
     }
 
 
-def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
-    """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is not
-    searched.
-    """
-    gain_unit = unit(law, name)
-    gain = _gain(law, name)
-    if gain_unit is None or gain.held:
-        return 1.0
-    return gain_unit.of(_scales_of(gain, scales))
-
-
 def _scales_of(gain: Gain, scales: Mapping[str, float]) -> Mapping[str, float]:
     """Return F, X and T of the channels that a gain is of; of a plant without a pose there is one
     set.

@@ -233,11 +233,9 @@ class Members:
         # N or N m a sample; 0: d may jump
         self.slope = (within.slope or 0.0) * self.h
         _check_class(scenario, within)
-        sets = Constant(
-            name="set", bounds=(0.0, count), put=lambda _, at: scenarios[min(int(at), count - 1)]
-        )
         self.constants = list(_constants(scenario, within))
         if count > 1:
+            sets = Constant("set", (0.0, count), lambda _, at: scenarios[min(int(at), count - 1)])
             self.constants.insert(0, sets)
         self.ends = [[0.0, 1.0] for _ in self.constants]
         # samples that an error of measurement lasts
@@ -404,7 +402,7 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return mutated
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True)
 class Constant:
     """Something that is constant in a run and may differ from member to member."""
 
@@ -462,61 +460,37 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
     effort = EFFORT[scenario.plant.units[0]]
     plant = scenario.plant
     if within.delay != (0.0, 0.0):
-        yield Constant(
-            name="delay",
-            bounds=_multiples("delay", within.delay, scenario.resolved.physics_step),
-            put=_with_delay,
-            unit="s",
-        )
+        bounds = _multiples("delay", within.delay, scenario.resolved.physics_step)
+        yield Constant("delay", bounds, _with_delay, "s")
     if within.jitter:
-        _, jitter = _multiples(
-            "jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES
-        )
-        yield Constant(
-            name="jitter",
-            bounds=(0.0, jitter / scenario.control_period),
-            put=with_jitter,
-            unit="periods",
-        )
+        step = scenario.control_period / JITTER_SHARES
+        _, jitter = _multiples("jitter", (0.0, within.jitter), step)
+        yield Constant("jitter", (0.0, jitter / scenario.control_period), with_jitter, "periods")
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
             unit = "added" if name in plant.added else ""
-            yield Constant(
-                name=name, bounds=bounds, put=functools.partial(_with_factor, name=name), unit=unit
-            )
+            yield Constant(name, bounds, functools.partial(_with_factor, name=name), unit)
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
             raise ScenarioError(
                 f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: "
                 "give it some, such as friction=smc.Coulomb(0.1)"
             )
-        yield Constant(
-            name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale
-        )
+        yield Constant("friction_scale", within.friction_scale, _with_friction_scale)
     if within.friction != (0.0, 0.0):
-        yield Constant(name="friction", bounds=within.friction, put=with_friction, unit=effort)
+        yield Constant("friction", within.friction, with_friction, effort)
     if within.encoder:
-        yield Constant(
-            name="encoder", bounds=within.encoder, put=_with_counts, unit="counts", geometric=True
-        )
+        yield Constant("encoder", within.encoder, _with_counts, "counts", geometric=True)
     if within.bound != (1.0, 1.0):
         if not math.isfinite(min(scenario.limits)):
             raise ScenarioError("Uncertainty's bound needs a finite one: give the scenario a u_max")
-        yield Constant(name="bound", bounds=within.bound, put=_with_bound)
+        yield Constant("bound", within.bound, _with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
-        yield Constant(
-            name=name,
-            bounds=(-within.x0, within.x0),
-            put=functools.partial(_with_start, i=i),
-            unit="%",
-        )
+        yield Constant(name, (-within.x0, within.x0), functools.partial(_with_start, i=i), "%")
     if within.period != (1.0, 1.0):
-        yield Constant(
-            name="period",
-            bounds=_multiples("period", within.period, 1.0 / scenario.steps),
-            put=_with_period,
-        )
+        bounds = _multiples("period", within.period, 1.0 / scenario.steps)
+        yield Constant("period", bounds, _with_period)
 
 
 def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:

@@ -29,9 +29,8 @@ def list_(
     needs: Annotated[
         str | None,
         typer.Option(
-            help="Only laws that have all these, as a,b: no-velocity, no-acceleration, "
-            "no-model, continuous (u), "
-            "finite-time (of the error), finite-reaching (of s), one-gain, two-gains (at most)."
+            help="Only laws that have all these, as a,b: no-velocity, no-model, continuous "
+            "(u), finite-time (of the error), one-gain, two-gains (at most)."
         ),
     ] = None,
     plant: Annotated[

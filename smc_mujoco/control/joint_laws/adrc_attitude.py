@@ -24,11 +24,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.control.attitude import STEERING, shorter, steer, wrench
+from smc_mujoco.control.attitude import FEEDBACK, LAG, STEERING, shorter, steer, wrench
 from smc_mujoco.control.joint_law import inner
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.laws.extended_state import corrections, observe
-from smc_mujoco.control.units import RATE, TIME, Gain, Unit
+from smc_mujoco.control.units import RATE, Gain
 
 LEAST = 0.2  # chosen: of |q0|
 
@@ -48,11 +48,10 @@ class Axis(NamedTuple):
     requires_model=True,
     plants=(FREE_BODY,),
     gains={
-        "kx": Gain(2.0, Unit(time=-2), positive=True, shared=True),
-        "kv": Gain(2.0, RATE, positive=True, shared=True),
-        "wc": Gain(4.0, RATE, positive=True, shared=True, turns=True),
-        "wo": Gain(40.0, RATE, positive=True, shared=True, turns=True),
-        "lag": Gain(0.0625, TIME, nonnegative=True, held=True, shared=True, turns=True),
+        **FEEDBACK,
+        "wc": Gain(4.0, RATE, positive=True, turns=True),
+        "wo": Gain(40.0, RATE, positive=True, turns=True),
+        "lag": LAG,
     },
     accuracy={"s": 0, "e": 0},
     label="ADRC attitude",

@@ -59,7 +59,7 @@ def _integrated(integral, error, dt, most):
 
 def _gains(turns, **values):
     return {
-        name: Gain(value, unit, nonnegative=True, shared=True, turns=turns)
+        name: Gain(value, unit, nonnegative=True, turns=turns)
         for name, (value, unit) in values.items()
     }
 
@@ -91,8 +91,8 @@ def _gains(turns, **values):
             Prz=(12.65, RATE),
             Irz=(1.760, RATE2),
         ),
-        "speed": Gain(1.0, SPEED, positive=True, held=True, shared=True),
-        "tilt": Gain(20.0 * DEGREES, Unit(), positive=True, held=True, shared=True, turns=True),
+        "speed": Gain(1.0, SPEED, positive=True, held=True),
+        "tilt": Gain(20.0 * DEGREES, Unit(), positive=True, held=True, turns=True),
     },
     accuracy={"s": 0, "e": 0},
     label="Firmware's PIDs",

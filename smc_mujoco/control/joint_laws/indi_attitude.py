@@ -28,7 +28,7 @@ import math
 import numpy as np
 from numba import njit
 
-from smc_mujoco.control.attitude import STEERING, shorter, steer, wrench
+from smc_mujoco.control.attitude import FEEDBACK, LAG, STEERING, shorter, steer, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.units import RATE, TIME, Gain, Unit
 
@@ -56,13 +56,12 @@ def _low_pass(x, i, cutoff, dt, states):
     requires_model=True,
     plants=(FREE_BODY,),
     gains={
-        "kx": Gain(2.0, Unit(time=-2), positive=True, shared=True),
-        "kv": Gain(2.0, RATE, positive=True, shared=True),
-        "kq": Gain(120.0, Unit(time=-2), positive=True, shared=True, turns=True),
-        "kw": Gain(24.0, RATE, positive=True, shared=True, turns=True),
-        "cutoff": Gain(8.0, RATE, positive=True, held=True, shared=True, turns=True),
-        "lag": Gain(0.0625, TIME, nonnegative=True, held=True, shared=True, turns=True),
-        "spin": Gain(0.0, TIME, nonnegative=True, held=True, shared=True, turns=True),
+        **FEEDBACK,
+        "kq": Gain(120.0, Unit(time=-2), positive=True, turns=True),
+        "kw": Gain(24.0, RATE, positive=True, turns=True),
+        "cutoff": Gain(8.0, RATE, positive=True, held=True, turns=True),
+        "lag": LAG,
+        "spin": Gain(0.0, TIME, nonnegative=True, held=True, turns=True),
     },
     accuracy={"s": 0, "e": 0},
     label="INDI attitude",

@@ -17,7 +17,7 @@ Syst. Meas. Control 103(2):119, 1981.
 
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.law import law_function
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import OBSERVER_FREE
 
 
 @law_function(
@@ -25,7 +25,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     family="observer-free",
     continuous=True,
     accuracy={"s": 0, "e": 0},
-    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
+    gains=OBSERVER_FREE,
     label="Observer-free (every joint)",
     colour="#0072B2",
 )

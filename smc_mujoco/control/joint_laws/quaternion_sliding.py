@@ -19,10 +19,10 @@ freedom flight control of quadrotors", arXiv 2403.10934.
 
 import numpy as np
 
-from smc_mujoco.control.attitude import STEERING, shorter, slide, steer, wrench
+from smc_mujoco.control.attitude import SLIDING, STEERING, shorter, slide, steer, wrench
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
+from smc_mujoco.control.units import Gain, Unit
 
 
 @law_function(
@@ -31,12 +31,9 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
     requires_model=True,
     plants=(FREE_BODY,),
     gains={
-        "c": Gain(1.25, RATE, positive=True, shared=True),
-        "Kx": Gain(5.0, ACCELERATION, positive=True, shared=True),
-        "rhox": Gain(1.0, Unit(position=-1, time=1), positive=True, shared=True),
-        "lam": Gain(8.0, RATE, positive=True, shared=True, turns=True),
-        "K": Gain(400.0, Unit(time=-2), positive=True, shared=True, turns=True),
-        "rho": Gain(0.25, Unit(time=1), positive=True, shared=True, turns=True),
+        **SLIDING,
+        "K": Gain(400.0, Unit(time=-2), positive=True, turns=True),
+        "rho": Gain(0.25, Unit(time=1), positive=True, turns=True),
     },
     accuracy={"s": 0, "e": 0},
     label="Quaternion sliding",

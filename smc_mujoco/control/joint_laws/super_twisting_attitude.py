@@ -23,9 +23,9 @@ import math
 
 import numpy as np
 
-from smc_mujoco.control.attitude import STEERING, shorter, slide, steer, wrench
+from smc_mujoco.control.attitude import SLIDING, STEERING, shorter, slide, steer, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function, power
-from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
+from smc_mujoco.control.units import Gain, Unit
 
 
 @law_function(
@@ -34,15 +34,10 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
     requires_model=True,
     plants=(FREE_BODY,),
     gains={
-        "c": Gain(1.25, RATE, positive=True, shared=True),
-        "Kx": Gain(5.0, ACCELERATION, positive=True, shared=True),
-        "rhox": Gain(1.0, Unit(position=-1, time=1), positive=True, shared=True),
-        "lam": Gain(8.0, RATE, positive=True, shared=True, turns=True),
-        "k1": Gain(22.6, Unit(time=-1.5), positive=True, shared=True, turns=True),
-        "k2": Gain(50.0, Unit(time=-3), nonnegative=True, shared=True, turns=True),
-        "z_max": Gain(
-            math.inf, Unit(time=-2), nonnegative=True, held=True, shared=True, turns=True
-        ),
+        **SLIDING,
+        "k1": Gain(22.6, Unit(time=-1.5), positive=True, turns=True),
+        "k2": Gain(50.0, Unit(time=-3), nonnegative=True, turns=True),
+        "z_max": Gain(math.inf, Unit(time=-2), nonnegative=True, held=True, turns=True),
     },
     accuracy={"s": 0, "e": 0},
     label="Super-twisting attitude",

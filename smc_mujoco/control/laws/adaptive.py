@@ -11,7 +11,7 @@ Bregeault & Poznyak, "New methodologies for adaptive sliding mode control", Int.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, SLOPE, Gain
 
 
 @law_function(
@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
     accuracy={"s": 1, "e": 1},
     gains={
         "gamma": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "k0": Gain(0.0, FORCE, nonnegative=True, held=True),
     },
     short="AD",

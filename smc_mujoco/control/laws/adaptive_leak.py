@@ -13,7 +13,7 @@ switching gain).
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SLOPE, SPEED, Gain
 
 
 @law_function(
@@ -21,7 +21,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
     accuracy={"s": 0, "e": 0},
     gains={
         "gamma": Gain(15.0, FORCE_PER_POSITION, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "leak": Gain(3.0, RATE, nonnegative=True),
         "deadzone": Gain(0.05, SPEED, nonnegative=True),
         "k0": Gain(0.0, FORCE, nonnegative=True, held=True),

@@ -15,7 +15,7 @@ conference version halves it).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn, sliding
-from smc_mujoco.control.units import FORCE_PER_ROOT, RATE, SPEED, Gain, Unit
+from smc_mujoco.control.units import FORCE_PER_ROOT, SLOPE, SPEED, Gain, Unit
 
 
 @law_function(
@@ -31,7 +31,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, RATE, SPEED, Gain, Unit
         "mu": Gain(0.02, SPEED, positive=True),
         "least": Gain(0.5, FORCE_PER_ROOT, positive=True),
         "k0": Gain(2.0, FORCE_PER_ROOT, nonnegative=True, held=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     memory=2,
 )

@@ -26,9 +26,9 @@ simulative study on active disturbance rejection control", Electronics 2:246, 20
 function and margins are worked out here.
 """
 
-from smc_mujoco.control.law import law_function
+from smc_mujoco.control.law import assumed, clipped, law_function
 from smc_mujoco.control.laws.extended_state import corrections, observe
-from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
+from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
 
 
 @law_function(
@@ -40,16 +40,16 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
     gains={
         "wc": Gain(5.0, RATE, positive=True),
         "w": Gain(40.0, RATE, positive=True),
-        "b": Gain(3.0, INPUT_GAIN, positive=True),
+        "b": ASSUMED_B,
     },
     memory=5,
     relative_degree=2,
 )
 def adrc(y, gains, memory):
-    b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
+    b, known = assumed(y, gains.b)
     l1, l2, l3 = corrections(gains.w, y.dt)
     d = observe(y, l1, l2, l3, memory)
     s = gains.wc * gains.wc * memory[1] + 2.0 * gains.wc * memory[2]
     u = -(s + d + known) / b
-    memory[4] = b * min(max(u, -y.limit), y.limit) + known
+    memory[4] = b * clipped(y, u) + known
     return u, s

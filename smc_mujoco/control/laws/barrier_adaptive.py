@@ -16,7 +16,7 @@ arXiv 2502.15201, 2025.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, SLOPE, SPEED, Gain
 
 
 @law_function(
@@ -27,7 +27,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
         "K0": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "eps": Gain(0.1, SPEED, positive=True),
         "k_max": Gain(6.0, FORCE, positive=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     memory=2,
 )

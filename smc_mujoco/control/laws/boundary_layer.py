@@ -12,7 +12,7 @@ import numpy as np
 
 from smc_mujoco.control.component import Rest
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, SPEED, Gain
+from smc_mujoco.control.units import FORCE, SLOPE, SPEED, Gain
 
 REST = Rest(
     linear=lambda g: (g.k / g.phi, g.c),
@@ -27,7 +27,7 @@ REST = Rest(
     admits={"d": lambda g: g.k},
     gains={
         "k": Gain(6.0, FORCE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "phi": Gain(0.5, SPEED, positive=True),
     },
     colour="#CC79A7",

@@ -7,7 +7,7 @@ Source: V. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chap
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import FORCE, SLOPE, Gain
 
 
 @law_function(
@@ -15,7 +15,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     finite_time="s",
     accuracy={"s": 1, "e": 1},
     admits={"d": lambda g: g.k},
-    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
+    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},
     short="CL",
     colour="#E69F00",
 )

@@ -13,8 +13,8 @@ Source: R. Seeber & M. Reichhartinger, "Conditioned super-twisting algorithm for
 saturated control action", Automatica 116:108921, 2020.
 """
 
-from smc_mujoco.control.law import command, input_gain, law_function, power, sgn, sliding
-from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
+from smc_mujoco.control.law import clipped, command, excess, law_function, power, sgn, sliding
+from smc_mujoco.control.units import REACHED, SUPER_TWISTING
 
 
 @law_function(
@@ -22,13 +22,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     continuous=True,
     finite_time="s",
     accuracy={"s": 2, "e": 2},
-    gains={
-        "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
-        "k2": Gain(4.4, FORCE_RATE, positive=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
-    },
+    gains=SUPER_TWISTING,
     memory=1,
-    conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
+    conditions=REACHED,
     label="Conditioned super-twisting",
     short="CS",
 )
@@ -36,6 +32,5 @@ def conditioned_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
     free = memory[0] - gains.k1 * power(s, 0.5)
     u = command(y, v_eq + free)
-    bounded = min(max(u, -y.limit), y.limit)
-    memory[0] -= y.dt * gains.k2 * sgn(memory[0] - free - input_gain(y) * (bounded - u))
-    return bounded, s
+    memory[0] -= y.dt * gains.k2 * sgn(memory[0] - free - excess(y, u))
+    return clipped(y, u), s

@@ -13,7 +13,7 @@ on 'Discrete-time variable structure control systems'", IEEE Trans. Ind. Electro
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, SLOPE, Gain
 
 
 @law_function(
@@ -23,7 +23,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
     gains={
         "eps": Gain(3.0, FORCE, positive=True),
         "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
 )
 def discrete_reaching(y, gains, memory):

@@ -13,8 +13,8 @@ Drakunov, "On discrete-time sliding modes", IFAC Nonlinear Control Systems Desig
 the condition on g: Jury's, derived here.
 """
 
-from smc_mujoco.control.law import command, input_gain, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.law import command, excess, law_function, sliding
+from smc_mujoco.control.units import FORCE, SLOPE, Gain
 
 
 @law_function(
@@ -22,7 +22,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     finite_time="s",
     accuracy={"s": 2, "e": 2},
     label="Discrete-time",
-    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
+    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},
     memory=3,
 )
 def discrete_time(y, gains, memory):
@@ -32,7 +32,7 @@ def discrete_time(y, gains, memory):
     u = command(y, v_eq + v)
     applied = v
     if abs(u) > y.limit:
-        applied = v + (min(max(u, -y.limit), y.limit) - u) * input_gain(y)
+        applied = v + excess(y, u)
     memory[0] = s
     memory[1] = applied
     memory[2] = 1.0

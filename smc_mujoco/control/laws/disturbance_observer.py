@@ -19,8 +19,8 @@ theorem 9.1 (k need only exceed the estimate's error).
 
 import math
 
-from smc_mujoco.control.law import law_function, sgn, sliding
-from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
+from smc_mujoco.control.law import assumed, clipped, law_function, sgn, sliding
+from smc_mujoco.control.units import ACCELERATION, ASSUMED_B, RATE, SLOPE, Gain
 
 
 @law_function(
@@ -29,14 +29,14 @@ from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
     accuracy={"s": 1, "e": 1},
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "l": Gain(20.0, RATE, positive=True),
-        "b": Gain(3.0, INPUT_GAIN, positive=True),
+        "b": ASSUMED_B,
     },
     memory=4,
 )
 def disturbance_observer(y, gains, memory):
-    b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
+    b, known = assumed(y, gains.b)
     if (
         memory[0] != 0.0
     ):  # memory: started, d^, last de, the acceleration b u + f - r'' of the last period
@@ -46,5 +46,5 @@ def disturbance_observer(y, gains, memory):
     u = (v_eq - gains.k * sgn(s) - memory[1] - known) / b
     memory[0] = 1.0
     memory[2] = y.de
-    memory[3] = b * min(max(u, -y.limit), y.limit) + known
+    memory[3] = b * clipped(y, u) + known
     return u, s

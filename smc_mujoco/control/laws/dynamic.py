@@ -12,7 +12,7 @@ design", IEE Proc. Control Theory Appl. 152(4):392, 2005.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
+from smc_mujoco.control.units import FORCE_RATE, RATE, SLOPE, Gain
 
 
 @law_function(
@@ -22,7 +22,7 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
     gains={
         "k": Gain(30.0, FORCE_RATE, nonnegative=True),
         "q": Gain(5.0, RATE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     memory=3,
     short="DY",

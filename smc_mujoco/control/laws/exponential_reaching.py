@@ -10,7 +10,7 @@ Trans. Ind. Electron. 40(1):45, 1993 (law); times: integrated here.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, SLOPE, Gain
 
 
 @law_function(
@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
     gains={
         "k": Gain(3.0, FORCE, nonnegative=True),
         "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     conditions={"k > 0": lambda g: g.k > 0.0},
 )

@@ -25,8 +25,8 @@ import math
 
 from numba import njit
 
-from smc_mujoco.control.law import law_function, sgn
-from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
+from smc_mujoco.control.law import assumed, clipped, law_function, sgn
+from smc_mujoco.control.units import ACCELERATION, ASSUMED_B, RATE, SLOPE, Gain
 
 
 @njit
@@ -68,18 +68,18 @@ def observe(y, l1, l2, l3, memory):
     label="Extended-state",
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "w": Gain(40.0, RATE, positive=True),
-        "b": Gain(3.0, INPUT_GAIN, positive=True),
+        "b": ASSUMED_B,
     },
     memory=5,
     relative_degree=2,
 )
 def extended_state(y, gains, memory):
-    b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
+    b, known = assumed(y, gains.b)
     l1, l2, l3 = corrections(gains.w, y.dt)
     d = observe(y, l1, l2, l3, memory)
     s = y.de + gains.c * y.e
     u = (-gains.k * sgn(s) - gains.c * y.de - d - known) / b
-    memory[4] = b * min(max(u, -y.limit), y.limit) + known
+    memory[4] = b * clipped(y, u) + known
     return u, s

@@ -11,7 +11,7 @@ systems", IEEE Trans. Autom. Control 57(8):2106, 2012 (Lemma 1: the bound).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain, force_per
+from smc_mujoco.control.units import FORCE, SLOPE, Gain, force_per
 
 
 def order(gains):
@@ -30,7 +30,7 @@ def order(gains):
         "a": Gain(0.5, positive=True, held=True),
         "b": Gain(1.5, positive=True, held=True),
         "k": Gain(2.0, FORCE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     conditions={
         "a < 1 < b": lambda g: g.a < 1.0 < g.b,

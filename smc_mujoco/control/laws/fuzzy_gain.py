@@ -22,7 +22,7 @@ table is ours.
 from numba import njit
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import ACCELERATION, FORCE, RATE, SPEED, Gain
+from smc_mujoco.control.units import ACCELERATION, FORCE, SLOPE, SPEED, Gain
 
 
 @njit
@@ -58,7 +58,7 @@ def inferred(size, rate):
         "k_max": Gain(6.0, FORCE, nonnegative=True),
         "width": Gain(0.5, SPEED, positive=True),
         "rate": Gain(10.0, ACCELERATION, positive=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     conditions={"k_min <= k_max": lambda g: g.k_min <= g.k_max},
     memory=2,

@@ -13,7 +13,7 @@ observer and disturbance rejection", IEEE Trans. Autom. Control 57(5):1087, 2012
 """
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import FORCE, SLOPE, Gain
 
 
 @law_function(
@@ -22,7 +22,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     accuracy={"s": 1, "e": 1},
     admits={"d": lambda g: g.k},
     label="Implicit first-order",
-    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
+    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},
 )
 def implicit_first_order(y, gains, memory):
     s, v_eq = sliding(y, gains.c)

@@ -14,7 +14,7 @@ conditions", Proc. 35th IEEE Conf. Decision and Control 4591, 1996.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import FORCE, RATE, SLOPE, Gain
 
 
 @law_function(
@@ -23,7 +23,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     accuracy={"s": 1, "e": 1},
     gains={
         "M": Gain(4.0, FORCE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "q": Gain(1.5, RATE, nonnegative=True),
     },
     memory=3,

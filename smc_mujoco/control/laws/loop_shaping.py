@@ -27,9 +27,9 @@ import math
 
 from numba import njit
 
-from smc_mujoco.control.law import command, input_gain, law_function, linear_plant
+from smc_mujoco.control.law import command, excess, law_function, linear_plant
 from smc_mujoco.control.laws.lqi import monic
-from smc_mujoco.control.units import FORCE_PER_POSITION, INPUT_GAIN, RATE, RATE2, Gain
+from smc_mujoco.control.units import FORCE_PER_POSITION, LINEAR_PLANT, RATE, Gain
 
 # of Newton's method and of the series of an exponential; chosen, more than doubles resolve
 ROUNDS, TERMS = (200, 40)
@@ -186,9 +186,7 @@ def observe(v, e, n0, n1, memory):
     gains={
         "k": Gain(20.0, FORCE_PER_POSITION, positive=True),
         "wi": Gain(0.5, RATE, positive=True),
-        "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
-        "a2": Gain(math.inf, RATE, held=True, plant="a2"),
-        "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
+        **LINEAR_PLANT,
     },
     memory=SLOTS,
     relative_degree=2,
@@ -200,8 +198,7 @@ def loop_shaping(y, gains, memory):
         memory[0] = start(y, a1, a2, b, k, wi, memory)
     v = memory[5] * memory[2] + memory[6] * memory[3] + memory[7] * memory[4]
     u = command(y, k * v + k * wi * memory[1])
-    lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
-    acted = v + lost / k
+    acted = v + excess(y, u) / k
     memory[4] = observe(acted, y.e, b * k * wi, b * k, memory)
     memory[1] += y.dt * acted
     return u, v / memory[7]

@@ -25,8 +25,8 @@ import math
 
 from numba import njit
 
-from smc_mujoco.control.law import command, input_gain, law_function, linear_plant
-from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
+from smc_mujoco.control.law import command, excess, law_function, linear_plant
+from smc_mujoco.control.units import LINEAR_PLANT, TIME, WEIGHTS, Gain, Unit
 
 # of a fixed point that gains about a digit in a round, and fewer where the plant is hardly damped
 MOST_ROUNDS = 1000
@@ -61,12 +61,9 @@ def feedback(a1, a2, b, q0, q1, q2):
     short="LI",
     gains={
         "q0": Gain(50.0, Unit(force=2, position=-2, time=-2), nonnegative=True),
-        "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
-        "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
+        **WEIGHTS,
         "tt": Gain(0.5, TIME, positive=True),
-        "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
-        "a2": Gain(math.inf, RATE, held=True, plant="a2"),
-        "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
+        **LINEAR_PLANT,
     },
     memory=5,
     relative_degree=2,
@@ -80,6 +77,5 @@ def lqi(y, gains, memory):
     s = memory[2] * y.e + memory[3] * y.de
     u = command(y, -s - memory[1])
     if memory[4] != 0.0:  # else nothing would take w back
-        lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
-        memory[1] += y.dt * (memory[4] * y.e - lost / gains.tt)
+        memory[1] += y.dt * (memory[4] * y.e - excess(y, u) / gains.tt)
     return u, s

@@ -17,7 +17,7 @@ Prentice Hall 1990, section 5.4.
 import math
 
 from smc_mujoco.control.law import command, law_function
-from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, Gain, Unit
+from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, WEIGHTS, Gain
 
 
 @law_function(
@@ -25,8 +25,7 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, Gain, Unit
     continuous=True,
     accuracy={"s": 0, "e": 0},
     gains={
-        "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
-        "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
+        **WEIGHTS,
         "r": Gain(1.0, positive=True, held=True),  # only the ratios of the weights matter
         "a1": Gain(0.0, RATE2, held=True),
         "a2": Gain(0.0, RATE, held=True),

@@ -36,7 +36,7 @@ from numba import njit
 
 from smc_mujoco.control.law import command, law_function, linear_plant
 from smc_mujoco.control.laws.extended_state import corrections, observe
-from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
+from smc_mujoco.control.units import LINEAR_PLANT, RATE, TIME, WEIGHTS, Gain
 
 # The memory: 0 to 4 the observer; 5, 1 once the matrices are there; 6, the held moves of the
 # Cholesky factor, as bits;
@@ -443,15 +443,12 @@ def planned(n, e, de, middle, reach, memory):
     label="MPC",
     short="MP",
     gains={
-        "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
-        "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
+        **WEIGHTS,
         "r": Gain(1.0, positive=True, held=True),  # only the ratios of the weights matter
         "w": Gain(20.0, RATE, positive=True),
         "N": Gain(20.0, positive=True, held=True),
         "H": Gain(0.03, TIME, positive=True, held=True),
-        "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
-        "a2": Gain(math.inf, RATE, held=True, plant="a2"),
-        "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
+        **LINEAR_PLANT,
     },
     memory=SLOTS,
     relative_degree=2,

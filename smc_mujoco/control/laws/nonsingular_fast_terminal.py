@@ -15,7 +15,8 @@ reaching law.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain, Unit
+from smc_mujoco.control.surfaces import nonsingular_fast_terminal as on
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain
 
 
 @law_function(
@@ -25,14 +26,11 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain, Unit
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "rate": Gain(3.0, FORCE_PER_POSITION, nonnegative=True),
-        "a": Gain(0.5, lambda g: Unit(position=1 - g.q), positive=True),
-        "q": Gain(2.0, positive=True, held=True),
-        "b": Gain(0.4, lambda g: Unit(position=1 - g.p, time=g.p), positive=True),
-        "p": Gain(1.6, positive=True, held=True),
+        **on.nonsingular_fast_terminal.gains,
     },
     memory=1,
     relative_degree=2,
-    conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0, "q > p": lambda g: g.q > g.p},
+    conditions=on.nonsingular_fast_terminal.conditions,
 )
 def nonsingular_fast_terminal(y, gains, memory):
     s = y.e + gains.a * power(y.e, gains.q) + gains.b * power(y.de, gains.p)

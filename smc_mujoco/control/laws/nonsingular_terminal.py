@@ -12,7 +12,8 @@ Automatica 38(12):2159, 2002.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.units import FORCE, Gain, Unit
+from smc_mujoco.control.surfaces import nonsingular_terminal as on
+from smc_mujoco.control.units import FORCE, Gain
 
 
 @law_function(
@@ -21,12 +22,11 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     accuracy={"s": lambda g: g.p, "e": lambda g: g.p},
     gains={
         "k": Gain(4.0, FORCE, positive=True),
-        "B": Gain(3.0, lambda g: Unit(position=g.p - 1, time=-g.p), positive=True),
-        "p": Gain(1.6, positive=True, held=True),
+        **on.nonsingular_terminal.gains,
     },
     memory=1,
     relative_degree=2,
-    conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0},
+    conditions=on.nonsingular_terminal.conditions,
 )
 def nonsingular_terminal(y, gains, memory):
     s = y.e + power(y.de, gains.p) / gains.B

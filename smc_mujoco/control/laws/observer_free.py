@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.control.component import Rest
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import OBSERVER_FREE
 
 REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g.k1 * x))
 
@@ -25,7 +25,7 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
     continuous=True,
     accuracy={"s": 0, "e": 0},
     admits={"d": lambda g: g.lam},
-    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
+    gains=OBSERVER_FREE,
     label="Observer-free",
     short="OF",
     colour="#0072B2",

@@ -21,7 +21,7 @@ analysis and improvement of robustness of adaptive control", Automatica 20(5):58
 import math
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, OBSERVER_FREE, RATE, SPEED, Gain
 
 
 @law_function(
@@ -30,8 +30,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
     accuracy={"s": 0, "e": 0},
     label="Observer-free, adaptive",
     gains={
-        "lam": Gain(6.0, FORCE, positive=True),
-        "k1": Gain(2.5, RATE),
+        **OBSERVER_FREE,
         "gamma": Gain(200.0, FORCE_PER_POSITION, nonnegative=True),
         "leak": Gain(1.0, RATE, nonnegative=True),
         "deadzone": Gain(0.1, SPEED, nonnegative=True),

@@ -21,7 +21,7 @@ Hagglund, PID Controllers, ISA 1995, section 3.5.
 import math
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
+from smc_mujoco.control.units import OBSERVER_FREE, RATE2, Gain
 
 
 @law_function(
@@ -30,8 +30,7 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
     accuracy={"s": 0, "e": 0},
     label="Observer-free, integral",
     gains={
-        "lam": Gain(6.0, FORCE, positive=True),
-        "k1": Gain(2.5, RATE),
+        **OBSERVER_FREE,
         "ki": Gain(2.0, RATE2, positive=True),
     },
     memory=1,

@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, POSITION, RATE, SPEED, Gain
+from smc_mujoco.control.units import FORCE, OBSERVER_FREE, POSITION, SPEED, Gain
 
 UNITS = 32768
 MAX_WORD = 32767
@@ -59,8 +59,7 @@ def saturated(n):
     accuracy={"s": 0, "e": 0},
     label="Observer-free, Q15",
     gains={
-        "lam": Gain(6.0, FORCE, positive=True),
-        "k1": Gain(2.5, RATE),
+        **OBSERVER_FREE,
         "e_range": Gain(4.0, POSITION, positive=True, held=True),
         "de_range": Gain(8.0, SPEED, positive=True, held=True),
         "u_range": Gain(8.0, FORCE, positive=True, held=True),

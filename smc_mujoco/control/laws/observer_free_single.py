@@ -15,7 +15,7 @@ fraction).
 import numpy as np
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import OBSERVER_FREE
 
 ONE = np.float32(1.0)
 TEN = np.float32(10.0)
@@ -29,7 +29,7 @@ QUARTER, MAX_S = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
     continuous=True,
     accuracy={"s": 0, "e": 0},
     label="Observer-free, single",
-    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
+    gains=OBSERVER_FREE,
 )
 def observer_free_single(y, gains, memory):
     s = np.float32(y.de) + np.float32(gains.k1) * np.float32(y.e)

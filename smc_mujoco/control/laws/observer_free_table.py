@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import OBSERVER_FREE, Gain
 
 # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
 MAX_STEPS, MAX_S = (256, 5.0)
@@ -32,8 +32,7 @@ TABLE.flags.writeable = False
     accuracy={"s": 0, "e": 0},
     label="Observer-free, table",
     gains={
-        "lam": Gain(6.0, FORCE, positive=True),
-        "k1": Gain(2.5, RATE),
+        **OBSERVER_FREE,
         "size": Gain(64.0, positive=True, held=True),
     },
     conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MAX_STEPS},

@@ -14,7 +14,7 @@ law); M. Abramowitz & I. Stegun, Handbook of Mathematical Functions, 1964, 4.5.6
 """
 
 from smc_mujoco.control.law import command, law_function, sliding
-from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.control.units import OBSERVER_FREE, Gain
 
 SERIES = (1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0, 62.0 / 2835.0)
 MAX_S = 8.0  # 1 - tanh(8) = 2.3e-7
@@ -26,8 +26,7 @@ MAX_S = 8.0  # 1 - tanh(8) = 2.3e-7
     accuracy={"s": 0, "e": 0},
     label="Observer-free, Taylor",
     gains={
-        "lam": Gain(6.0, FORCE, positive=True),
-        "k1": Gain(2.5, RATE),
+        **OBSERVER_FREE,
         "terms": Gain(3.0, positive=True, held=True),
     },
     conditions={"terms is 1, 2, 3, 4 or 5": lambda g: g.terms in (1.0, 2.0, 3.0, 4.0, 5.0)},

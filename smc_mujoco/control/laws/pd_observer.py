@@ -29,8 +29,8 @@ Automatica 45(1):296, 2009. The identities and margins are worked out here.
 
 import math
 
-from smc_mujoco.control.law import law_function
-from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
+from smc_mujoco.control.law import assumed, clipped, law_function
+from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
 
 
 @law_function(
@@ -42,14 +42,14 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
     gains={
         "wc": Gain(5.0, RATE, positive=True),
         "l": Gain(20.0, RATE, positive=True),
-        "b": Gain(3.0, INPUT_GAIN, positive=True),
+        "b": ASSUMED_B,
     },
     memory=4,
     relative_degree=2,
 )
 def pd_observer(y, gains, memory):
     # memory: started, the last rate, the known acceleration of the last period, and z
-    b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
+    b, known = assumed(y, gains.b)
     if memory[0] != 0.0:
         memory[3] += (1.0 - math.exp(-gains.l * y.dt)) * (
             (y.de - memory[1]) / y.dt - memory[2] - memory[3]
@@ -58,5 +58,5 @@ def pd_observer(y, gains, memory):
     u = -(s + memory[3] + known) / b
     memory[0] = 1.0
     memory[1] = y.de
-    memory[2] = b * min(max(u, -y.limit), y.limit) + known
+    memory[2] = b * clipped(y, u) + known
     return u, s

@@ -12,7 +12,7 @@ Source: K. J. Astrom & T. Hagglund, PID Controllers: Theory, Design, and Tuning,
 sections 3.4 (derivative) and 3.5 (integrator windup).
 """
 
-from smc_mujoco.control.law import command, input_gain, law_function
+from smc_mujoco.control.law import command, excess, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, TIME, Gain, Unit
 
 
@@ -40,8 +40,7 @@ def pid(y, gains, memory):
     s = gains.kp * y.e + gains.kd * D
     u = command(y, w - s)
     if gains.ki != 0.0:  # else nothing would take w back
-        lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
-        w += y.dt * (lost / gains.tt - gains.ki * y.e)
+        w += y.dt * (excess(y, u) / gains.tt - gains.ki * y.e)
     memory[0] = 1.0
     memory[1] = w
     memory[2] = D

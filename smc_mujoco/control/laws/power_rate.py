@@ -9,7 +9,7 @@ Trans. Ind. Electron. 40(1):45, 1993 (law); time and bounds: integrated here.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sliding
-from smc_mujoco.control.units import RATE, Gain, force_per
+from smc_mujoco.control.units import SLOPE, Gain, force_per
 
 
 @law_function(
@@ -21,7 +21,7 @@ from smc_mujoco.control.units import RATE, Gain, force_per
     gains={
         "k": Gain(6.0, force_per("a"), nonnegative=True),
         "a": Gain(0.5, positive=True, held=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     conditions={"a < 1": lambda g: g.a < 1.0},
 )

@@ -14,7 +14,7 @@ gain); with a switching term as in a reaching law.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
+from smc_mujoco.control.units import FORCE, INERTIA, SLOPE, TIME, Gain
 
 
 @law_function(
@@ -26,7 +26,7 @@ from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
         "T": Gain(2.0, TIME, positive=True),
         "m": Gain(2.0, INERTIA, nonnegative=True),  # m s / (T - t) is a force
         "k": Gain(3.0, FORCE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     conditions={"m >= 1, or u grows without bound towards T": lambda g: g.m >= 1.0},
 )

@@ -16,8 +16,8 @@ preprint arXiv:2406.16094v1).
 
 import math
 
-from smc_mujoco.control.law import command, input_gain, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
+from smc_mujoco.control.law import clipped, command, excess, law_function, sgn, sliding
+from smc_mujoco.control.units import REACHED, SUPER_TWISTING
 
 
 @law_function(
@@ -26,13 +26,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     finite_time="s",
     accuracy={"s": 2, "e": 2},
     label="Proper conditioned super-twisting",
-    gains={
-        "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
-        "k2": Gain(4.4, FORCE_RATE, positive=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
-    },
+    gains=SUPER_TWISTING,
     memory=1,
-    conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
+    conditions=REACHED,
 )
 def proper_conditioned_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
@@ -45,7 +41,6 @@ def proper_conditioned_super_twisting(y, gains, memory):
         root = math.sqrt(half * half + abs(s) - y.dt * step) - half
         free = w - (gains.k1 * root + 2.0 * step) * sgn(s)
     u = command(y, v_eq + free)
-    bounded = min(max(u, -y.limit), y.limit)
-    ahead = free + input_gain(y) * (bounded - u) - w
+    ahead = free + excess(y, u) - w
     memory[0] = w + (0.5 * ahead if abs(ahead) <= 2.0 * step else step * sgn(ahead))
-    return bounded, s
+    return clipped(y, u), s

@@ -17,7 +17,7 @@ without and with actuator saturation", Automatica 173:112027, 2025, eq. 11 to 13
 import math
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
+from smc_mujoco.control.units import REACHED, SUPER_TWISTING
 
 
 @law_function(
@@ -26,13 +26,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     finite_time="s",
     accuracy={"s": 2, "e": 2},
     label="Proper super-twisting",
-    gains={
-        "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
-        "k2": Gain(4.4, FORCE_RATE, positive=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
-    },
+    gains=SUPER_TWISTING,
     memory=1,
-    conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
+    conditions=REACHED,
 )
 def proper_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)

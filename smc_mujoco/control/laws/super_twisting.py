@@ -19,7 +19,7 @@ clamp is a common anti-windup, its residual derived here.
 import math
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
+from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, SLOPE, Gain
 
 
 @law_function(
@@ -31,7 +31,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, RATE, Ga
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, nonnegative=True),
         "k2": Gain(4.4, FORCE_RATE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
         "w_max": Gain(math.inf, FORCE, nonnegative=True, held=True),
     },
     label="Super-twisting",

@@ -12,7 +12,7 @@ Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control",
 import math
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
-from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
+from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, SLOPE, Gain
 
 
 @law_function(
@@ -23,7 +23,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, nonnegative=True),
         "k2": Gain(4.4, FORCE_RATE, nonnegative=True),
-        "c": Gain(2.5, RATE, nonnegative=True),
+        "c": SLOPE,
     },
     label="Super-twisting, unclamped",
 )

@@ -13,7 +13,8 @@ terminal sliding-mode control of nonlinear systems", Automatica 49(6):1715, 2013
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.units import FORCE, Gain, Unit
+from smc_mujoco.control.surfaces import terminal as on
+from smc_mujoco.control.units import FORCE, Gain
 
 
 @law_function(
@@ -23,13 +24,12 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     admits={"d": lambda g: g.k},
     gains={
         "k": Gain(4.0, FORCE, positive=True),
-        "b": Gain(2.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),
-        "p": Gain(0.6, positive=True, held=True),
+        **on.terminal.gains,
         "bound": Gain(20.0, FORCE, positive=True),
     },
     memory=1,
     relative_degree=2,
-    conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
+    conditions=on.terminal.conditions,
     short="TE",
 )
 def terminal(y, gains, memory):

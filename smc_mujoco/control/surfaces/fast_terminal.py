@@ -11,18 +11,19 @@ IEEE Trans. Circuits Syst. I 49(2):261, 2002.
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
-from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
+from smc_mujoco.control.surfaces import terminal as on
+from smc_mujoco.control.units import RATE, Gain, Unit
 
 
 @surface_function(
     gains={
         "a": Gain(1.0, RATE, positive=True),
         "b": Gain(1.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),
-        "p": Gain(0.6, positive=True, held=True),
-        "bound": Gain(20.0, ACCELERATION, positive=True),
+        "p": on.terminal.gains["p"],
+        "bound": on.terminal.gains["bound"],
     },
     memory=1,
-    conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
+    conditions=on.terminal.conditions,
 )
 def fast_terminal(y, gains, memory):
     s = y.de + gains.a * y.e + gains.b * power(y.e, gains.p)

@@ -35,7 +35,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
-from smc_mujoco.control.source import by_words, kinds, untuned_laws
+from smc_mujoco.control.source import by_words, kinds
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, Scaling, scaling
 from smc_mujoco.mechanisms.named import as_plant
@@ -151,7 +151,7 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
         ],
         rows=cells,
         title=", ".join(filter(None, [title, by_words(gains)])),
-        notes=[*(f"* {row.law}: {row.why}" for row in rows if row.why), *untuned_laws(gains)],
+        notes=[f"* {row.law}: {row.why}" for row in rows if row.why],
     )
 
 

@@ -203,6 +203,9 @@ def test_a_descent_ends_when_it_gains_too_little(slope, least, most):
             costs.append(1.0 + slope * float(logs @ logs))
             return costs[-1]
 
+        def drawn_back(self, logs, inside):
+            return logs
+
     search._descend(Bowl(), {"a": (0.1, 10.0), "b": (0.1, 10.0)}, np.array([0.9, -0.8]), 200)
     assert least <= len(costs) <= most
     assert min(costs) < 1.001
