@@ -29,7 +29,7 @@ create() {
         fail "needs Python 3.11 or newer, but $python is $found: name another, as in PYTHON=python3.12"
     "$python" -c 'import ensurepip, venv' 2>/dev/null ||
         fail "$python has no venv module: install it (Debian, Ubuntu: apt-get install python3-venv)"
-    echo "smc-mujoco: setting up .venv, once (a minute or two, 1.3 GB)"
+    echo "smc-mujoco: setting up .venv, once (two minutes of processor time, 1.1 GB)"
     said=$("$python" -m venv --clear .venv 2>&1) ||
         fail "$python could not make .venv: $(echo "$said" | tail -n 1)"
 }
@@ -56,7 +56,7 @@ if [ "$(wanted)" != "$(cat .venv/installed 2>/dev/null)" ]; then
     wanted >.venv/installed
 fi
 if [ -n "$extra" ] && ! cmp -s "$extra" ".venv/$extra"; then
-    [ "$extra" != requirements-test.lock ] || echo "smc-mujoco: adding $extra, once (0.6 GB)"
+    [ "$extra" != requirements-test.lock ] || echo "smc-mujoco: adding $extra, once (0.8 GB)"
     [ ! -e .venv/adding ] || again=yes # uv was stopped: it takes a package that it had half copied for complete
     touch .venv/adding
     install --only-binary :all: --require-hashes -r "$extra"

@@ -6,7 +6,7 @@ sentence.
     python tests/attack.py files --seed 7 --start 1234 --cases 1      # one case, as it prints it
 
 Parts: `scenarios` (wild fields, run to a trace that is sound), `batches` (several together, the
-same bits as alone), `files` (damaged ones).
+same bits as alone), `files` (damaged ones), `calls` (of functions with odd arguments), `commands`.
 Found is: an exception that is not ours, a sentence that is none, a trace with a number that was not
 computed, a crash, and a case that takes longer than LIMIT. Every case is made of its part, the seed
 and its number alone. Exit code 1 where something was found.
@@ -36,6 +36,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
+import odd_calls
 import wild
 
 import smc_mujoco as smc
@@ -50,7 +51,7 @@ MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
 # 10 minutes on two cores
-CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000}
+CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000, "calls": 5_000, "commands": 5_000}
 
 
 class Found(AssertionError):
@@ -348,6 +349,8 @@ PARTS: dict[str, Callable[[Random], str]] = {
     "scenarios": scenarios,
     "batches": batches,
     "files": files,
+    "calls": functools.partial(odd_calls.calls, sentence=sentence),
+    "commands": functools.partial(odd_calls.commands, sentence=sentence),
 }
 
 

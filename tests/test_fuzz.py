@@ -6,6 +6,7 @@ import re
 from random import Random
 
 import attack
+import numpy as np
 import pytest
 import wild
 
@@ -29,6 +30,30 @@ def test_wild_scenarios_are_refused_or_run_to_sound_traces(part, cases, tmp_path
 def test_wild_files_end_well_or_in_a_sentence(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert [why for _, why in (attack.case("files", 0, i) for i in range(5)) if why] == []
+
+
+@pytest.mark.parametrize(("part", "cases"), [("calls", 60), ("commands", 8)])
+def test_calls_with_odd_arguments_end_well_or_in_a_sentence(part, cases, tmp_path, monkeypatch):
+    """The first cases have what was a foreign error once: arrays as flags, lists and tables."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    assert [why for _, why in (attack.case(part, 0, i) for i in range(cases)) if why] == []
+
+
+def test_arrays_and_others_where_a_list_a_table_or_a_flag_belongs_are_refused():
+    many = np.ones(3)
+    for call in (
+        lambda: smc.results(many),  # type: ignore[arg-type]
+        lambda: smc.leaderboard(many),  # type: ignore[arg-type]
+        lambda: smc.plot(many),  # type: ignore[arg-type]
+        lambda: smc.which("duffing", needs=many),  # type: ignore[arg-type]
+        lambda: smc.margins("duffing", "pid", quick=many),  # type: ignore[arg-type]
+        lambda: smc.compare("pid", np.zeros(0)),  # type: ignore[arg-type]
+        lambda: smc.identify("emps", {}, start=many),  # type: ignore[arg-type]
+        lambda: smc.design.chattering("pid", many, plant="duffing"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(smc.ScenarioError, match=r": (give|choose)"):
+            call()
 
 
 # what the attack finds

@@ -25,7 +25,7 @@ import numpy as np
 
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, whole
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
@@ -148,8 +148,7 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     is faster.
     """
     jointed(scenario.plant, "chattering")
-    if channel not in range(scenario.plant.driven):
-        raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
+    channel = whole("channel", channel, 0, scenario.plant.driven - 1)
     loop = Loop(scenario, channel)
     stable, unstable = cycles(loop)
     assumptions = tuple(_assumptions(loop))

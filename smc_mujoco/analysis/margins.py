@@ -28,6 +28,7 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
+from smc_mujoco.common.constraints import Truth, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
@@ -292,12 +293,13 @@ class Margin:
         return self.value == self.searched
 
 
+@constrained
 def margins(
     plants: str | Plant | Sequence[str | Plant] = tuple(sets.STUDY),
     laws: str | Law | Template | Sequence[str | Law | Template] = sets.LAWS,
     kinds: str | Sequence[str] = KINDS,
     gains: str = "tuned",
-    quick: bool = False,
+    quick: Truth = False,
     threads: int | None = None,
     report: Report = lambda done, whole: None,
     condition: str | Condition = "nominal",

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from smc_mujoco.analysis.ranking import first_of_kind
-from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown
+from smc_mujoco.common.errors import ScenarioError, has, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
@@ -53,6 +53,12 @@ class ByRow(NamedTuple):
     # y', the same at half the physics step: inf for a run that then failed, NaN for none
     halves: np.ndarray
     trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
+
+
+def is_table(table: object) -> None:
+    """Raise ScenarioError for what has no columns."""
+    if not has(table, "column"):
+        raise ScenarioError(f"table is {shown(table)}: give a study's, as smc.Table.read(path)")
 
 
 def values(table: Columns, metric: str) -> np.ndarray:

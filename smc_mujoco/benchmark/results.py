@@ -331,10 +331,9 @@ def results(source: str | os.PathLike[str] = "smc-30@1", seed: int = 0) -> Resul
       ScenarioError: no results there, results on several suites or seeds, or a table that was
         changed since it was written.
     """
-    if source in suite.suites():
+    path = as_path(source)
+    if str(source) in suite.suites():
         path = Path("results") / suite.folder(str(source), seed)
-    else:
-        path = as_path(source)
     found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path)
     if refused:
         raise refused[0]

@@ -1,11 +1,11 @@
 """Running a scene: from its declaration to printed scores, traces, figures and a film."""
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from smc_mujoco.analysis.apart import apart
-from smc_mujoco.analysis.step_halving import NUDGE, first_order, halved, nudged
+from rich.text import Text
+
+from smc_mujoco.analysis.step_halving import halved, nudged
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
@@ -19,7 +19,6 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.scene import Scene
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
-NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def perform(
@@ -55,10 +54,7 @@ def perform(
     for table in tables.answers(scene.answers, traces, again) if scene.answers else ():
         terminal.print(table, "")
     written = save(traces, out, export)  # first, so that runs are kept if the scene's answer fails
-    answer = scene.sentence(traces)
-    terminal.note(answer, "bold", wrap=True)
-    for words in other_answers(scene, traces, again, answer) if again else ():
-        terminal.note(words, "yellow", wrap=True)
+    terminal.print(Text(scene.sentence(traces), "bold"))
     terminal.print()
     written += figures(scene, traces, out)
     try:
@@ -104,35 +100,6 @@ def repeat(scene: Scene, threads: int | None) -> dict[str, dict[str, list[Trace]
     ):
         made.setdefault(condition, {}).setdefault(label, []).append(trace)
     return made
-
-
-def other_answers(
-    scene: Scene, traces: Traces, again: Mapping[str, tables.Again], answer: str
-) -> list[str]:
-    """Return the scene's answer at half the physics step and from nudged starts, where it says
-    something else.
-    """
-    order = any(first_order(scenario) for _, _, scenario in scene.runs())
-    changes = ("At half the physics step", order), (f"From starts moved by {NUDGE:g} of it", False)
-    said = []
-    for k, (words, halved_first_order) in enumerate(changes):
-        runs: dict[str, dict[str, Trace]] = {}
-        for condition, of_condition in traces.items():
-            runs[condition] = dict(of_condition)
-            for label, others in again.get(condition, {}).items():
-                runs[condition][label] = others[k]
-        other = scene.sentence(runs)
-        if not same_answer(answer, other, halved_first_order):
-            said.append(f"{words}: {other}")
-    return said
-
-
-def same_answer(one: str, other: str, first_order: bool = False) -> bool:
-    """Return whether two answers say the same: equal words, and numbers that are not `apart`."""
-    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
-        return False
-    pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
-    return not any(apart([float(a), float(b)], first_order=first_order) for a, b in pairs)
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:

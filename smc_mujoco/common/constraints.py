@@ -87,8 +87,8 @@ class Flag(Constraint):
     """True or False."""
 
     def __call__(self, what: str, value: Any) -> bool:
-        if isinstance(value, bool):
-            return value
+        if isinstance(value, bool | np.bool_):
+            return bool(value)
         raise ScenarioError(f"{what} is {shown(value)}: give True or False")
 
 
@@ -149,6 +149,7 @@ class OrNone(Constraint):
 
 MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
 
+Truth = Annotated[bool, Flag()]
 Finite = Annotated[float, Number()]
 Natural = Annotated[float, Number(low=0.0)]
 Positive = Annotated[float, Number(above=0.0)]

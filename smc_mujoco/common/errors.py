@@ -3,6 +3,7 @@ that raise it.
 """
 
 import difflib
+import inspect
 import itertools
 import math
 import numbers
@@ -193,6 +194,11 @@ def items_of(what: str, values: Iterable[T]) -> list[T]:
     if len(first) > MAX_ITEMS:
         raise ScenarioError(f"{what} has more than {MAX_ITEMS:,} items: give fewer")
     return first
+
+
+def has(value: object, name: str) -> bool:
+    """Return whether a value has an attribute. It runs no code of the value."""
+    return inspect.getattr_static(value, name, None) is not None
 
 
 def words(error: BaseException) -> str:

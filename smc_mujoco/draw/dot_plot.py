@@ -17,6 +17,7 @@ from smc_mujoco.analysis.paired_runs import (
     Columns,
     by_row,
     groups,
+    is_table,
     scenarios,
     sources,
     unit_of_x,
@@ -64,6 +65,7 @@ def plot(
         raise ScenarioError(
             f"table is {shown(table)}: smc.figure draws traces, and this draws the table of a study"
         )
+    is_table(table)
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     names = items_of("metrics", metrics)

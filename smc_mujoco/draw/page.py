@@ -92,6 +92,8 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
             raise ScenarioError(
                 f"size is {shown(size)}, but fig already has a size: give one of the two"
             )
+        if not isinstance(fig, Figure | SubFigure):
+            raise ScenarioError(f"fig is {shown(fig)}: give a figure of matplotlib")
         box = fig.bbox.transformed(fig.dpi_scale_trans.inverted())
         return box.width, box.height
     if size is None:

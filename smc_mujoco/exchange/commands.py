@@ -102,7 +102,7 @@ def export(
     chosen = from_text.law(
         laws[0] if laws else out.stem, **from_text.parsed_gains(gains, "--gains")
     )
-    with delay_ctrl_c(), options.as_options({r"\bjoints=": "--joints "}):
+    with delay_ctrl_c():
         if out.suffix == ".c":
             from smc_mujoco.common.files import replacing
             from smc_mujoco.exchange.c.export import law_to_c

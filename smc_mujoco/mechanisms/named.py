@@ -70,16 +70,12 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
 
     path = model["path"]
     joints = list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
-    if not joints:
-        raise ScenarioError(
-            f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow"
-        )
     channels = dict(map(_channel, joints))
     if len(channels) < len(joints):
         raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
     if model["keyframe"] is not None:
         values = {"keyframe": model["keyframe"].strip()} | values
-    return plant_from(folder / path, channels, **values)
+    return plant_from(folder / path, channels or {"": None}, **values)  # an error names the joints
 
 
 def _channel(text: str) -> tuple[str, Any]:

@@ -47,7 +47,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 
@@ -250,7 +250,7 @@ def metric(
 
 def refuse(trace: Trace) -> None:
     """Raise ScenarioError for anything but a trace of finite signals whose run did not fail."""
-    if not hasattr(trace, "scenario"):
+    if not has(trace, "scenario"):
         raise ScenarioError(f"cannot score {shown(trace)}: give one Trace")
     names = ("x", "v", "u", "applied", "s", "d", "r", "reaction")
     finite = np.isfinite(trace.t)

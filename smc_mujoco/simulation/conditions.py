@@ -250,6 +250,8 @@ def from_file(path: Path) -> list[Condition]:
                 conditions.append(find_condition(line))
         except ScenarioError as error:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
+    if not conditions:
+        raise ScenarioError(f"{str(path)!r} has no condition: write one on a line")
     return conditions
 
 

@@ -12,7 +12,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
-from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
+from smc_mujoco.common.constraints import FilePath, Positive, Truth, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
@@ -209,7 +209,7 @@ def compare(
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = SEARCHES,
-    tune: bool = True,
+    tune: Truth = True,
     worst: "bool | Uncertainty" = False,
     executor: "executors.Workers | None" = None,
     *,
@@ -220,8 +220,8 @@ def compare(
     gains: gain_sets.NameOfSet = "tuned",
     searches: Searches | None = None,
     budget: Budget = BUDGET,
-    quick: bool = False,
-    defaults: bool = False,
+    quick: Truth = False,
+    defaults: Truth = False,
     relevant: Relevant = RELEVANT,
     traces: Traces = "none",
     threads: int | None = None,
@@ -270,10 +270,13 @@ def compare(
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     within = _class(worst)
     extent = QUICK if quick else FULL
-    machines = [as_plant(plant) for plant in listed("plants", plants or extent.plants)]
+    machines = [
+        as_plant(plant) for plant in listed("plants", extent.plants if plants is None else plants)
+    ]
     length = duration or extent.duration
-    given = conditions or applicable(extent.conditions, machines, length)
-    tested = [find_condition(name) for name in listed("conditions", given)]
+    if conditions is None:
+        conditions = applicable(extent.conditions, machines, length)
+    tested = [find_condition(name) for name in listed("conditions", conditions)]
     trial = Trial(machines, tested, length, starts, Path(out), threads, progress, seed)
     chosen: dict[str, list[Law | Template]] = {}
     of_all = None if laws is None else [law_or_template(law) for law in listed_laws(laws)]

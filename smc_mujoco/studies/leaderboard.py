@@ -17,7 +17,7 @@ from smc_mujoco.analysis.bootstrap import median_of, share_interval
 from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
@@ -61,10 +61,11 @@ def leaderboard(
       ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a
         common cell.
     """
-    if isinstance(metrics, str) or not metrics:
+    if isinstance(metrics, str) or not items_of("metrics", metrics):
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
     for name in metrics:
         find("metric", name, {known: unit for known, unit in UNITS.items() if known != OBJECTIVE})
+    paired_runs.is_table(table)
     boards = Boards()
     boards.failures = paired_runs.failures(table)
     groups = paired_runs.groups(table, by)

@@ -372,11 +372,11 @@ def _of_package(point: EntryPoint) -> Path:
 
 def find(name: str) -> Path:
     """Return the scene file at a path, or the one of that name that comes with a package."""
-    if os.path.isfile(name):
+    if os.path.isfile(name) and name.endswith(".py"):
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
         raise ScenarioError(
-            f"no scene file {name}: give the path of a scene file, or a name from smc-mujoco list"
+            f"no scene file {name}: give the path of a .py file, or a name from smc-mujoco list"
         )
     return lookup("scene", name, scenes())
 

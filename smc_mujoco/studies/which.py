@@ -18,7 +18,7 @@ import numpy as np
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES
-from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
+from smc_mujoco.common.constraints import FilePath, Positive, Truth, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.control import gain_sets
@@ -111,10 +111,10 @@ def which(
     duration: Positive | None = None,
     starts: Starts | None = None,
     out: Annotated[str | Path, FilePath()] = "which",
-    quick: bool = False,
+    quick: Truth = False,
     threads: int | None = None,
     progress: bool = False,
-    defaults: bool = False,
+    defaults: Truth = False,
     relevant: Relevant = RELEVANT,
     seed: DrawSeed = 0,
 ) -> Advice:
@@ -139,9 +139,11 @@ def which(
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     machine = as_plant(plant)
-    names = needs.split(",") if isinstance(needs, str) else listed("needs", needs or DEFAULT_NEEDS)
-    names = [name.strip() for name in names]
-    for name in names:
+    given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
+    names = []
+    for need in given:
+        name = need.strip() if isinstance(need, str) else need
+        names.append(name)
         find("need", name, {**NEEDS, **PROPERTIES})
     compared = [NEEDS[name] for name in names if name in NEEDS]
     for metric in compared:
@@ -149,8 +151,9 @@ def which(
             raise ScenarioError(why)
     chosen = _suited(machine, [name for name in names if name in PROPERTIES], laws)
     length = duration or (3.0 if quick else 5.0)
-    given = conditions or applicable(DEFAULT_CONDITIONS, [machine], length)
-    tested = [find_condition(name) for name in listed("conditions", given)]
+    if conditions is None:
+        conditions = applicable(DEFAULT_CONDITIONS, [machine], length)
+    tested = [find_condition(name) for name in listed("conditions", conditions)]
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress, seed)
     trial.check({machine.name: chosen})
     searches, budget = (3, 16) if quick else (SEARCHES, BUDGET)

@@ -58,7 +58,9 @@ def tune(
             help="Also write gains, history and provenance to a file, and each search.",
         ),
     ] = None,
-    condition: options.Conditions = None,
+    condition: Annotated[
+        list[str] | None, options.conditions_by_default("the seven named above")
+    ] = None,
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -147,7 +149,7 @@ def margins(
 
     terminal = Terminal(json)
     machines = []
-    for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS):
+    for text in options.plants(plants, QUICK_MARGINS["plants"] if quick else PLANTS):
         machines.append(as_plant(text))
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)

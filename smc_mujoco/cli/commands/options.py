@@ -1,11 +1,10 @@
 """Options and arguments that several commands have, and functions that parse them."""
 
-import contextlib
 import importlib
 import itertools
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,6 +33,19 @@ def picture(contents: str) -> Any:
     )
 
 
+def conditions_by_default(default: str) -> Any:
+    """Return the option --condition of a command that has these conditions by default."""
+    return typer.Option(
+        "--condition",
+        metavar="NAME|TEXT|FILE",
+        autocompletion=_completing("simulation.conditions", "NAMED"),
+        help="Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your own, "
+        'as "worn gear: friction=Coulomb(0.05)", or a file with one on each line. May be '
+        f"repeated. Default: {default}.",
+        show_default=False,
+    )
+
+
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:
     """Return a function that completes a text such as "a,b" or "a+b" in a shell, with names from a
     module.
@@ -50,7 +62,6 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
 
 PLANTS = _completing("mechanisms.plant", "plants")
 LAWS = _completing("control.law", "known_laws")
-CONDITIONS = _completing("simulation.conditions", "NAMED")
 SCENES = _completing("studies.scene", "scenes")
 
 Columns = Annotated[
@@ -60,24 +71,12 @@ Columns = Annotated[
         help="Columns whose names differ from the rig's, as theta=arm_angle.",
     ),
 ]
-Conditions = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--condition",
-        metavar="NAME|TEXT|FILE",
-        autocompletion=CONDITIONS,
-        help="Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your "
-        'own, as "worn gear: '
-        'friction=Coulomb(0.05)", or a file with one on each line. May be repeated.',
-        show_default=False,
-    ),
-]
 Condition = Annotated[
     str,
     typer.Option(
         "--condition",
         metavar="NAME|TEXT",
-        autocompletion=CONDITIONS,
+        autocompletion=_completing("simulation.conditions", "NAMED"),
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: '
         'friction=Coulomb(0.05)".',
     ),
@@ -172,20 +171,6 @@ X0 = Annotated[
 ]
 
 
-@contextlib.contextmanager
-def as_options(words: Mapping[str, str]) -> Iterator[None]:
-    """Write arguments of Python as options in sentences of errors; `words` is pattern -> what takes
-    its place.
-    """
-    try:
-        yield
-    except ScenarioError as error:
-        sentence = str(error)
-        for pattern, option in words.items():
-            sentence = re.sub(pattern, option, sentence)
-        raise ScenarioError(sentence) from None
-
-
 def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
     """Return the names in a text such as "a,b", or in several, or the default if there is none."""
     if texts is None:
@@ -194,9 +179,20 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
     for text in [texts] if isinstance(texts, str) else texts:
         of_text = [name.strip() for name in COMMA.split(text) if name.strip()]
         if not of_text:
-            raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
+            raise ScenarioError(f"{shown(text)} holds no name: give names, as a,b")
         parts += of_text
     return parts
+
+
+def plants(texts: Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
+    """Return the names of plants in texts, or the default; a law's name is refused."""
+    from smc_mujoco.control.law import known_laws
+
+    found = names(texts, default)
+    for name in found:
+        if name in known_laws():
+            raise ScenarioError(f"{name!r} is a law, not a plant: give it as --law {name}")
+    return found
 
 
 def check_files(json: Path | None, *others: Path | None) -> None:
@@ -214,7 +210,7 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
     for pair in names(text):
         name, _, value = (part.strip() for part in pair.partition("="))
         if not (name and value):
-            raise ScenarioError(f"{option} {pair!r} cannot be read: write it as {example}")
+            raise ScenarioError(f"{option} {shown(pair)} cannot be read: write it as {example}")
         if name in values:
             raise ScenarioError(f"{option} has {name} twice: leave out one of them")
         values[name] = value

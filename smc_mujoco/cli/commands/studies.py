@@ -32,7 +32,9 @@ def which(
             "as for `smc-mujoco list --needs`."
         ),
     ] = "fast,accurate,calm",
-    condition: options.Conditions = None,
+    condition: Annotated[
+        list[str] | None, options.conditions_by_default("nominal, noise and sine")
+    ] = None,
     law: options.Laws = None,
     quick: options.Quick = False,
     seeds: Annotated[
@@ -87,7 +89,9 @@ def which(
 def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
-    condition: options.Conditions = None,
+    condition: Annotated[
+        list[str] | None, options.conditions_by_default("those of a study; of --quick, three")
+    ] = None,
     seeds: Annotated[
         int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")
     ] = 12,
@@ -176,7 +180,7 @@ def compare(
         return
     latex = latex and with_ending(latex, ".tex")
     options.check_files(None, latex, *files(figure))
-    machines = options.names(plants)
+    machines = options.plants(plants)
     comparison = run(
         options.compared_laws(law, machines, gains),
         machines or None,

@@ -20,6 +20,7 @@ METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
 
 
 def certify(
+    ctx: typer.Context,
     plant: Annotated[
         str | None,
         typer.Argument(
@@ -45,7 +46,10 @@ def certify(
     ] = False,
     check: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again."),
+        typer.Option(
+            metavar="FILE.json",
+            help="Instead, prove the certificate in a file again; without plant, law, gains.",
+        ),
     ] = None,
     json: options.Json = None,
 ) -> None:
@@ -74,8 +78,8 @@ def certify(
     options.check_files(out, *pictures)
     scenario = worst_run = None
     if check:
-        if plant:
-            raise ScenarioError("--check proves what is in a file: leave out the plant")
+        asked = ("plant", "law", "disturbance", "slope", "condition", "gains", "worst")
+        options.only_for(ctx, asked, False, "a new certificate: leave it out beside --check")
         made = Certificate.load(check)
         made.check()
         terminal.note(f"{check}: every statement is proven", "bold")

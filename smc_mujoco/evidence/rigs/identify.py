@@ -210,7 +210,7 @@ def identify(
     if not many:
         raise ScenarioError("there are no records: give at least one")
     twin, data = _twin(rig, many)
-    twin = twin.with_values(start or {})
+    twin = twin.with_values({} if start is None else start)
     names = _checked_names(twin, quantities)
     fits_before = twin.fits(data)  # also refuses records that are too short
     with bar(f"identify {twin.name}", 2 * most * (2 * len(names) + 1), shown=progress) as drawn:

@@ -148,7 +148,7 @@ class Rig:
     def with_values(self, values: Mapping[str, float], source: str = "given") -> "Rig":
         """Return the rig with other values of some quantities, SI units, from a source."""
         changed = dict(self.quantities)
-        for name, value in values.items():
+        for name, value in frozen(values).items():
             known = find(f"quantity of {self.name}", name, changed)
             new = number(f"{self.name}'s {name}", value, low=known.least, high=known.most)
             if new != known.value:

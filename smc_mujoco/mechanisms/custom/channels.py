@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Bound, Flag, Number, constrain
+from smc_mujoco.common.constraints import Bound, Number, Truth, constrain
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -63,7 +63,7 @@ class Channel:
         0.
     """
 
-    motor: Annotated[bool, Flag()] = False
+    motor: Truth = False
     partner: str | None = None
     x0: Place | None = None
     partner_x0: Place | None = None

@@ -7,12 +7,11 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 import dataclasses
 import math
 from collections.abc import Hashable, Iterator
-from typing import Annotated
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Flag
+from smc_mujoco.common.constraints import Truth
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
@@ -169,7 +168,7 @@ class LuGre(Friction):
     stribeck: Positive
     stiffness: Positive = 1e3
     damping: Natural | None = None
-    driven: Annotated[bool, Flag()] = False
+    driven: Truth = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

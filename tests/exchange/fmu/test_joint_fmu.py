@@ -286,7 +286,5 @@ def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["export", "unit_vector.fmu"])
     assert end.value.code == 2
-    said = (
-        "smc-mujoco: law 'unit_vector' is of many joints: give their number, such as --joints 7\n"
-    )
+    said = "smc-mujoco: law 'unit_vector' is of many joints: give their number, such as joints=7\n"
     assert capsys.readouterr().err == said

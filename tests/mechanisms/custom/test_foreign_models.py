@@ -185,7 +185,7 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
             "elbow u (N·m)",
         ]
     for text, words in (
-        ("arm.xml", "as arm.xml:shoulder"),
+        ("arm.xml", "choose from "),
         ("no.xml:a", "no model at"),
         ("arm.xml:ift", "mean 'lift'"),
     ):

@@ -1,0 +1,252 @@
+"""Calls with odd arguments: of public functions, and of commands.
+
+Each call is right but for one argument or a few. It ends well, in a ScenarioError of one sentence,
+or in a TypeError; a command ends with exit code 0 or 2, and without a traceback.
+"""
+
+import contextlib
+import functools
+import inspect
+import io
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import typer
+import wild
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main
+
+SCENE = """import smc_mujoco as smc
+scene = smc.Scene(
+    title="t", figure="states", film="nominal",
+    conditions={"nominal": {"a": smc.Scenario(plant="duffing", law="none", duration=0.01)}},
+    answer=lambda traces: "It ran.",
+)
+"""
+TEXTS = [
+    "",
+    " ",
+    "0",
+    "1",
+    "-1",
+    "3",
+    "007",
+    "1e999",
+    "nan",
+    "-inf",
+    "inf",
+    "9" * 400,
+    "0x10",
+    "1,",
+]
+TEXTS += [
+    ",",
+    "a,b",
+    "a=b",
+    "=",
+    "a=",
+    "M=nan",
+    "mass=1:2:3",
+    "mass=nan:inf",
+    ":",
+    "a:b",
+    "lag:",
+    "@",
+]
+TEXTS += [
+    "duffing",
+    "pid",
+    "pid(",
+    "pid(kp=",
+    "pid(kp=nan)",
+    "pid(text=1)",
+    "linear(c=x)",
+    "(",
+    ")",
+]
+TEXTS += ["noise", "worn: friction=Coulomb(-1)", "w: x=1", "w: friction=", "w: __import__('os')"]
+TEXTS += [
+    "é" * 300,
+    "名",
+    "\ud800",
+    "\x1b[31m",
+    "a\nb",
+    "%s{0}",
+    "../../x",
+    "/",
+    ".",
+    "~",
+    "x" * 9999,
+]
+TEXTS += [
+    "nowhere.npz",
+    "nowhere.py",
+    "nowhere.json",
+    "nowhere.xml:a",
+    "no/where.c",
+    "nowhere.toml",
+]
+FILES = ["a.csv", "a.json", "a.npz", "a.py", "a.xml", "a.xml:shoulder", "a.xml:x@y", "empty.npz"]
+FILES += ["bom.toml", "folder", "trace.npz", "scene.py", "list.json", "a.c", "out.json", "out.csv"]
+LINES = {  # command -> its shortest right lines, "?" for what is always odd
+    "list": ["", "pid", "--plant duffing", "--needs continuous"],
+    "run": ["scene.py --no-film --no-repeat", "?"],
+    "show": ["trace.npz", "?"],
+    "view": ["?", "a.xml:shoulder --port 0 --law ?"],
+    "compare": ["duffing --law ?", "? --law pid", "--rig ?", "duffing --law pid --condition ?"],
+    "which": ["duffing --law ?", "?", "duffing --needs ?", "duffing --condition ?"],
+    "tune": ["duffing ?", "? pid", "duffing pid --condition ?"],
+    "margins": ["duffing --law pid --gains default --kinds ?", "? --law pid", "duffing --law ?"],
+    "worst": ["duffing --law classical --gains default --budget 1 --duration 0.01"],
+    "sensitivity": ["duffing --gains default --points 8 --duration 0.01"],
+    "chatter": ["duffing --law ?", "duffing --gains default --actuator ?", "? --law pid"],
+    "export": ["pid out.c", "pid out.fmu --no-binary", "? out.c", "?"],
+    "enter": ["?", "folder", "a.py", "pid --suite ?", "pid --against ?"],
+    "claims": ["--papers", "?", "--paper ?", "--check ?", "1 --gains ?"],
+    "certify": ["?", "--check ?", "duffing --gains ?", "duffing --law ?", "duffing --condition ?"],
+    "report": ["--paper ?", "--law ?"],
+    "rig": ["?", "emps ?", "emps a.csv", "emps a.csv --fit", "duffing ? --fit"],
+}
+
+
+@functools.cache
+def world() -> smc.Trace:
+    """Write the files that commands are given, once, and return a trace."""
+    trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.02))
+    trace.save("trace.npz")
+    Path("a.csv").write_text("t,x\n0,1\n1,nan\n")
+    Path("a.json").write_text('{"x": [1, null]}')
+    Path("list.json").write_text("[1e999]")
+    np.savez("a.npz", x=np.zeros(3), t=np.array([{}], dtype=object))
+    Path("a.py").write_text("x = 1\n")
+    Path("a.c").write_text("int x;\n")
+    Path("a.xml").write_text(wild.ARM)
+    Path("empty.npz").write_bytes(b"")
+    Path("bom.toml").write_bytes(b"\xef\xbb\xbfname = 'x'\n")
+    Path("folder").mkdir(exist_ok=True)
+    Path("folder/law.py").write_text("x = 1\n")
+    Path("folder/entry.toml").write_bytes(b"\xef\xbb\xbfname = 'x'\n")
+    Path("scene.py").write_text(SCENE)
+    return trace
+
+
+def text(random: Random) -> str:
+    """An odd text of a command line."""
+    return random.choice(random.choice([TEXTS, FILES]))
+
+
+def line(random: Random) -> list[str]:
+    """A command line with odd values."""
+    name = random.choice(sorted(LINES))
+    words = [name]
+    for word in random.choice(LINES[name]).split():
+        words.append(text(random) if word == "?" else word)
+    command: Any = typer.main.get_command(main.app)
+    known = [option for option in command.commands[name].params if option.opts[0][:2] == "--"]
+    for option in random.sample(known, random.randint(0, 2)):
+        if option.name in ("help", "worst", "site", "mutants", "film", "browser"):
+            continue
+        words.append(option.opts[0])
+        if not option.is_flag:
+            words.append(text(random))
+    return words
+
+
+def commands(random: Random, sentence: Callable[[str], None]) -> str:
+    """Run an odd command line."""
+    world()
+    words = line(random)
+    out = io.StringIO()
+    code: object = 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+        try:
+            main.app(words, prog_name="smc-mujoco")
+        except SystemExit as ended:
+            code = ended.code or 0
+        except BaseException as error:
+            raise AssertionError(f"{words} ends in {type(error).__name__}: {error}") from error
+    said = out.getvalue()
+    if code not in (0, 2) or "Traceback" in said:
+        raise AssertionError(f"{words} ends with {code}: {said[-300:]}")
+    if code and "Usage:" not in said:
+        sentence(said.splitlines()[-1].removeprefix("smc-mujoco: "))
+    return "refused" if code else "ran"
+
+
+SHORT = smc.Scenario(plant="duffing", law="classical", duration=0.01)
+WITHIN = smc.Uncertainty(disturbance=1.0)
+# function -> its right arguments, which cost little; ... for what is always odd
+CALLS: dict[Callable, dict[str, Any]] = {
+    smc.tune: {"plant": ..., "law": "pid", "budget": 1, "searches": 1, "objective": "balanced"},
+    smc.compare: {"laws": ..., "plants": "duffing", "conditions": "nominal", "seeds": 1},
+    smc.which: {"plant": "duffing", "needs": ..., "laws": "pid", "conditions": "nominal"},
+    smc.margins: {"plants": "duffing", "laws": "pid", "kinds": ..., "gains": "default"},
+    smc.worst_case: {"scenario": SHORT, "metric": "peak", "within": WITHIN, "budget": 1, "seed": 0},
+    smc.sensitivity: {"scenario": SHORT, "metric": "peak", "points": ..., "seed": 0},
+    smc.design.basin: {"plant": "duffing", "law": ..., "points": (2, 2), "duration": 0.1},
+    smc.design.chattering: {"law": SHORT, "channel": 0},
+    smc.audits.certify: {"scenario": ..., "within": WITHIN},
+    smc.grid: {"plants": "duffing", "laws": "pid", "conditions": "nominal", "seeds": 1},
+    smc.study: {"scenarios": [SHORT], "out": ...},
+    smc.leaderboard: {"table": ..., "metrics": ["itae"]},
+    smc.Table.read: {"path": "a.csv"},
+    smc.load: {"path": "trace.npz"},
+    smc.law: {"text": "pid", "kp": 3.0},
+    smc.surface: {"name": "linear", "c": 3.0},
+    smc.estimator: {"name": "levant"},
+    smc.laws: {"plant": "duffing"},
+    smc.plant: {"name": "duffing", "M": 1.0, "set": None},
+    smc.condition: {"name": "noise"},
+    smc.starts: {"x0": 0.3},
+    smc.law_from: {"source": np.array([[3.0, 1.0]]), "name": "x"},
+    smc.law_function: {"function": lambda y, gains, memory: (0.0, 0.0), "gains": {"k": 1.0}},
+    smc.results: {"source": ...},
+    smc.problem: {"name": "duffing/noise@1"},
+    smc.rig: {"name": "emps"},
+    smc.identify: {"rig": "emps", "records": ...},
+    smc.policy: {"act": lambda y: 0.0},
+    smc.plot: {"table": ..., "path": "p.pdf"},
+    smc.figure: {"traces": ..., "path": "f.pdf"},
+    smc.film: {"traces": ..., "path": "f.mp4"},
+    smc.plant_from: {"path": "a.xml", "channels": ["shoulder"]},
+    smc.Uncertainty: {"mass": (0.9, 1.1), "disturbance": 1.0},
+    smc.Channel: {"x0": 0.1},
+    smc.scores: {"trace": ...},
+    smc.score: {"trace": ...},
+}
+
+
+PARAMETERS: dict[Callable, list[str]] = {}
+for function in CALLS:
+    PARAMETERS[function] = []
+    for name, parameter in inspect.signature(function).parameters.items():
+        if parameter.kind is not parameter.VAR_KEYWORD:
+            PARAMETERS[function].append(name)
+
+
+def calls(random: Random, sentence: Callable[[str], None]) -> str:
+    """Call a public function with odd arguments."""
+    world()
+    function = random.choice(list(CALLS))
+    arguments = dict(CALLS[function])
+    odd = [name for name, value in arguments.items() if value is ...]
+    known = sorted({*arguments, *PARAMETERS[function]} - {"progress", "report"})
+    odd += random.sample(known, random.randint(0 if odd else 1, min(2, len(known))))
+    for name in odd:
+        arguments[name] = wild.value(random)
+    first, *_ = arguments
+    try:
+        if random.random() < 0.5:
+            function(arguments.pop(first), **arguments)
+        else:
+            function(**arguments)
+    except smc.ScenarioError as error:
+        sentence(str(error))
+        return "refused"
+    except TypeError:
+        return "of another type"
+    return "ran"
