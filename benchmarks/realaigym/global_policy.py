@@ -102,15 +102,9 @@ def minute(scenario: Scenario, seed: int) -> Run:
     """
     machine, (times, goals) = Machine(scenario), resets(seed)
     run = Run(np.zeros((STEPS + 1, 4)), np.zeros((STEPS, 2)))
-    memories = np.zeros(machine.sizes[0]), np.zeros((2, machine.sizes[1]))
-    functions = np.array([machine.law.address, machine.estimator.address])
     with delay_ctrl_c():  # numba may compile it now
         raised = _minute(
-            functions,
-            machine.gains,
-            machine.filter,
-            *memories,
-            machine.known,
+            *machine.start(),
             machine.driven,
             machine.limit,
             machine.uses_model,

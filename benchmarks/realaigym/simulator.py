@@ -234,6 +234,12 @@ class Machine:
         self.limit = scenario.limits[0]
         self.uses_model = float(resolved.model == "nominal")
 
+    def start(self) -> tuple[Any, ...]:
+        """Return addresses, gains, empty memories, and what the law knows, for a compiled loop."""
+        functions = np.array([self.law.address, self.estimator.address])
+        memories = np.zeros(self.sizes[0]), np.zeros((2, self.sizes[1]))
+        return functions, self.gains, self.filter, *memories, self.known
+
     def simulate(self, case: Case) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (q1, q2, q1', q2'), (5001, 4), and the motor's torque, N m, (5000,), of
         a case.
@@ -251,15 +257,9 @@ class Machine:
             pulse += amplitude * np.exp(-0.5 * ((t - centre) / width) ** 2)
         states = np.zeros((STEPS + 1, 4))
         torque = np.zeros(STEPS)
-        memories = np.zeros(self.sizes[0]), np.zeros((2, self.sizes[1]))
-        functions = np.array([self.law.address, self.estimator.address])
         with delay_ctrl_c():  # numba may compile it now
             raised = _simulate(
-                functions,
-                self.gains,
-                self.filter,
-                *memories,
-                self.known,
+                *self.start(),
                 tuple(true.values()),
                 self.driven,
                 self.limit,

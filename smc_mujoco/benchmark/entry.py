@@ -96,7 +96,10 @@ def read(folder: str | os.PathLike[str]) -> Entry:
     if folder in known_laws() and not os.path.isdir(folder):
         return _of_library(str(folder))
     folder = Path(folder)
-    laws = [folder / name for name in FILES if (folder / name).is_file()]
+    laws = []
+    for name in FILES:
+        if (folder / name).is_file():
+            laws.append(folder / name)
     if len(laws) != 1:
         names = " and ".join(path.name for path in laws) or "none of them"
         raise ScenarioError(f"entry {str(folder)!r} has {names}: give one of {', '.join(FILES)}")
@@ -153,7 +156,10 @@ def _text(name: str, value: object) -> str:
 
 def _gains(sets: object, division: str) -> Mapping[str, Mapping[str, float]]:
     """Return plant -> gain -> value, as a division allows them."""
-    known = (EVERYWHERE,) if division == "one set" else plants()
+    if division == "one set":
+        known = (EVERYWHERE,)
+    else:
+        known = plants()
     cure = f"the division {division!r} takes {DIVISIONS[division]}, so write [gains.{known[0]}]"
     if not isinstance(sets, dict):
         raise ScenarioError(f"gains is {shown(sets)}: {cure}")

@@ -42,10 +42,15 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
     """
     suites, refused = sound(results)
     if not suites:
-        why = str(refused[0]) if refused else "enter a law first, with smc-mujoco enter FOLDER"
+        if refused:
+            why = str(refused[0])
+        else:
+            why = "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
     made = _environment()
-    left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused]
+    left_out = []
+    for error in refused:
+        left_out.append(str(error).replace(f"{results}{os.sep}", ""))
     for found in suites:
         folder = suite.folder(found.suite, found.seed)
         page = {"found": found, "folder": folder}

@@ -187,7 +187,9 @@ class Problem:
         x0 = []
         for place, origin in zip(base.resolved.x0, rest, strict=True):
             x0.append(origin + drawn.side * drawn.start * (place - origin))
-        disturbance = [_scaled(signal, force) for signal in base.disturbance]
+        disturbance = []
+        for signal in base.disturbance:
+            disturbance.append(_scaled(signal, force))
         scenario = dataclasses.replace(
             base, x0=x0, mismatch=mismatch, disturbance=disturbance, seed=drawn.seed
         )
@@ -216,7 +218,9 @@ class Problem:
             values = dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
             return {"failed": 1.0} | values | dict.fromkeys(self._names(), math.nan)
         groups = conventions.by_group(trace).values()
-        relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
+        relative = []
+        for part in groups:
+            relative.append(np.abs(conventions.error(part)) / conventions.scale(part))
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
         plant = trace.scenario.plant
@@ -250,14 +254,18 @@ class Problem:
         }
         for measure, time in counted.items():
             for i, level in enumerate(self.targets.get(measure, ()), 1):
-                times[f"{measure}_{i}"] = time if values[measure] <= level else math.nan
+                if values[measure] <= level:
+                    times[f"{measure}_{i}"] = time
+                else:
+                    times[f"{measure}_{i}"] = math.nan
         return times
 
     def _names(self) -> list[str]:
         """List the names of the targets' times."""
         names = []
         for measure in MEASURES:
-            names += [f"{measure}_{i}" for i, _ in enumerate(self.targets.get(measure, ()), 1)]
+            for i in range(1, len(self.targets.get(measure, ())) + 1):
+                names.append(f"{measure}_{i}")
         return names
 
 
@@ -267,7 +275,10 @@ def problem(name: str) -> Problem:
     Raises:
       ScenarioError: a text that is no such name, or an unknown version, plant or condition.
     """
-    parts = ID.fullmatch(name) if isinstance(name, str) else None
+    if isinstance(name, str):
+        parts = ID.fullmatch(name)
+    else:
+        parts = None
     if parts is None:
         raise ScenarioError(
             f"problem {shown(name)} is no plant/condition@version: write it as duffing/noise@1"
@@ -300,9 +311,11 @@ def cells(version: int) -> list[str]:
         conditions[plant] = fields["conditions"]
     listed = []
     for plant, of_plant in conditions.items():
-        listed += [f"{plant}/{condition}" for condition in of_plant]
+        for condition in of_plant:
+            listed.append(f"{plant}/{condition}")
     for plant in plants:
-        listed += [f"{plant}/{condition}" for condition in _attacks(version)]
+        for condition in _attacks(version):
+            listed.append(f"{plant}/{condition}")
     return listed
 
 

@@ -104,7 +104,10 @@ class Board:
         lines = [f"{title}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"]
         for one in self.standings:
             rank = f"{one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}]"
-            level = " level" if one.level and one.place > 1 else ""
+            if one.level and one.place > 1:
+                level = " level"
+            else:
+                level = ""
             lines.append(f"{one.place:>3} {one.entry:<28} {rank} {100 * one.reached:4.0f} %{level}")
         return "\n".join(lines)
 
@@ -155,7 +158,8 @@ class Result:
         for name in problems:
             columns = self.runs.columns(name)
             levels = problem(name).targets.get(measure, ())
-            times += [columns[f"{measure}_{i}"] for i, _ in enumerate(levels, 1)]
+            for i in range(1, len(levels) + 1):
+                times.append(columns[f"{measure}_{i}"])
         return np.nan_to_num(np.concatenate(times), nan=np.inf)
 
 
@@ -179,7 +183,9 @@ class Results:
     @property
     def title(self) -> str:
         """The suite, and the seed unless that is 0."""
-        return f"{self.suite}, seed {self.seed}" if self.seed else self.suite
+        if self.seed:
+            return f"{self.suite}, seed {self.seed}"
+        return self.suite
 
     def on(self, question: str) -> list[str]:
         """Return the problems that inform a board."""
@@ -348,7 +354,10 @@ def results(source: str | os.PathLike[str] = "smc-30@1", seed: int = 0) -> Resul
 
 def sound(folder: Path) -> tuple[list[Results], list[ScenarioError]]:
     """Return the results in a folder, by suite and seed, and why others are left out."""
-    places = [Path(place) for place, _, files in os.walk(folder) if RESULT in files]
+    places = []
+    for place, _, files in os.walk(folder):
+        if RESULT in files:
+            places.append(Path(place))
     refused = []
     entries: dict[tuple[str, int], dict[str, Result]] = {}
     for place in sorted(places):

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 VALUES = "failed", "accuracy", "itae", "settling", "calm"
 LEVELS = 5  # targets of a measure
-COLUMNS = (*VALUES, *(f"{measure}_{i}" for measure in MEASURES for i in range(1, LEVELS + 1)))
+COLUMNS = list(VALUES)
+for measure in MEASURES:
+    for level in range(1, LEVELS + 1):
+        COLUMNS.append(f"{measure}_{level}")
 Row = dict[str, Any]
 
 

@@ -56,9 +56,6 @@ def export(
             help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed.",
         ),
     ] = None,
-    joint: Annotated[
-        str, typer.Option(metavar="hinge|slide", help="FMU: units: rad and N m, or m and N.")
-    ] = "hinge",
     binary: Annotated[
         bool, typer.Option(help="FMU: whether to compile a binary for this machine.")
     ] = True,
@@ -94,7 +91,7 @@ def export(
         raise ScenarioError(f"cannot write {last}: end its name in .c or .fmu")
     if len(laws) > 1:
         raise ScenarioError(f"{len(laws)} laws for {out}: give one")
-    of_fmu = "surface", "velocity", "period", "u_max", "model", "joint", "binary"
+    of_fmu = "surface", "velocity", "period", "u_max", "model", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
     options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
     with delay_ctrl_c():
@@ -122,7 +119,6 @@ def export(
                 control_period=period,
                 u_max=u_max,
                 model=model,
-                joint=joint,
                 joints=joints,
                 binary=binary,
             )

@@ -87,7 +87,7 @@ CALLS = {
     "export pid.fmu": ["exchange.fmu.export.law_to_fmu"],
     "export pid p.fmu --gains kp=50 --surface linear(c=4) --velocity levant --period 0.002 "
     "--u-max 6 --model nominal "
-    "--joint slide --joints 2 --no-binary": ["exchange.fmu.export.law_to_fmu"],
+    "--joints 2 --no-binary": ["exchange.fmu.export.law_to_fmu"],
 }
 
 

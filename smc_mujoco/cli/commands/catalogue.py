@@ -63,7 +63,8 @@ def list_(
     if name is not None and Path(name).suffix in (".c", ".so"):
         with delay_ctrl_c():
             loader = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {name},")
-        terminal.print(*loader.check(Path(name), None, None, "smc_law", (), C_TIME), sep="\n")
+        lines = loader.check(Path(name), None, None, "smc_law", (), C_TIME)
+        terminal.print(*lines, sep="\n", soft_wrap=True)
     elif name is not None:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import no_room, without_room
+from smc_mujoco.common.files import no_room
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
@@ -41,11 +41,7 @@ STRICT_FLAGS = tuple(
     for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
 )
 ERROR = re.compile(
-    r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE
-)
-NO_ROOM_WORDS = re.compile(  # what compilers and linkers say
-    "No space left on device|Disk quota exceeded|File too large|File size limit exceeded|"
-    "Cannot create temporary file"
+    r"^(?P<file>[^:\n]+):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE
 )
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
 _count = itertools.count()
@@ -84,15 +80,26 @@ def compiler() -> list[str]:
         return [command]
 
 
-def run_compiler(command: Sequence[str], timeout: float) -> subprocess.CompletedProcess[str]:
-    """Run the command of a compiler, for at most `timeout` seconds.
-
-    Errors are those of `process.timed`.
+def compiled(
+    rest: Sequence[str], target: Path, name: str, timeout: float
+) -> subprocess.CompletedProcess[str]:
+    """Compile a shared library of files and flags, within a time, s. `name`: of what it is, in
+    words.
     """
-    done = timed(command, timeout)
-    if done.returncode and (why := NO_ROOM_WORDS.search(done.stderr)):
-        raise without_room(why[0])
-    return done
+    command = compiler()
+    line = [*command, *LIBRARY_FLAGS, *rest, "-o", str(target), "-lm"]
+    try:
+        return timed(line, timeout)
+    except TimedOut:
+        raise ScenarioError(
+            f"{name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or "
+            "give timeout="
+        ) from None
+    except OSError:
+        raise ScenarioError(
+            f"{name} cannot be compiled, as there is no C compiler {command[0]!r}: install one, or "
+            "set CC"
+        ) from None
 
 
 def library(
@@ -104,29 +111,16 @@ def library(
     """
     path = str(source.resolve())
     target = fresh(".so")
-    command = compiler()
     if set('"\\\n') & set(path):
         raise ScenarioError(
             f"cannot include {shown(str(source))} in C: give a path without quotation marks and "
             "backslashes"
         )
     macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT_FLAGS, "-I", str(FOLDER)]
-    files = [str(FOLDER / "glue.c"), "-o", str(target), *flags, "-lm"]
-    try:
-        line = [*command, *LIBRARY_FLAGS, *SYMBOLIC_FLAGS, *STRICT_FLAGS, *macros, *files]
-        done = run_compiler(line, timeout)
-    except TimedOut:
-        raise ScenarioError(
-            f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it "
-            "shorter, or give timeout="
-        ) from None
-    except OSError:
-        raise ScenarioError(
-            f"{source.name} cannot be compiled, as there is no C compiler {command[0]!r}: install "
-            "one, or set CC"
-        ) from None
+    rest = [*SYMBOLIC_FLAGS, *STRICT_FLAGS, *macros, str(FOLDER / "glue.c"), *flags]
+    done = compiled(rest, target, source.name, timeout)
     if done.returncode or not target.exists():
-        raise ScenarioError(_sentence(source, symbol, " ".join(command), done.stderr))
+        raise ScenarioError(_sentence(source, symbol, done.stderr))
     return target, WARNING.findall(done.stderr)
 
 
@@ -135,37 +129,20 @@ def undefined(source: Path, symbol: str) -> str:
     return f"{source.name} has no function {symbol}: define {PROTOTYPE.format(symbol)}"
 
 
-def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
+def _sentence(source: Path, symbol: str, output: str) -> str:
     """Return the first error in a compiler's output, with a cure."""
-    error = ERROR.search(output)
-    name = source.name
-    if error:
-        what = error["what"]
-        file = Path(error["file"]).name
-    else:
-        what = ""
-        file = ""
-    if (f"'{symbol}'" in what and "undeclared" in what) or re.search(
-        rf"ndefined \w+.*\b_?{symbol}\b", output
-    ):
+    must = f"the law must be {PROTOTYPE.format(symbol)}"
+    if re.search(rf"'{symbol}' undeclared|ndefined \w+.*\b_?{symbol}\b", output):
         return undefined(source, symbol)
-    if error is None or error["line"] is None:  # from the linker or the command itself
+    error = ERROR.search(output)
+    if error is None:  # from the linker or the command itself
         lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)]
         said = (telling or lines)[0].strip()
-        return f"{name} does not compile, {command} says: {said}; fix it, or give other flags="
-    must = f"it must be {PROTOTYPE.format(symbol)}"
-    if f"'{symbol}'" in what or file == "glue.c":
-        return f"{name} has another {symbol} than smc_mujoco calls: {must}"
-    if what.startswith("#error"):
-        wanted = what.removeprefix("#error").strip(' "')
-        return f"{name} does not compile: {wanted}"
-    if file == name:
-        where = f"line {error['line']}"
-    else:
-        where = f"{error['file']}, line {error['line']}"
-    if "unknown type name 'smc_" in what:
-        cure = f"the law must be {PROTOTYPE.format(symbol)}"
-    else:
-        cure = "fix it"
-    return f"{name} does not compile: {where}, {what}; {cure}"
+        command = " ".join(compiler())
+        return f"{source.name} does not compile, {command} says: {said}; fix it, or its flags"
+    file = Path(error["file"]).name
+    if f"'{symbol}'" in error["what"] or file == "glue.c":
+        return f"{source.name} has another {symbol} than smc_mujoco calls: {must}"
+    where = f"{file}, line {error['line']}: {error['what']}"
+    return f"{source.name} does not compile: {where}; fix it; {must}"

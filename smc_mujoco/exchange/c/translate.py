@@ -21,7 +21,6 @@ import functools
 import inspect
 import itertools
 import math
-import operator
 import re
 import textwrap
 import threading
@@ -365,6 +364,12 @@ class Function:
         for node in nodes:
             for name in assigned(node):
                 self.assignments[name].append(node)
+        self.read = set[str]()  # names that it reads: others need no variable
+        for node in nodes:
+            if isinstance(node, ast.AugAssign):
+                self.read |= assigned(node)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                self.read.add(node.id)
         loops = [node for node in nodes if isinstance(node, ast.For | ast.While)]
         self.in_loops = {*inside(loops)}
         self.kinds = dict(self.parameters)
@@ -377,12 +382,10 @@ class Function:
         while before != (self.kinds, self.results):  # until no variable's kind widens
             before = dict(self.kinds), list(self.results)
             self.translate()
-        for name, sources, node in self.copies:
-            if (sources | {name}) & self.changed:
-                what = (
-                    "an array, which shares its numbers with another name: write .copy() behind it,"
-                )
-                raise refuse(node, what)
+        for sources, node in self.copies:
+            if sources & self.changed:
+                what = "an array, which shares its numbers with another name: write .copy()"
+                raise refuse(node, f"{what} behind it,")
 
     def translate(self) -> None:
         """Write the lines, with the kinds as far as they are known."""
@@ -393,8 +396,8 @@ class Function:
         self.changed = set[str]()  # names of arrays whose elements it changes
         if self.entry:
             self.changed |= {name for name, kind in self.parameters.items() if kind.of == "memory"}
+        self.copies = list[tuple[frozenset[str], ast.AST]]()  # which must not change
         self.returned = set[int]()  # positions of arguments whose numbers a result may have
-        self.copies = list[tuple[str, frozenset[str], ast.AST]]()
         self.block(self.tree.body)
 
     def text(self, name: str) -> str:
@@ -509,6 +512,13 @@ class Function:
         own, self.lines = self.lines, lines
         return made, own
 
+    def alone(self, translate: Callable[[Any], Any], node: ast.expr) -> Any:
+        """Return what a method makes of some code that must need no line before it."""
+        made, lines = self.captured(translate, node)
+        if lines:
+            raise refuse(node, "an array that is computed within a condition")
+        return made
+
     def block(self, body: Sequence[ast.stmt]) -> None:
         """Translate some statements."""
         for node in body:
@@ -537,10 +547,7 @@ class Function:
             case ast.For(target=ast.Name(id=name), orelse=[]):
                 self.loop(node, name)
             case ast.While(orelse=[]):
-                test, lines = self.captured(self.truth, node.test)
-                if lines:
-                    raise refuse(node.test, "an array that is computed within a condition")
-                self.lines.append(f"while ({test}) {{")
+                self.lines.append(f"while ({self.alone(self.truth, node.test)}) {{")
                 self.block(node.body)
                 self.lines.append("}")
             case ast.Break() | ast.Continue():
@@ -556,17 +563,16 @@ class Function:
         self.block(node.body)
         if node.orelse:
             _, lines = self.captured(self.block, node.orelse)
-            before = [""]  # an elif may need lines of its own before its condition
-            if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-                _, before = self.captured(self.truth, node.orelse[0].test)
-            if not before:
+            # an elif may need lines of its own before its condition
+            (first, *more) = node.orelse
+            if isinstance(first, ast.If) and not more and lines[0].startswith("if ("):
                 self.lines += [f"}} else {lines[0]}", *lines[1:]]
                 return
             self.lines += ["} else {", *lines]
         self.lines.append("}")
 
     def loop(self, node: ast.For, variable: str) -> None:
-        """Translate for i in range(...) and for element in array."""
+        """Translate for i in range(...)."""
         if {*inside(node.body)} & {*self.assignments[variable]}:
             raise refuse(node.iter, "a loop that changes its own variable")
         match node.iter:
@@ -575,12 +581,6 @@ class Function:
                 self.block(node.body)
                 self.counters.discard(variable)
                 del self.names[variable]
-            case ast.Name(id=array) if len(self.kinds.get(array, REAL).shape) == 1:
-                items = self.value(node.iter)
-                i = self.temporary(INT).text
-                self.lines.append(f"for ({i} = 0; {i} < {items.kind.shape[0]}; {i}++) {{")
-                self.store(node.target, Value(items.text.replace(ROW, i), items.kind.number))
-                self.block(node.body)
             case _:
                 raise refuse(node.iter, "a loop over anything but a range")
         self.lines.append("}")
@@ -658,20 +658,14 @@ class Function:
     def assign(self, target: ast.expr, node: ast.expr) -> None:
         """Assign a value to one target, or to a tuple of them."""
         if not isinstance(target, ast.Tuple | ast.List):
-            if isinstance(node, ast.Call) and self.calls_python(node):
-                self.store(target, self.results_of(node, [target]))
-            else:
-                self.store(target, self.number(node))
+            self.store(target, self.number(node))
             return
         targets = target.elts
-        if isinstance(node, ast.Call) and self.calls_python(node):
-            values = self.results_of(node, targets).items
-        else:
-            value = self.value(node)
-            values = value.elements()
-            if value.kind.of == "memory":
-                self.program.claim(node, len(targets))
-                values = values[: len(targets)]
+        value = self.value(node)
+        values = value.elements()
+        if value.kind.of == "memory":
+            self.program.claim(node, len(targets))
+            values = values[: len(targets)]
         if len(values) != len(targets):
             raise refuse(node, f"{len(targets)} names for {len(values)} numbers")
         held = []  # Python computes all values before the first assignment
@@ -691,6 +685,8 @@ class Function:
         """Assign a value to a name, an element, or a part of an array."""
         if value.items and any(item.kind.shape for item in value.items):
             raise refuse(target, "a tuple of arrays under one name")
+        if isinstance(target, ast.Name) and target.id not in self.read:
+            return
         if isinstance(target, ast.Name):
             place = self.destination(target, value)
         else:
@@ -725,7 +721,7 @@ class Function:
         self.kinds[name] = wider(before or kind, kind)
         self.names[name] = self.named(name)
         if value.sources and kind.shape and kind.fields is None:
-            self.copies.append((name, value.sources, target))
+            self.copies.append((value.sources | {name}, target))
             self.names[name] = self.names[name]._replace(sources=value.sources | {name})
         return self.names[name]
 
@@ -752,11 +748,8 @@ class Function:
 
     # calls of Python functions
 
-    def results_of(self, call: ast.Call, targets: Sequence[ast.expr] = ()) -> Value:
-        """Call a function of Python. Return its result, or a tuple of them.
-
-        Results go directly to those of the targets that are variables and that it does not read.
-        """
+    def results_of(self, call: ast.Call) -> Value:
+        """Call a function of Python. Return its result, or a tuple of them."""
         function = self.callee(call)
         values = [*map(self.argument, call.args)]
         literals = [*map(self.constant, call.args)]
@@ -772,33 +765,21 @@ class Function:
                 return self.kept(value)
             return value
         sources = frozenset[str]().union(*(values[i].sources for i in made.returned))
-        read = self.origins(" ".join(arguments))
         kinds = made.results
-        alone = len(kinds) > 1 and len(targets) != len(kinds) and {*kinds} == {Kind(kinds[0].of)}
-        if alone:
+        alike = len(kinds) > 1 and {*kinds} == {Kind(kinds[0].of)}
+        if alike:  # in one array
             kinds = [Kind(kinds[0].of, (len(kinds),), ())]
-        if len(targets) != len(kinds):
-            targets = [ast.Constant(0)] * len(kinds)
         items = []
-        for kind, target in zip(kinds, targets, strict=True):
-            place = self.receiver(target, kind, read) or self.temporary(kind)
+        for kind in kinds:
+            place = self.temporary(kind)
             arguments.append(place.pointer or f"&{place.text}")
             if kind.shape:
                 place = place._replace(sources=sources)
             items.append(place)
-        if alone:
+        if alike:
             arguments += [f"{items[0].pointer} + {i}" for i in range(1, items[0].kind.shape[0])]
         self.lines.append(f"{name}({', '.join(arguments)});")
         return items[0] if len(items) == 1 else gathered(items)
-
-    def receiver(self, target: ast.expr, kind: Kind, read: set[str]) -> Value | None:
-        """Return the place of a target that a call can write itself."""
-        if not isinstance(target, ast.Name) or self.kinds.get(target.id, kind) != kind:
-            return None
-        if kind.shape and target.id in {*self.parameters, *read}:
-            return None
-        self.kinds[target.id] = kind
-        return self.named(target.id)
 
     def check_changes(self, call: ast.Call, values: list[Value], made: "Function") -> None:
         """Refuse a call that changes an array in a way that C would not."""
@@ -811,8 +792,8 @@ class Function:
                     raise refuse(node, "a part of a matrix, which a function changes,")
             elif values[i].sources:
                 raise refuse(node, "a result that shares its numbers, which a function changes,")
-            others = map(operator.attrgetter("sources"), values[:i] + values[i + 1 :])
-            if values[i].sources & frozenset().union(*others):
+            others = values[:i] + values[i + 1 :]
+            if any(values[i].sources & other.sources for other in others):
                 raise refuse(call, "a call that gets an array twice and changes it")
             within = set(ast.walk(call))
             targets = getattr(self.line, "targets", [])
@@ -1001,10 +982,7 @@ class Function:
             raise refuse(node, "an element")
         places += [ast.Slice()] * (len(shape) - len(places))
         if owner.items:
-            i = self.whole(places[0])
-            if i is not None and -len(owner.items) <= i < len(owner.items):
-                return owner.items[i]
-            owner = self.kept(owner)
+            return owner.items[int(self.index(node, places[0], len(owner.items), False).text)]
         memory = owner.kind.of == "memory"
         strides = [owner.kind.stride]
         if len(shape) == 2:
@@ -1133,13 +1111,10 @@ class Function:
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         parts = []
-        for i, operand in enumerate(node.values):
-            value, lines = self.captured(self.number, operand)
-            if lines and i > 0:
-                raise refuse(node, "an array that is computed within a condition")
+        for operand in node.values:
+            value = self.alone(self.number, operand) if parts else self.number(operand)
             if value.kind != BOOL:
                 raise refuse(node, "`and` or `or` of anything but two comparisons")
-            self.lines += lines
             text = value.text
             if "&&" in text or "||" in text:
                 text = f"({text})"
@@ -1148,25 +1123,15 @@ class Function:
         return Value(sign.join(parts), BOOL, LOOSE)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        text = self.truth(node.test)
-        test = Value(text, BOOL, LOOSE)
-        yes, first = self.captured(self.number, node.body)
-        no, second = self.captured(self.number, node.orelse)
-        is_tuple = yes.kind.fields is not None
-        pairs = [(yes, no)]
-        if is_tuple:
-            pairs = [*zip(yes.elements(), no.elements(), strict=True)]
-        items = [chosen(test, *pair) for pair in pairs]
-        if first or second:
-            items = [self.temporary(item.kind) for item in items]
-            for i, beginning in enumerate(([f"if ({text}) {{", *first], ["} else {", *second])):
-                self.lines += beginning
-                for place, pair in zip(items, pairs, strict=True):
-                    self.fill(place, pair[i])
-            self.lines.append("}")
-        if is_tuple:
-            return gathered(items)
-        return items[0]._replace(sources=yes.sources | no.sources)
+        test = Value(self.truth(node.test), BOOL, LOOSE)
+        yes = self.alone(self.number, node.body)
+        no = self.alone(self.number, node.orelse)
+        if yes.kind.fields is None:
+            return chosen(test, yes, no)._replace(sources=yes.sources | no.sources)
+        items = []
+        for pair in zip(yes.elements(), no.elements(), strict=True):
+            items.append(chosen(test, *pair))
+        return gathered(items)
 
     def _tuple(self, node: ast.Tuple) -> Value:
         return gathered([*map(self.number, node.elts)])

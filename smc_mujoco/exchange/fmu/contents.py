@@ -21,12 +21,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from smc_mujoco.control import units
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.control.units import FORCE, POSITION, SPEED, TIME, Unit
 from smc_mujoco.exchange.c import export
 from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.mechanisms.plant import Plant
@@ -35,29 +33,29 @@ from smc_mujoco.simulation.model import mixer
 
 MAX_DOUBLE = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
-# Input -> its unit and description, in the order of the variables: of every FMU, and of one channel
+# Input -> its description, in the order of the variables: of every FMU, and of one channel
 # or of many joints.
-COMMON_INPUTS: dict[str, tuple[Unit | None, str]] = {
-    "x": (POSITION, "measured position"),
-    "v": (SPEED, "measured velocity"),
-    "r": (POSITION, "reference"),
-    "dr": (SPEED, "first derivative of the reference"),
-    "ddr": (units.ACCELERATION, "second derivative of the reference"),
+COMMON_INPUTS = {
+    "x": "measured position, rad or m",
+    "v": "measured velocity, rad/s or m/s",
+    "r": "reference, rad or m",
+    "dr": "first derivative of the reference",
+    "ddr": "second derivative of the reference",
 }
-CHANNEL_INPUTS: dict[str, tuple[Unit | None, str]] = {
-    "f": (units.ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
-    "g": (units.INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
-    "q": (None, "measured position of the joint without actuator that this one moves"),
-    "dq": (None, "velocity of the joint without actuator"),
-    "fq": (None, "nominal fq of q'' = fq + gq u"),
-    "gq": (None, "nominal gq of q'' = fq + gq u"),
+CHANNEL_INPUTS = {
+    "f": "nominal f of x'' = f + g u, at the measured x and v",
+    "g": "nominal g of x'' = f + g u, at the measured x and v",
+    "q": "measured position of the joint without actuator that this one moves",
+    "dq": "velocity of the joint without actuator",
+    "fq": "nominal fq of q'' = fq + gq u",
+    "gq": "nominal gq of q'' = fq + gq u",
 }
-JOINT_INPUTS: dict[str, tuple[Unit | None, str]] = {
-    "h": (FORCE, "nominal h of M x'' + h = u, at the measured x and v"),
-    "g": (FORCE, "nominal gravity and springs, at the measured x"),
-    "M": (units.INERTIA, "nominal mass matrix of M x'' + h = u, at the measured x"),
-    "C": (units.FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
-    "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
+JOINT_INPUTS = {
+    "h": "nominal h of M x'' + h = u, at the measured x and v",
+    "g": "nominal gravity and springs, at the measured x",
+    "M": "nominal mass matrix of M x'' + h = u, at the measured x",
+    "C": "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric",
+    "J": "nominal Jacobian of the tip, in the world: its velocity is J v",
 }
 # of the nominal model; C and J are what coriolis and jacobian need
 MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}
@@ -78,10 +76,6 @@ SYMBOLS = (  # names that the linker sees
     "smc_errors",
     "smc_actuators",
 )
-# In C, a function's return for a run without the model, and all that follows it.
-UNREACHED = re.compile(
-    r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL
-)
 
 
 class Variable(NamedTuple):
@@ -90,7 +84,6 @@ class Variable(NamedTuple):
     name: str  # in modelDescription.xml
     kind: str  # a smc_kind of smc_fmu.h, such as SMC_INPUT
     description: str  # in words
-    unit: Unit | None = None  # None if it has none, or if that is unknown
     start: float = 0.0
     minimum: float = -math.inf  # the smallest value that can be set
     positive: bool = False  # whether it must be greater than 0
@@ -142,31 +135,31 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     """Return the variables in the order of their value references."""
     places = exported.places
     wanted = inputs(exported)
-    listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
+    listed = [Variable("time", "SMC_CLOCK", "time, s")]
     of_model = JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
-    for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
+    for name, words in {**COMMON_INPUTS, **of_model}.items():
         if name in wanted:
             for index, start in _starts(name, exported).items():
-                listed.append(Variable(name + index, "SMC_INPUT", words, unit, start))
-    computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
+                listed.append(Variable(name + index, "SMC_INPUT", words, start))
+    computed = {"u": "command, within u_max, N or N m", "s": "sliding variable"}
     if exported.surface:
-        computed.append(("v_eq", "acceleration of the error that keeps s constant", None))
+        computed["v_eq"] = "acceleration of the error that keeps s constant"
     if exported.estimator:
-        computed.append(("v_estimated", "estimated velocity", SPEED))
-    for name, words, unit in computed:
+        computed["v_estimated"] = "estimated velocity, rad/s or m/s"
+    for name, words in computed.items():
         for place in places:
-            listed.append(Variable(name + place, "SMC_COMPUTED", words, unit))
+            listed.append(Variable(name + place, "SMC_COMPUTED", words))
     for i in range(exported.actuators):
         words = "command of an actuator, for u"
         listed.append(Variable(f"control[{i + 1}]", "SMC_COMPUTED", words))
-    words = "bound on the magnitude of u"
+    words = "bound on the magnitude of u, N or N m"
     for place, bound in zip(places, exported.u_max, strict=True):
         start = min(bound, MAX_DOUBLE)
-        listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
+        listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, start, 0.0, True))
     for kind, part in exported.parts.items():
         listed += _gains(kind, part, places if kind == "law" else ("",))
-    words = "control period: the law runs this often"
-    listed.append(Variable("dt", "SMC_CONSTANT", words, TIME, exported.period))
+    words = "control period, s: the law runs this often"
+    listed.append(Variable("dt", "SMC_CONSTANT", words, exported.period))
     for kind, (slots, _) in exported.code.items():
         listed += _memory(kind, slots, exported.joints)
     return listed
@@ -208,10 +201,9 @@ def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
 
 def inputs(exported: ExportedLaw) -> set[str]:
     """Return the names of the inputs that the components read, without indices."""
-    texts = []
+    read = set[str]()
     for _, text in exported.code.values():
-        texts.append(text if exported.modelled else UNREACHED.sub(r"\1", text))
-    read = reads("".join(texts))
+        read |= reads(text)
     wanted = {"x", "r", "dr"}
     if exported.estimator is None or "v" in reads(exported.code["estimator"][1]):
         wanted.add("v")
@@ -234,12 +226,10 @@ def reads(code: str) -> set[str]:
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
     """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
     gain = part.template.gains.get(name) if part.template else None
-    unit = None
     minimum = -math.inf
     limits = ""
     positive = False
     if gain:
-        unit = gain.unit_at({key: gain_at(number, 0) for key, number in part.gains.items()})
         positive = gain.positive
         if gain.positive or gain.nonnegative:
             minimum = 0.0
@@ -247,7 +237,7 @@ def parameter(kind: str, part: Component, name: str, value: float, index: str = 
     finite = value if math.isfinite(value) else math.copysign(MAX_DOUBLE, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
     full = f"{kind}.{plain(name)}{index}"
-    return Variable(full, "SMC_PARAMETER", words, unit, finite, minimum, positive)
+    return Variable(full, "SMC_PARAMETER", words, finite, minimum, positive)
 
 
 # C

@@ -5,14 +5,8 @@ import xml.etree.ElementTree as xml
 from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control.units import Unit
 from smc_mujoco.exchange.fmu.contents import OUTPUTS, ExportedLaw, Variable
 
-# Kind of joint -> units of force and position: name, exponents of the base units.
-JOINT_UNITS = {
-    "hinge": (("N.m", {"kg": 1, "m": 2, "s": -2}), ("rad", {"rad": 1})),
-    "slide": (("N", {"kg": 1, "m": 1, "s": -2}), ("m", {"m": 1})),
-}
 # Kind of variable -> causality, variability, initial.
 VARIABLE_ROLES = {
     "SMC_CLOCK": ("independent", "continuous", None),
@@ -24,45 +18,10 @@ VARIABLE_ROLES = {
 }
 
 
-def unit_name(unit: Unit, joint: str) -> str:
-    """Return the name of a unit in FMI, such as N.m.s/rad."""
-    (force, _), (position, _) = JOINT_UNITS[joint]
-    powers = {force: unit.force, position: unit.position, "s": unit.time}
-    above = [_power(name, n) for name, n in powers.items() if n > 0.0]
-    below = []
-    for name, n in powers.items():
-        if n < 0.0:
-            below.append(_power(f"({name})" if "." in name else name, -n))
-    return "/".join([".".join(above) or "1", *below])
-
-
-def _power(name: str, n: float) -> str:
-    """Return a unit to a power."""
-    if n == 1.0:
-        return name
-    if "." in name:
-        return f"({name})^{n:g}"
-    return f"{name}^{n:g}"
-
-
-def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
-    """Return SI base unit -> its exponent in a unit; None if an exponent is not whole."""
-    (_, force), (_, position) = JOINT_UNITS[joint]
-    powers: dict[str, float] = {}
-    for parts, n in ((force, unit.force), (position, unit.position), ({"s": 1}, unit.time)):
-        for name, exponent in parts.items():
-            powers[name] = powers.get(name, 0.0) + n * exponent
-    if any(n != int(n) for n in powers.values()):
-        return None
-    return {name: int(n) for name, n in powers.items() if n}
-
-
 def model_description(
-    listed: Sequence[Variable], exported: ExportedLaw, identifier: str, token: str, joint: str
+    listed: Sequence[Variable], exported: ExportedLaw, identifier: str, token: str
 ) -> str:
-    """Return modelDescription.xml of an FMU for Co-Simulation, with the units of a hinge or a
-    slide.
-    """
+    """Return modelDescription.xml of an FMU for Co-Simulation."""
     root = xml.Element(
         "fmiModelDescription",
         fmiVersion="3.0",
@@ -84,11 +43,6 @@ def model_description(
         hasEventMode="true",
         fixedInternalStepSize=repr(exported.period),
     )
-    units = xml.SubElement(root, "UnitDefinitions")
-    for unit in dict.fromkeys(v.unit for v in listed if v.unit is not None and any(v.unit)):
-        definition = xml.SubElement(units, "Unit", name=unit_name(unit, joint))
-        if (base := base_units(unit, joint)) is not None:
-            xml.SubElement(definition, "BaseUnit", {name: str(n) for name, n in base.items()})
     categories = xml.SubElement(root, "LogCategories")
     xml.SubElement(categories, "Category", name="error", description="why a call failed")
     xml.SubElement(
@@ -97,7 +51,7 @@ def model_description(
     variables = xml.SubElement(root, "ModelVariables")
     structure = xml.SubElement(root, "ModelStructure")
     for reference, variable in enumerate(listed):
-        variables.append(_variable(reference, variable, joint))
+        variables.append(_variable(reference, variable))
     outputs = [str(reference) for reference, variable in enumerate(listed) if is_output(variable)]
     for element in ("Output", "InitialUnknown"):
         for reference in outputs:
@@ -110,7 +64,7 @@ def is_output(variable: Variable) -> bool:
     return variable.name.partition("[")[0] in (*OUTPUTS, "control")
 
 
-def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:
+def _variable(reference: int, variable: Variable) -> xml.Element:
     """Return the element of a variable."""
     causality, variability, initial = VARIABLE_ROLES[variable.kind]
     about = {
@@ -124,8 +78,6 @@ def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:
     }
     if initial is not None:
         about["initial"] = initial
-    if variable.unit is not None and any(variable.unit):
-        about["unit"] = unit_name(variable.unit, joint)
     if math.isfinite(variable.minimum):
         about["min"] = repr(variable.minimum)
     if variable.kind not in ("SMC_CLOCK", "SMC_COMPUTED"):

@@ -24,7 +24,6 @@ import numpy as np
 from smc_mujoco.common.constraints import Each, Number, OneOf, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import no_room, replacing, scratch, with_ending
-from smc_mujoco.common.process import TimedOut
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -38,7 +37,6 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
 FOLDER = Path(__file__).parent
-MIXED_JOINTS = "mixed"  # kind of joints of which some turn and some slide: without units
 FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 COMPILE_TIMEOUT = 120.0  # s
 BOUND = Number(above=0.0, infinite=True)  # on |u| of a joint
@@ -64,7 +62,6 @@ def law_to_fmu(
     control_period: Positive | None = None,
     u_max: float | Sequence[float] | None = None,
     model: Annotated[str, OneOf(names=coerce.MODELS[:2])] | None = None,
-    joint: Annotated[str, OneOf(names=(*description.JOINT_UNITS,))] | None = None,
     joints: int | None = None,
     binary: bool = True,
 ) -> Path:
@@ -74,7 +71,7 @@ def law_to_fmu(
 
     Args:
       law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity,
-        control_period, u_max, model, the number of joints and their units.
+        control_period, u_max, model and the number of joints.
       path: of the .fmu file. Default: the law's name, in the current folder.
       surface: a Surface or its name. None: the law's own, de + c e.
       velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
@@ -84,7 +81,6 @@ def law_to_fmu(
       model: "nominal" gives the FMU the inputs f and g of x'' = f + g u, or those of M, h, g, C and
         J that a law of many joints reads. Default: "nominal" for a law that requires it, else
         "none".
-      joint: "hinge" for the units rad and N m, the default, or "slide" for m and N.
       joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
@@ -105,19 +101,15 @@ def law_to_fmu(
         "joints": joints,
     }
     if isinstance(law, Scenario):
-        law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
-    else:
-        joint = joint or "hinge"
+        law, chosen = law.resolved.law, _of_scenario(law, chosen)
     exported = _exported(law, **chosen)
-    if exported.of_body:
-        joint = MIXED_JOINTS
     identifier = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
     if not identifier[:1].isalpha():
         identifier = f"law_{identifier}".rstrip("_")  # of C
     if path is None:
         path = f"{identifier}.fmu"
     target = with_ending(path, ".fmu")
-    files = _files(exported, identifier, joint)
+    files = _files(exported, identifier)
     if binary:
         files |= _binary(files, identifier)
     with (
@@ -130,11 +122,8 @@ def law_to_fmu(
     return target
 
 
-def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """Return a scenario's arguments of `_exported`, and its kind of joint.
-
-    `chosen`: those that the user gives.
-    """
+def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario's arguments of `_exported`. `chosen`: those that the user gives."""
     if given := [name for name, value in chosen.items() if value is not None]:
         raise ScenarioError(
             f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead"
@@ -153,13 +142,10 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
             f"the scenario has {what}, which an FMU cannot have: give its law, with u_max="
         )
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
-    joint = "slide" if s.plant.unit == "m" else "hinge"
-    if s.law.joint and s.plant.mixed:
-        joint = MIXED_JOINTS
     if s.law.joint:
         plant = s.plant if s.plant.pose else None
-        return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": plant}, joint
-    return own | {"u_max": limits.pop(), "joints": None}, joint
+        return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": plant}
+    return own | {"u_max": limits.pop(), "joints": None}
 
 
 def _exported(
@@ -212,15 +198,9 @@ def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
     return Each(one=BOUND)("u_max", u_max)
 
 
-def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]:
+def _files(exported: ExportedLaw, identifier: str) -> dict[str, str]:
     """Return path in the archive -> text, for all files but the binary."""
     listed = contents.variables(exported)
-    if joint == MIXED_JOINTS:
-        joint = "hinge"  # of which no unit is left but powers of the second
-        for i, variable in enumerate(listed):
-            unit = variable.unit
-            if unit and (unit.force or unit.position):
-                listed[i] = variable._replace(unit=None)
     law = with_head(exported.law, "double", *exported.code["law"], exported.joints)
     files = {
         "controller.c": contents.source(
@@ -232,7 +212,7 @@ def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]
         if kind != "law":
             files[f"{kind}.c"] = contents.component_file(exported.parts[kind], slots, text)
     files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8"), **files}
-    content = "\0".join([*files.values(), contents.header(listed, exported, identifier, ""), joint])
+    content = "\0".join([*files.values(), contents.header(listed, exported, identifier, "")])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
     files["controller.h"] = contents.header(listed, exported, identifier, token)
@@ -240,9 +220,7 @@ def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]
     files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
     files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
     return {
-        "modelDescription.xml": description.model_description(
-            listed, exported, identifier, token, joint
-        ),
+        "modelDescription.xml": description.model_description(listed, exported, identifier, token),
         "sources/buildDescription.xml": description.build_description(compiled, identifier),
         **{f"sources/{name}": text for name, text in files.items()},
     }
@@ -259,7 +237,7 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
     """Return path in the archive -> shared library for this machine, compiled from the sources in
     `files`.
     """
-    (machine, suffix), command = platform_tuple(), build.compiler()
+    machine, suffix = platform_tuple()
     with scratch() as folder:
         sources = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}
         target = folder / "out"
@@ -267,24 +245,12 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
             for name, text in sources.items():
                 (folder / name).write_text(text, encoding="utf-8")
         compiled = [str(folder / name) for name in sources if name.endswith(".c")]
-        try:
-            flags = [*build.LIBRARY_FLAGS, *BINARY_FLAGS]
-            line = [*command, *flags, *compiled, "-o", str(target), "-lm"]
-            done = build.run_compiler(line, COMPILE_TIMEOUT)
-        except TimedOut:
-            raise ScenarioError(
-                f"{command[0]} takes more than {COMPILE_TIMEOUT:g} s to compile the FMU: set "
-                "another compiler in CC, or leave the binary out (binary=False, --no-binary)"
-            ) from None
-        except OSError:
-            raise ScenarioError(
-                f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install "
-                "one, set CC, or leave the binary out (binary=False, --no-binary)"
-            ) from None
+        done = build.compiled(
+            [*BINARY_FLAGS, *compiled], target, "an FMU with a binary", COMPILE_TIMEOUT
+        )
         if done.returncode or not target.exists():
-            lines = [line for line in done.stderr.splitlines() if "error" in line]
-            said = lines[0] if lines else "nothing"
+            said = build.ERROR.search(done.stderr)
             raise ScenarioError(
-                f"the FMU does not compile, {command[0]} says: {said}; set another compiler in CC"
+                f"the FMU does not compile: {said[0] if said else 'set another compiler in CC'}"
             )
         return {f"binaries/{machine}/{identifier}{suffix}": target.read_bytes()}

@@ -11,7 +11,6 @@ hang.
 import dataclasses
 import errno
 import functools
-import gc
 import hashlib
 import itertools
 import keyword
@@ -78,7 +77,6 @@ class FmuLaw(Uncompiled):
     ]  # the FMU's name and the value of inputs that do not change
     parameters: tuple[str, ...]  # the FMU's names of its gains
     period: float | None  # of its steps, s; None for the control period
-    once: bool = False  # whether a process can have only one instance
 
     why = "is an FMU, called from Python: several times slower than a law that compiles"
 
@@ -120,13 +118,6 @@ class FmuLaw(Uncompiled):
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
         names = [theirs for _, theirs in self.inputs]
-        if self.once:
-            gc.collect()  # ends the instances of runs that are over
-            if any(other.law == self for other in _running.values()):
-                raise ScenarioError(
-                    f"FMU {Path(self.path).name!r} can have only one instance in a process, by its "
-                    "description: give a plant of one channel"
-                )
         made = Slave(
             str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t
         )
@@ -235,7 +226,6 @@ def law_from_fmu(
             (key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()
         ),
         parameters=tuple(theirs for theirs, _ in gains.values()),
-        once=bool(about.coSimulation.canBeInstantiatedOnlyOncePerProcess),
         period=_period(about) if period is None else period,
     )
     if isolate:
@@ -297,13 +287,10 @@ def _meanings(
             f"constants={{{first!r}: 0.0}}"
         )
     outputs = _by_name(outs, OUTPUTS, taken, chosen)
-    if not outs:
-        raise ScenarioError(f"{file} has no output: export it with the command as an output")
     if "u" not in outputs and len(outs) != 1:
-        free = next((n for n in outs if n not in outputs.values()), outs[0])
         raise ScenarioError(
-            f"{file} has no output that is named as a command ({', '.join(outs)}): "
-            f"say which it is, as in variables={{'u': {free!r}}}"
+            f"{file} has no output that is named as a command ({', '.join(outs) or 'none'}): "
+            "say which it is, as in variables={'u': 'torque'}"
         )
     outputs.setdefault("u", outs[0])
     types = dict.fromkeys(constants, CONSTANT_TYPES)

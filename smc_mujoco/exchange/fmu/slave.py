@@ -3,10 +3,12 @@ must start quickly.
 """
 
 import math
+import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
+from smc_mujoco.exchange.c.sandbox import double_integrators
 
 REAL_TYPES = ("Real", "Float64", "Float32")  # as in the names of FMPy's functions
 WHOLE_TYPES = ("Integer", "Enumeration", "Int8", "Int16", "Int32", "Int64")
@@ -16,8 +18,6 @@ CONSTANT_TYPES = (*REAL_TYPES, *WHOLE_TYPES, "Boolean")  # types of inputs that 
 CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}
 TRIAL_STEPS = 500
 TRIAL_PERIOD = 1e-3  # s, of a step if the FMU names none
-MAX_POSITION = 3.0  # where the double integrator of a trial stops: a law need not stabilise it
-MAX_COMMAND = 6.0  # bound on u in a trial
 CURE = "fix the FMU, or its inputs and parameters"
 
 
@@ -106,9 +106,9 @@ class Slave:
                 setter = "setInteger" if self.two else "setInt64"
             else:
                 setter = f"set{kind}"
-            pairs = [f"{name} = {value:g}" for name, value in zip(names, typed, strict=True)]
-            what = ", ".join(pairs)
-            self._called(f"setting {what}", getattr(self.fmu, setter), references, typed)
+            self._called(
+                f"setting {', '.join(names)}", getattr(self.fmu, setter), references, typed
+            )
 
     def _get(self, groups: Sequence[Group]) -> list[float]:
         """Return the values of variables in the order of their places."""
@@ -148,23 +148,15 @@ def worker(job: Mapping[str, Any], report: Callable) -> None:
     arithmetic = Arithmetic()
     slave = Slave(job["folder"], list(job["inputs"].values()), job["outputs"], job["fixed"])
     length = job["step"] or TRIAL_PERIOD
-    x = 0.5
-    v = 0.0
+    motion = double_integrators(1, length, random.Random(0))
+    (seen,) = next(motion)
     for k in range(TRIAL_STEPS):
-        report(f"the step from t = {k * length:g} s")
-        t = k * length
-        r = 0.1 * math.sin(t)
-        dr = 0.1 * math.cos(t)
-        seen = {"t": t, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "a": -r}
-        seen |= {"e": x - r, "de": v - dr, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
-        outputs = slave.step([seen.get(name, 0.0) for name in job["inputs"]], t, length)
+        report(f"the step from t = {seen['t']:g} s")
+        inputs = [seen.get(name, 0.0) for name in job["inputs"]]
+        outputs = slave.step(inputs, seen["t"], length)
         if not all(map(math.isfinite, outputs)):
             raise Fault(f"{job['outputs'][0]} is {outputs[0]:g} after {k + 1} steps: {CURE}")
-        v += length * min(max(outputs[0], -MAX_COMMAND), MAX_COMMAND)
-        x += length * v
-        if abs(x) > MAX_POSITION:
-            x = math.copysign(MAX_POSITION, x)
-            v = 0.0
+        (seen,) = motion.send(outputs[:1])
     if arithmetic.changed():
         raise Fault(f"a step {ALTERS}: {CURE}")
     report("termination")

@@ -322,10 +322,10 @@ def both(a):
 def conditions(y, gains, memory):
     if y.e > 1.0:
         u = 1.0
-    elif (both(y.e)[1] if y.de > 0.0 else 0.0) > 0.5:
+    elif both(y.e)[1] > 0.5:
         u = 2.0
     else:
-        u = both(y.e)[0] if y.de > 0.0 else 0.25
+        u = y.de
     if y.e > 2.0:
         u = 7.0
     else:
@@ -334,7 +334,7 @@ def conditions(y, gains, memory):
 
 
 def test_a_condition_that_needs_lines_of_its_own_has_them_within_its_else(folder):
-    """An `else if` before those lines would give 0.25 below e = 1."""
+    """An `else if` before those lines would give de below e = 1."""
     ours = back(folder, conditions())
     theirs = rebuild(conditions().function, lambda g: g)
     for e in (-0.5, 0.2, 0.3, 1.5, 3.0):
@@ -394,6 +394,7 @@ def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
 REFUSED = {
     "u = [y.e, y.de][0]": "List",
     "u = y.e // 2.0": "the operator FloorDiv",
+    "u = both(y.e)[0] if y.de > 0.0 else 0.0": "computed within a condition",
     "u = 'a'": "the value 'a'",
     "u = y.e if y.de else np.sinc(y.e)": "sinc",
     "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
@@ -417,6 +418,7 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
     text = (
         "import numpy as np\nimport smc_mujoco as smc\nTABLE = 1.0, 2.0\n"
         "def halts(a):\n    while a:\n        return a\n"
+        "def both(a):\n    return a, 2.0 * a\n"
         "def again(a):\n    return again(a - 1.0) if a > 0.0 else a\n"
         f"@smc.law_function\ndef strange(y, gains, memory):\n    {line}\n    return u, 0.0\n"
     )

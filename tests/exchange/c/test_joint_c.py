@@ -109,8 +109,8 @@ def turns(y, gains, memory):
         column[:, i] = y.M[i] - column[:, i - 1]
     low, high = ends(column[:, n - 1], gains.all)
     total = 0.0
-    for one in twice:
-        total += one
+    for i in range(n):
+        total += twice[i]
     if norm(y.e) > 0.1 and total < 1e3:
         u = (
             np.where(s > low, np.sqrt(np.abs(s)) * np.sign(s), np.minimum(s, high))
@@ -209,8 +209,8 @@ def parts(y, gains, memory):
     bottom[0] = s
     bottom[1, 1:] = table[1, :-1]
     shift(table[2], Pair(kept[1], q[0]))
-    for one in q:
-        u[-1] += 1e-2 * one
+    for i in range(len(q)):
+        u[-1] += 1e-2 * q[i]
     return u + 0.1 * table[1] - gains.k * table[2], kept
 
 

@@ -28,7 +28,7 @@ pytestmark = needs_compiler
 DOCS = Path(smc.__file__).parents[1] / "docs" / "c.md"
 (MINE,) = re.findall(r"^```c\n(.*?)^```$", DOCS.read_text(), re.MULTILINE | re.DOTALL)
 HEADER = build.HEADER.read_text()
-CALLED = "has another smc_law than smc_mujoco calls: it must be"
+CALLED = "has another smc_law than smc_mujoco calls: the law must be"
 TYPE = (
     "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 )
@@ -311,7 +311,7 @@ def test_what_cannot_be_loaded_is_one_sentence(file):
     for text, words in (
         (
             law("out[0] = y->e return;"),
-            "my_law.c does not compile: line 7, expected ';' before 'return'",
+            "my_law.c does not compile: my_law.c, line 7: expected ';' before 'return'",
         ),
         ("int smc_law(double e, double de) { return e + de; }", f"{CALLED} {TYPE}"),
         ("int my_law(void) { return 0; }", f"has no function smc_law: define {TYPE}"),

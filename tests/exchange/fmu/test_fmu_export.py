@@ -435,24 +435,6 @@ def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
 # description
 
 
-def test_the_units_are_those_of_the_scenario_s_joint(folder):
-    units = {}
-    for plant in ("duffing", "inverted_pendulum"):
-        path = smc.exchange.law_to_fmu(
-            scenario("pid").__class__(plant=plant, law="pid"), folder / f"{plant}.fmu", binary=False
-        )
-        units[plant] = {
-            v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables
-        }
-    assert [units["duffing"][n] for n in ("x", "v", "u", "law.kp")] == ["m", "m/s", "N", "N/m"]
-    assert [units["inverted_pendulum"][n] for n in ("x", "v", "u", "law.kp")] == [
-        "rad",
-        "rad/s",
-        "N.m",
-        "N.m/rad",
-    ]
-
-
 def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
     for call, said in (
         (

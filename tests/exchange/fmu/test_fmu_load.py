@@ -341,7 +341,7 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
                 'name="torque" valueReference="4" causality="output"',
                 'name="torque" valueReference="4"',
             ),
-            "changed.fmu has no output: export it with the command as an output",
+            "changed.fmu has no output that is named as a command (none): say which it is",
         ),
         (
             (
@@ -350,7 +350,7 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
                 '<ScalarVariable name="kraft"',
             ),
             "changed.fmu has no output that is named as a command (s, kraft): "
-            "say which it is, as in variables={'u': 'kraft'}",
+            "say which it is, as in variables={'u': 'torque'}",
         ),
         (
             (
