@@ -26,7 +26,7 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run import cores
-from smc_mujoco.studies import executors
+from smc_mujoco.studies import batches
 from smc_mujoco.studies.study import study
 
 QUICK = "--quick" in sys.argv
@@ -62,7 +62,7 @@ def slices() -> list[list[smc.Scenario]]:
 def plain(scenarios: Sequence[smc.Scenario], threads: int) -> float:
     """Seconds of stepping these plants, in the same batches, without the callback."""
     spent = 0.0
-    for prepared in executors.batches(scenarios):
+    for prepared in batches.batches(scenarios):
         scenario = prepared[0].scenario
         batch = plain_batch(scenario, len(prepared), min(threads, len(prepared)))
         start = time.perf_counter()

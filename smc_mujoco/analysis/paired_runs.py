@@ -3,6 +3,7 @@ which every law ran.
 """
 
 import contextlib
+import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import groups as channel_groups
+from smc_mujoco.metrics.conventions import resolution
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller values of u matter on no machine; chosen
@@ -33,8 +35,8 @@ OTHER_ENTRIES = ("model", "versions")
 
 
 class Columns(Protocol):
-    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at, and
-    every metric.
+    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at,
+    arrived, and every metric.
     """
 
     def column(self, name: str) -> np.ndarray:
@@ -53,6 +55,7 @@ class ByRow(NamedTuple):
     # y', the same at half the physics step: inf for a run that then failed, NaN for none
     halves: np.ndarray
     trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
+    arrived: np.ndarray  # 1.0 for a run that has arrived, else 0.0
 
 
 def is_table(table: object) -> None:
@@ -62,7 +65,8 @@ def is_table(table: object) -> None:
 
 
 def values(table: Columns, metric: str) -> np.ndarray:
-    """Return a metric by row: inf for a failed run, NaN where it does not apply.
+    """Return a metric by row: inf for a failed run, and for one that has not arrived unless the
+    metric is an error; NaN where it does not apply.
 
     "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no
     successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
@@ -78,10 +82,12 @@ def values(table: Columns, metric: str) -> np.ndarray:
     lost = failed(table)
     missing = np.isnan(scores) & ~lost
     lacking = set(plants[missing]) - set(plants[~missing & ~lost])
+    if not CATALOGUE[name].error:
+        lost = lost | ~has_arrived(table)
     scores[lost] = np.inf
     scores[np.isin(plants, list(lacking))] = np.nan
     if metric == SETTLES:
-        return np.isinf(scores).astype(float)
+        return np.where(np.isnan(scores), np.nan, np.isinf(scores))
     return scores
 
 
@@ -93,12 +99,14 @@ def by_row(table: Columns, metric: str) -> ByRow:
         name = metric
     whole = values(table, metric)
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
+    if not CATALOGUE[name].error:
+        halves[_from_json(table, "half_step", "arrived", 1.0) == 0.0] = np.inf
     halves[np.isnan(whole)] = np.nan
     trends = _from_json(table, "trends", name, np.nan)
     if metric == SETTLES:
         halves = np.where(np.isnan(halves), np.nan, np.isinf(halves))
         trends[:] = np.nan
-    return ByRow(whole, halves, trends)
+    return ByRow(whole, halves, trends, has_arrived(table).astype(float))
 
 
 def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndarray:
@@ -110,6 +118,11 @@ def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndar
         numbers = from_json(text) if text else {name: np.nan}
         found.append(numbers.get(name, absent) if numbers else np.inf)
     return np.array(found, float)
+
+
+def has_arrived(table: Columns) -> np.ndarray:
+    """Return which rows are runs that have arrived."""
+    return table.column("arrived") == np.array(True)
 
 
 def failed(table: Columns) -> np.ndarray:
@@ -142,6 +155,7 @@ class Scores(NamedTuple):
     sets: dict[str, np.ndarray]  # as `Group.sets`
     halves: dict[str, np.ndarray]  # as `ByRow.halves`
     trends: dict[str, np.ndarray]  # as `ByRow.trends`
+    arrived: dict[str, np.ndarray]  # as `ByRow.arrived`
 
 
 class Group:
@@ -187,9 +201,10 @@ class Group:
 
     def scores(self, by_row: ByRow) -> Scores:
         """Return the scores of the laws in the blocks in which a metric applies."""
-        cube, halves, trends = (np.where(self.rows >= 0, row[self.rows], np.nan) for row in by_row)
+        cubes = [np.where(self.rows >= 0, row[self.rows], np.nan) for row in by_row]
+        cube = cubes[0]
         if np.isnan(cube).all():
-            return Scores([], {}, {}, {}, {}, {})
+            return Scores([], {}, {}, {}, {}, {}, {})
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
             where = ", ".join(self.name.values())
@@ -202,7 +217,7 @@ class Group:
         blocks = np.flatnonzero(common.any(axis=1))
         kept = np.ix_(np.arange(len(self.laws)), blocks, np.flatnonzero(common.any(axis=0)))
         parts = []
-        for values in (cube, self.outcome, self.sets, halves, trends):
+        for values in (cube, self.outcome, self.sets, *cubes[1:]):
             parts.append(dict(zip(self.laws, values[kept], strict=True)))
         return Scores(blocks.tolist(), *parts)
 
@@ -333,10 +348,7 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     off = np.abs(np.subtract(scenario.resolved.x0, rest))
     start = max((float(off[i]) for group in driven for i in group.channels), default=0.0)  # X0
     least = eps * start
-    seen = max(scenario.noise.position, least)
-    if scenario.sensor:
-        for group in driven:
-            seen = max(seen, scenario.sensor.quantum(group.unit == "rad") / 2)
+    seen = max(least, *(resolution(scenario, group) for group in driven))
     bounds = []
     for bound in scenario.limits:
         if math.isfinite(bound):
@@ -358,3 +370,14 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
         "Hz": 1 / T,
     }
     return by_unit.get(entry.unit, 0.0)
+
+
+def floor_words(scenario: Scenario | None, metric: str) -> str:
+    """Return q in words, such as "the sensor's 0.01 rad"; "" where it is not known."""
+    if not (q := floor(scenario, metric)) or scenario is None:
+        return ""
+    unit = CATALOGUE[metric].unit_in(scenario)
+    whose = "problem"
+    if q > floor(dataclasses.replace(scenario, noise=None, sensor=None), metric):
+        whose = "sensor"
+    return f"the {whose}'s {q:.3g} {unit}"

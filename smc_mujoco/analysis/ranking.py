@@ -40,12 +40,16 @@ grouped into boards. Both are corrected by S. Holm's method (Scandinavian Journa
 - Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly
   called better than another is at most 5 %, in addition to that of a wrong winner.
 
+Below the floor. A law is below q in a block if its high values are at most q in more than half of
+its units. Two laws below q are not ranked: neither is better, and they have no least visible lead.
+If only one is, its lead is at least the median of the rival's low values over q.
+
 No winner. Two laws are level only if there are 12 units or more and the interval of their ratio, at
 the pairs' level, lies within 10 %. Otherwise one cannot tell, and `least_visible_lead` says which
 lead would have been seen.
 
-A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such
-runs come first.
+A law with a run that failed, has no value, or has not arrived (`metrics.catalogue.arrived`) wins
+nothing. In every order the laws with fewer runs without a value come first.
 
 A law is among the best if no other is better. One exception: where another law's median is
 relevantly lower, and two laws have too few units for any verdict, the law is undecided, and not
@@ -54,6 +58,7 @@ among the best.
 
 import copy
 import functools
+import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, NamedTuple
@@ -72,12 +77,12 @@ Relevant = Annotated[float, Number(low=0.0, high=0.5)]
 TREND_POWER = 5
 LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
 MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
-MAX_WIDENING = 1e3  # of a logarithm: more than the range of floating-point numbers, but finite
+MAX_LOG = 1e6  # of a logarithm: more than the range of floating-point numbers, but finite
 # of log rho: a value that has vanished within the last fifth of a run has fallen enough
 MAX_RISE = 60.0
 POWER = 0.8  # with which the least visible lead is seen
-# median of the absolute difference of two draws from a normal law, over its standard deviation
-NORMAL_SPREAD = 0.954
+LEAD_RESAMPLES = 400  # for the least visible lead; chosen
+MAX_SUMS = 10_000_000  # of pairs, in memory at once
 
 
 class Rank(NamedTuple):
@@ -98,6 +103,7 @@ class Effect(NamedTuple):
     ahead: int  # number of units in which the law is better by more than what is relevant
     samples: int  # number of units
     sets: bool  # whether the units are sets of gains; otherwise they are seeds
+    below: bool = False  # whether the law is below the floor and the rival is not
 
 
 class Limits(NamedTuple):
@@ -122,6 +128,7 @@ class Comparison:
       sets: a number per run, equal if two seeds had the same gains. Default: all had.
       relevant: r.
       halves, trends: y' and rho of each run, NaN where they are not known. Default: nowhere.
+      arrived: whether each run has arrived. Default: all have.
       first_order: whether the integrator of all blocks, or of each, is of first order.
     """
 
@@ -136,6 +143,7 @@ class Comparison:
         relevant: Relevant = RELEVANT,
         halves: Mapping[str, ArrayLike] | None = None,
         trends: Mapping[str, ArrayLike] | None = None,
+        arrived: Mapping[str, ArrayLike] | None = None,
         first_order: ArrayLike = False,
     ):
         self.laws = tuple(sorted(scores))
@@ -152,7 +160,7 @@ class Comparison:
         results = self._cube(outcomes or own, np.int64)
         self.floors = np.broadcast_to(np.asarray(floors, float), blocks)
         self.first_order = np.broadcast_to(np.asarray(first_order, bool), blocks)
-        low, high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
+        self.low, high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
         if shares:
             plain = self.cells
             self.beyond = relevant  # what d must exceed
@@ -160,6 +168,10 @@ class Comparison:
             plain = _logarithms(self.cells, self.floors)
             self.beyond = -math.log1p(-relevant)
         ran = ~np.isnan(self.cells[0])
+        self.away = np.isinf(self.cells)  # runs that failed, have no value or have not arrived
+        if arrived:
+            self.away |= self._cube(arrived, float) == 0.0
+        self.below = np.zeros((count, blocks), bool)  # whether a law is below the floor
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
         # d of the first law over the second by unit, then NaN; and without halves and trends
         self.leads = np.full((blocks, count, count, seeds), math.nan)
@@ -167,16 +179,22 @@ class Comparison:
         for k in range(blocks):
             for a in range(count):
                 self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
+                if self.floors[k] > 0.0 and not shares:
+                    own = linked(gains[a, k, ran[k]])
+                    of_units = _by_unit(high[a, k, ran[k]], own, seeds)
+                    under = of_units[~np.isnan(of_units)] <= math.log(self.floors[k])
+                    self.below[a, k] = 2 * under.sum() > under.size
                 for b in range(a):
                     first = first_of_kind(results[[a, b], k][:, None], ran[[k]])[0]
                     units = linked(gains[a, k, first], gains[b, k, first])
                     for i, j in ((a, b), (b, a)):
-                        charged = _difference(low[j, k], high[i, k])[first]
+                        charged = _difference(self.low[j, k], high[i, k])[first]
                         self.leads[k, i, j] = _by_unit(charged, units, seeds)
                         as_run = _difference(plain[j, k], plain[i, k])[first]
                         self.plain[k, i, j] = _by_unit(as_run, units, seeds)
         # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
         self.p = p_values(self.leads - self.beyond)
+        self.p[self.unranked] = 1.0
         self.limits = corrected_limits([self])  # of the p-values, after the correction
 
     def _cube(self, by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
@@ -197,6 +215,11 @@ class Comparison:
             return np.nanmean(self.cells, axis=2)
         return middle(self.cells)
 
+    @property
+    def unranked(self) -> np.ndarray:
+        """Whether two laws are both below the floor, (blocks, laws, laws)."""
+        return self.below.T[:, :, None] & self.below.T[:, None, :]
+
     @functools.cached_property
     def without_value(self) -> np.ndarray:
         """The number of runs that failed or have no value, (laws, blocks); 0 for shares."""
@@ -214,8 +237,8 @@ class Comparison:
 
     @functools.cached_property
     def _eligible(self) -> np.ndarray:
-        """Whether a law has no more runs without a value than another, (blocks, laws, laws)."""
-        lacking = self.without_value.T
+        """Whether a law has no more runs `away` than another, (blocks, laws, laws)."""
+        lacking = self.away.sum(axis=2).T
         return lacking[:, :, None] <= lacking[:, None, :]
 
     @functools.cached_property
@@ -224,7 +247,7 @@ class Comparison:
         winners = []
         itself = np.eye(len(self.laws), dtype=bool)
         beats = (self.p <= self.limits.winner) & self._eligible
-        wins = np.all(beats | itself, axis=2) & (self.without_value.T == 0)
+        wins = np.all(beats | itself, axis=2) & ~self.away.any(axis=2).T
         for block in wins:
             winners.append(self.laws[int(block.argmax())] if block.any() else None)
         if len(self.laws) == 1:
@@ -249,10 +272,10 @@ class Comparison:
 
     @property
     def beaten(self) -> np.ndarray:
-        """Whether another law is better, or a run of the law failed or has no value, (laws,
-        blocks).
+        """Whether another law is better, or a run of the law failed, has no value or has not
+        arrived, (laws, blocks).
         """
-        return self.worse | (self.without_value > 0)
+        return self.worse | self.away.any(axis=2)
 
     @property
     def level(self) -> np.ndarray:
@@ -265,6 +288,7 @@ class Comparison:
             margin = -math.log1p(-LEVEL_SHARE)
         within = p_values(self.leads + margin) <= self.limits.pair
         level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS)
+        level &= ~(self.below.T[:, :, None] | self.below.T[:, None, :])
         return level | np.eye(len(self.laws), dtype=bool)
 
     @property
@@ -295,6 +319,11 @@ class Comparison:
             low = np.exp(interval(self.leads[block, b, a], error)[1])
             high = np.exp(-interval(leads, error)[1])
             value = np.exp(-interval(self.plain[block, a, b], error)[0])
+        below = bool(self.below[a, block] and not self.below[b, block])
+        if below:
+            low = 0.0
+            high = math.exp(math.log(self.floors[block]) - np.nanmedian(self.low[b, block]))
+            value = high
         return Effect(
             value=float(np.clip(value, low, high)),
             low=float(low),
@@ -302,15 +331,18 @@ class Comparison:
             ahead=int((leads > self.beyond).sum()),
             samples=int(self.samples[block, a, b]),
             sets=bool(self.sets[[a, b], block].max() > 1),
+            below=below,
         )
 
     def visible(self, block: int, law: str, rival: str) -> float:
         """Return the least lead of a law over a rival that is seen with a probability of 80 %, as a
-        share.
+        share; NaN if one of them is below the floor.
 
         It makes up for what half the step and trends charge, too.
         """
         at = block, self.laws.index(law), self.laws.index(rival)
+        if self.below[list(at[1:]), block].any():
+            return math.nan
         lead = least_visible_lead(self.leads[at], self.limits.first, self.relevant)
         charged = _difference(self.plain[at], self.leads[at])
         known = charged[np.isfinite(charged)]
@@ -349,7 +381,7 @@ def bounds(
     half = _logarithms(halves, np.zeros(len(floors)))
     change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
     # of a law in a block, for its runs that were not repeated
-    widening = np.minimum(np.nan_to_num(middle(change)), MAX_WIDENING)[..., None]
+    widening = np.minimum(np.nan_to_num(middle(change)), MAX_LOG)[..., None]
     with np.errstate(divide="ignore"):
         rise = np.log(middle(trends))[..., None]
     matters = np.abs(rise) > (relevant or RELEVANT)
@@ -395,30 +427,32 @@ def least_visible_lead(leads: ArrayLike, error: float, relevant: float = RELEVAN
     """Return the least lead that the test sees with a probability of 80 %, as a share; 1 if it can
     see none.
 
-    With n units whose d (n,) have the standard deviation s, and t(p) exceeded with probability p by
-    Student's law,
+    Let c be the n units' d about their centre, times sqrt(n / (n - 1)), and low and high the ends
+    of the signed-rank interval of n draws from c, at `error`. The test sees a lead l of these draws
+    if low + l > -log(1 - r). With Q the quantile of 80 % over 400 resamples,
 
-        L = 1 - (1 - r) exp( -(t(error) + t(0.2)) s sqrt(pi / 3n) )
+        L = 1 - (1 - r) exp( -max(0, Q[-low], Q[high]) )
 
-    The factor is that of the signed ranks' efficiency under a normal law. s is the median of |d_i -
-    d_j| over 0.954.
+    The seed of the resamples follows from the units, so that L is always the same.
 
     Args:
       leads: d of the units, NaN for none.
       error: one-sided level of the first step of Holm's method.
       relevant: r.
     """
-    from scipy.special import stdtrit
-
-    known = np.asarray(leads, float)
-    known = known[~np.isnan(known)]
+    known = _finite(leads)
     n = known.size
     if n < 2 or min_p(n) > error:
         return 1.0
-    i, j = np.triu_indices(n, 1)
-    spread = float(np.median(np.abs(_difference(known[i], known[j])))) / NORMAL_SPREAD
-    quantiles = stdtrit(n - 1, 1.0 - error) + stdtrit(n - 1, POWER)
-    return 1.0 - (1.0 - relevant) * math.exp(-quantiles * spread * math.sqrt(math.pi / (3 * n)))
+    centred = math.sqrt(n / (n - 1)) * (known - interval(known, error)[0])
+    seed = int.from_bytes(hashlib.sha256(known.tobytes()).digest()[:8])
+    drawn = np.random.default_rng(seed).integers(n, size=(LEAD_RESAMPLES, n))
+    needed = []
+    for indices in np.array_split(drawn, 1 + drawn.size * n // MAX_SUMS):
+        low, high = _ends(centred[indices], error)
+        needed.append([-low, high])
+    least = np.quantile(np.concatenate(needed, axis=1), POWER, axis=1)
+    return 1.0 - (1.0 - relevant) * math.exp(-max(0.0, *least.tolist()))
 
 
 def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
@@ -495,6 +529,7 @@ def ranks(comparison: Comparison) -> list[Rank]:
     centres = comparison.centres
     behind = lacking[:, None] > lacking
     larger = exceeds(centres[:, None], centres, comparison.floors, comparison.relevant)
+    larger &= ~comparison.unranked.transpose(1, 2, 0)
     behind |= (lacking[:, None] == lacking) & larger
     by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
     means = by_block.mean(axis=1).tolist()
@@ -557,21 +592,29 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
     The true centre lies beyond each end with probability `error`. Ends are infinite if the sample
     is too small.
     """
-    known = np.asarray(differences, float)
-    known = known[~np.isnan(known)]
-    n = known.size
-    if not n:
+    known = _finite(differences)
+    if not known.size:
         return math.nan, math.nan, math.nan
-    i, j = np.triu_indices(n)
-    with np.errstate(invalid="ignore"):
-        means = (known[i] + known[j]) / 2  # NaN of two opposite infinite values
-    value = float(np.median(np.nan_to_num(means, nan=0.0, posinf=math.inf, neginf=-math.inf)))
-    enough = np.flatnonzero(_tail(n, np.arange(means.size + 1)) <= error)
+    i, j = np.triu_indices(known.size)
+    low, high = _ends(known[None], error)
+    return float(np.median(known[i] + known[j])) / 2, float(low[0]), float(high[0])
+
+
+def _finite(differences: ArrayLike) -> np.ndarray:
+    """Return the differences that are known, with finite numbers in place of infinite ones."""
+    known = np.asarray(differences, float)
+    return np.clip(known[~np.isnan(known)], -MAX_LOG, MAX_LOG)
+
+
+def _ends(samples: np.ndarray, error: float) -> np.ndarray:
+    """Return the ends of the intervals of samples (m, n), as (2, m); infinite if n is too small."""
+    i, j = np.triu_indices(samples.shape[1])
+    enough = np.flatnonzero(_tail(samples.shape[1], np.arange(i.size + 1)) <= error)
     if not enough.size:
-        return value, -math.inf, math.inf
-    low = np.sort(np.where(np.isnan(means), -math.inf, means))[means.size - enough[0]]
-    high = np.sort(np.where(np.isnan(means), math.inf, means))[enough[0] - 1]
-    return value, float(low), float(high)
+        return np.array([[-math.inf], [math.inf]]).repeat(len(samples), axis=1)
+    at = i.size - enough[0], enough[0] - 1
+    sums = np.partition(samples[:, i] + samples[:, j], at, axis=1)
+    return sums[:, at].T / 2
 
 
 def min_p(n: int) -> float:

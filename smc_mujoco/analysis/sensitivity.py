@@ -21,10 +21,10 @@ from smc_mujoco.simulation.scenario import Scenario
 
 RESAMPLES = 499  # of a bootstrap: chosen
 CHANCE = "chance"  # the axis of what is drawn in a run
-CUTS = tuple(i / 8 for i in range(1, 8))  # shares of an axis at which a region may end: chosen
-MIN_REGION_RUNS = 8  # in a region: fewer tell no rate; chosen
+CUTS = tuple(i / 16 for i in range(1, 16))  # shares of an axis at which a region may end: chosen
+MIN_REGION_RUNS = 3  # in a region, and outside; chosen
 MAX_REGIONS = 3
-BETTER_SHARE = 0.5  # of an axis, to which it may be narrowed: chosen
+REGION_ERROR = 0.01  # probability with which runs that fail by chance have a region; chosen
 WORDS = {"bound": "u_max", "period": "control period"}
 
 
@@ -41,11 +41,12 @@ class Axis(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """A bound on one axis."""
+    """Bounds on one axis, as shares of its range: a lower one, an upper one, or both."""
 
     axis: int  # index
-    above: bool  # whether values above the bound are within, or those below it
-    share: float  # of the axis's range at which it lies
+    low: float = 0.0
+    high: float = 1.0
+    outside: bool = False  # whether values beyond the bounds are within, or those between them
 
 
 class Region(NamedTuple):
@@ -59,20 +60,22 @@ class Region(NamedTuple):
 
 
 class Improvement(NamedTuple):
-    """The axis whose narrowing to one half improves the score most, in runs that did not choose
-    it.
+    """The axis whose narrowing to one half, lower, upper or middle, leaves the fewest failures, and
+    of these the best median, in runs that did not choose it.
     """
 
     half: Cut
     median: float  # of the score within that half
     before: float  # median of the score over the whole range
+    failed: float  # share of the runs within that half
+    failed_before: float  # share over the whole range
 
 
 class Space:
     """The axes of a class around a scenario: its constants, levels of what is drawn, and chance."""
 
-    def __init__(self, scenario: Scenario, over: Uncertainty):
-        self.members = members = Members([scenario], over)
+    def __init__(self, scenario: Scenario, within: Uncertainty):
+        self.members = members = Members([scenario], within)
         unit = scenario.plant.units[0]
         self.names: list[str] = []
         self.columns: list[Constant | None] = []
@@ -86,13 +89,13 @@ class Space:
         for constant in members.constants:
             add(constant.name, *constant.bounds, constant.unit, constant)
         if members.forced:
-            add("disturbance", 0.0, over.disturbance, scenario.plant.efforts[0])
-        if over.position_noise:
-            add("noise", 0.0, over.position_noise, unit)
-        elif over.velocity_noise:
-            add("noise", 0.0, over.velocity_noise, f"{unit}/s")
+            add("disturbance", 0.0, within.disturbance, scenario.plant.efforts[0])
+        if within.position_noise:
+            add("noise", 0.0, within.position_noise, unit)
+        elif within.velocity_noise:
+            add("noise", 0.0, within.velocity_noise, f"{unit}/s")
         levels = len(self.names) > len(members.constants)
-        if levels or over.jitter > 0.0 or _random(scenario):
+        if levels or within.jitter > 0.0 or _random(scenario):
             add(CHANCE, math.nan, math.nan, "")
 
     def scenario_at(self, shares: np.ndarray) -> Scenario:
@@ -253,7 +256,9 @@ def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
     """Return which points lie within all cuts, (N,)."""
     sides = []
     for cut in cuts:
-        sides.append((shares[:, cut.axis] > cut.share) == cut.above)
+        place = shares[:, cut.axis]
+        between = (place > cut.low) & (place <= cut.high)
+        sides.append(between != cut.outside)
     if sides:
         return np.logical_and.reduce(sides)
     return np.ones(len(shares), bool)
@@ -262,32 +267,36 @@ def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
 def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region]:
     """Return regions where runs fail, chosen by the first half of the points and told by the
     second.
+
+    A region has a bound on one side of an axis, on two of them, or two bounds on one axis, between
+    or beyond which it lies.
     """
     half = len(failed) // 2
     found = []
     left = np.ones(len(failed), bool)  # not in a region yet
     axes = [i for i, name in enumerate(space.names) if name != CHANCE]
-    single = []
+    single: list[tuple[Cut, ...]] = []
+    double: list[tuple[Cut, ...]] = []
     for i in axes:
-        for above in (False, True):
-            for share in CUTS:
-                single.append((Cut(i, above, share),))
-    pairs = []
-    for one, other in itertools.combinations(single, 2):
+        for share in CUTS:
+            single += [(Cut(i, low=share),), (Cut(i, high=share),)]
+        for low, high in itertools.combinations(CUTS, 2):
+            double += [(Cut(i, low, high),), (Cut(i, low, high, outside=True),)]
+    coarse = single[2::4] + single[3::4]  # every other share
+    for one, other in itertools.combinations(coarse, 2):
         if one[0].axis != other[0].axis:
-            pairs.append(one + other)
+            double.append(one + other)
+    prices = dict.fromkeys(single, 1) | dict.fromkeys(double, 2)
     while len(found) < MAX_REGIONS and failed[:half].any():
         chooses = left[:half]
-        sides = {cuts: _within(cuts, shares[:half])[chooses] for cuts in (*single, *pairs)}
-        gains = {
-            cuts: _gain(inside, failed[:half][chooses], len(cuts)) for cuts, inside in sides.items()
-        }
+        gains = {}
+        for cuts, price in prices.items():
+            inside = _within(cuts, shares[:half])[chooses]
+            gains[cuts] = _gain(inside, failed[:half][chooses], price)
         cuts = max(gains, key=gains.__getitem__)
         told = _within(cuts, shares) & left
         told[:half] = False
-        if gains[cuts] <= math.log(len(gains)) or not _confirmed(
-            failed[half:], told[half:], left[half:]
-        ):
+        if gains[cuts] <= 0.0 or not _more_fail(failed[half:], told[half:], left[half:]):
             break
         left &= ~_within(cuts, shares)
         rest = left.copy()
@@ -296,7 +305,7 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
     return found
 
 
-def _confirmed(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
+def _more_fail(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
     """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact
     test.
     """
@@ -305,7 +314,7 @@ def _confirmed(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool
     counts = []
     for side in (within, left & ~within):
         counts.append([int((failed & side).sum()), int((~failed & side).sum())])
-    return float(np.asarray(fisher_exact(counts, "greater"))[1]) < 1.0 - LEVEL
+    return float(np.asarray(fisher_exact(counts, "greater"))[1]) < REGION_ERROR
 
 
 def _rate(failed: np.ndarray) -> Interval:
@@ -314,7 +323,7 @@ def _rate(failed: np.ndarray) -> Interval:
     )._replace(n=len(failed))
 
 
-def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
+def _gain(within: np.ndarray, failed: np.ndarray, bounds: int) -> float:
     """Return how well a region where more fail explains failures: the gain in log likelihood less
     BIC's price.
     """
@@ -323,7 +332,7 @@ def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
     if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
         return 0.0
     parts = [failed[within], failed[~within]]
-    return sum(map(_log_likelihood, parts)) - _log_likelihood(failed) - cuts * math.log(n)
+    return sum(map(_log_likelihood, parts)) - _log_likelihood(failed) - bounds * math.log(n)
 
 
 def _log_likelihood(failed: np.ndarray) -> float:
@@ -332,32 +341,47 @@ def _log_likelihood(failed: np.ndarray) -> float:
     return sum(count * math.log(count / n) for count in (k, n - k) if count)
 
 
-def improvement(space: Space, shares: np.ndarray, values: np.ndarray) -> Improvement | None:
-    """Return the half of an axis with the best median, chosen by half of the points and told by the
-    others.
+def improvement(
+    space: Space, shares: np.ndarray, values: np.ndarray, failed: np.ndarray
+) -> Improvement | None:
+    """Return the half of an axis with the fewest failures and then the best median, chosen by half
+    of the points and told by the others.
 
-    None if the others do not show that it is better (H. B. Mann & D. R. Whitney's test).
+    None if the others do not show that more runs fail beyond it, or that the score is better within
+    (H. B. Mann & D. R. Whitney's test).
     """
     from scipy.stats import mannwhitneyu
 
     half = len(values) // 2
-    axes = [i for i, name in enumerate(space.names) if name != CHANCE]
     halves = []
-    for i in axes:
-        for above in (False, True):
-            halves.append(Cut(i, above, BETTER_SHARE))
+    for i, name in enumerate(space.names):
+        if name != CHANCE:
+            halves += [Cut(i, high=0.5), Cut(i, low=0.5), Cut(i, 0.25, 0.75)]
+
+    def rank(cut: Cut) -> tuple[float, float]:
+        inside = _within([cut], shares[:half])
+        return float(failed[:half][inside].mean()), float(np.median(values[:half][inside]))
+
+    halves = [cut for cut in halves if _within([cut], shares[:half]).any()]
     if not halves:
         return None
-    best = min(
-        halves, key=lambda cut: float(np.median(values[:half][_within([cut], shares[:half])]))
-    )
+    best = min(halves, key=rank)
     told = values[half:]
+    fails = failed[half:]
     within = _within([best], shares[half:])
     if not 0 < within.sum() < len(told):
         return None
-    if mannwhitneyu(told[within], told[~within], alternative="less").pvalue > 1 - LEVEL:
-        return None
-    return Improvement(best, float(np.median(told[within])), float(np.median(told)))
+    if not _more_fail(fails, ~within, np.ones(len(told), bool)):
+        better = mannwhitneyu(told[within], told[~within], alternative="less").pvalue
+        if better > 1 - LEVEL or fails[within].mean() > fails.mean():
+            return None
+    return Improvement(
+        best,
+        float(np.median(told[within])),
+        float(np.median(told)),
+        float(fails[within].mean()),
+        float(fails.mean()),
+    )
 
 
 def in_words(name: str) -> str:

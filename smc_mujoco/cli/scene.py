@@ -1,11 +1,12 @@
 """Running a scene: from its declaration to printed scores, traces, figures and a film."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.text import Text
 
-from smc_mujoco.analysis.step_halving import halved, nudged
+from smc_mujoco.analysis.step_halving import repetitions
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
@@ -34,14 +35,14 @@ def perform(
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the
     folder `out`.
 
-    Runs are `repeated` at half the physics step, and from a nudged start: what then differs is
-    marked.
+    Runs are `repeated` at half the physics step, from a nudged start and so on: what then differs
+    is marked.
     """
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
     out.mkdir(parents=True, exist_ok=True)
     traces = simulate(scene, threads)
-    again = repeat(scene, threads) if repeated else {}
+    again = repeat(traces, threads) if repeated else {}
     for condition, runs in traces.items():
         title = _title(scene, condition)
         others = again.get(condition)
@@ -86,14 +87,13 @@ def simulate(scene: Scene, threads: int | None) -> Traces:
     return traces
 
 
-def repeat(scene: Scene, threads: int | None) -> dict[str, dict[str, list[Trace]]]:
-    """Return condition -> label -> the run at half the physics step, and from a nudged start."""
+def repeat(traces: Traces, threads: int | None) -> dict[str, dict[str, list[Trace]]]:
+    """Return condition -> label -> the `repetitions` of the run."""
     changed: list[tuple[str, str, Scenario]] = []
-    for condition, label, scenario in scene.runs():
-        try:
-            changed += [(condition, label, halved(scenario)), (condition, label, nudged(scenario))]
-        except ScenarioError:  # its step cannot be halved
-            continue
+    for condition, runs in traces.items():
+        for label, trace in runs.items():
+            with contextlib.suppress(ScenarioError):  # its step cannot be halved
+                changed += [(condition, label, again) for again in repetitions(trace)]
     made: dict[str, dict[str, list[Trace]]] = {}
     for (condition, label, _), trace in zip(
         changed, run([s for *_, s in changed], threads, progress=True), strict=True

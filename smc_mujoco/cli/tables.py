@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.step_halving import StepChange
 
 T = TypeVar("T")
-# label -> the same run at half the physics step, and from a nudged start
+# label -> the same run again, as `step_halving.repetitions` has it
 Again = Mapping[str, Sequence[Trace]]
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),

@@ -134,7 +134,10 @@ def _border(
     ends = [list(ax.get_xlim()), list(ax.get_ylim())]
     for cut in cuts:
         k = at.index(cut.axis)
-        ends[k][not cut.above] = factors[k] * space.value(cut.axis, cut.share)
+        if cut.low > 0.0:
+            ends[k][0] = factors[k] * space.value(cut.axis, cut.low)
+        if cut.high < 1.0:
+            ends[k][1] = factors[k] * space.value(cut.axis, cut.high)
     (left, right), (low, high) = ends
     border = Rectangle(
         (left, low),

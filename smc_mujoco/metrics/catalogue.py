@@ -15,6 +15,8 @@ import numpy as np
 
 from smc_mujoco.metrics import conventions, limit_cycle
 from smc_mujoco.metrics.conventions import (
+    ARRIVAL_BAND,
+    ARRIVAL_COUNTS,
     CATALOGUE,
     ROUNDING,
     SETTLING_BAND,
@@ -26,7 +28,9 @@ from smc_mujoco.metrics.conventions import (
     last_part,
     metric,
     refuse,
+    resolution,
     scale,
+    travels,
 )
 
 if TYPE_CHECKING:
@@ -73,6 +77,24 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     }
 
 
+def arrived(trace: Trace) -> bool:
+    """Return whether a run has arrived, see `conventions`; False if it diverged or failed."""
+    if trace.failure is not None or trace.diverged_at is not None:
+        return False
+    for group, part in conventions.by_group(trace).items():
+        off = error(part)
+        largest = scale(part)
+        if travels(part):
+            speed = np.gradient(part.r, part.t, axis=0)
+            off = part.v - speed
+            largest = np.abs(speed).max()
+        band = max(ARRIVAL_BAND * largest, ARRIVAL_COUNTS * resolution(trace.scenario, group))
+        # NaN, too, has not arrived
+        if not np.abs(off[last_part(part)]).max() <= band:
+            return False
+    return True
+
+
 def trends(trace: Trace) -> dict[str, float]:
     """Return name -> rho of the metrics of the last part: their value over that of the run without
     its last fifth.
@@ -100,13 +122,15 @@ def trends(trace: Trace) -> dict[str, float]:
     return found
 
 
-@metric("s", need="fast")
+@metric("s", need="fast", error=True)
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
     Last exit of max_i |e_i| from 2 % of the scale. The time counts from t[0], even if r steps
-    later.
+    later. NaN where the reference travels, as in a speed loop: no time is known for that.
     """
+    if travels(trace):
+        return np.nan
     return last_exit(
         trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace)
     )
@@ -166,7 +190,7 @@ def steady_error(trace: Trace) -> float:
     return np.abs(error(trace)[last_part(trace)].mean(axis=0)).max()
 
 
-@metric("{x}", need="accurate", late=True)
+@metric("{x}", need="accurate", late=True, error=True)
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
     return np.abs(error(trace)[last_part(trace)]).max()
@@ -178,7 +202,7 @@ def ripple(trace: Trace) -> float:
     return np.ptp(error(trace)[last_part(trace)], axis=0).max()
 
 
-@metric("{x}", label="rms error")
+@metric("{x}", label="rms error", error=True)
 def rms_error(trace: Trace) -> float:
     """Root mean square of e from a quarter of the run on, worst channel.
 
@@ -189,19 +213,19 @@ def rms_error(trace: Trace) -> float:
     return np.sqrt((error(trace)[late] ** 2).mean(axis=0)).max()
 
 
-@metric("({x})^2 s", label="ISE")
+@metric("({x})^2 s", label="ISE", error=True)
 def ise(trace: Trace) -> float:
     """Integral of e^2 dt, summed over the channels (trapezoid)."""
     return np.trapezoid((error(trace) ** 2).sum(axis=1), trace.t)
 
 
-@metric("{x} s", label="IAE")
+@metric("{x} s", label="IAE", error=True)
 def iae(trace: Trace) -> float:
     """Integral of |e| dt, summed over the channels (trapezoid)."""
     return np.trapezoid(np.abs(error(trace)).sum(axis=1), trace.t)
 
 
-@metric("{x} s^2", label="ITAE", need="on-track")
+@metric("{x} s^2", label="ITAE", need="on-track", error=True)
 def itae(trace: Trace) -> float:
     """Integral of (t - t0) |e| dt, summed over the channels (trapezoid)."""
     since = trace.t - trace.t[0]

@@ -23,6 +23,12 @@ project:
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which
   a signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is
   outside.
+- arrived: in the last part |e| of every group is at most 10 % of its scale, or 5 times what its
+  sensor tells apart if that is larger. Boards name no winner that has not arrived, and only a run
+  that has arrived has metrics other than errors.
+- travelling: r of a channel is a straight line throughout the last part and does not rest, as in a
+  speed loop. Such a run has no settling time, and it arrives by its speed: |v - r'| is at most 10 %
+  of the largest |r'|.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
 - approach: the part of one channel's run towards one reference. It begins at t[0], and again at
   each sample at which r has jumped by more than the settling band; the side it comes from is the
@@ -57,6 +63,9 @@ if TYPE_CHECKING:
 
 SETTLING_BAND = 0.02  # of the scale
 LAST_PART = 0.2  # of the run's duration
+ARRIVAL_BAND = 0.1  # of the scale
+ARRIVAL_COUNTS = 5.0  # of what the sensor tells apart
+STRAIGHT = 1e-6  # of the steps of a reference: so little may they differ on a straight line
 ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
 # the law's; it follows from that of x, so that metres and radians do not mix
 UNIT_OF_S = "unit of s"
@@ -137,6 +146,8 @@ class Metric:
     realistic: bool = False
     command: bool = False  # whether it is computed from u or s, which free joints do not have
     late: bool = False  # whether it is of the last part alone, so that it has a trend, see `trends`
+    # whether it is of the size of the error, so that a run that has not arrived has a large one
+    error: bool = False
     # Value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN
     absent: float = math.nan
 
@@ -301,6 +312,24 @@ def last_part(trace: Trace) -> slice:
     return slice(
         int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None
     )
+
+
+def travels(trace: Trace) -> bool:
+    """Return whether a channel's reference travels, see the module's conventions."""
+    steps = np.abs(np.diff(trace.r[last_part(trace)], axis=0))
+    if not steps.size:
+        return False
+    straight = np.ptp(steps, axis=0) <= STRAIGHT * steps.max(axis=0)
+    return bool(np.any(straight & (steps.min(axis=0) > 0.0)))
+
+
+def resolution(scenario: Scenario, group: Group) -> float:
+    """Return what the sensor of a group tells apart: the standard deviation of its noise, or half a
+    count if that is larger.
+    """
+    if scenario.sensor is None:
+        return scenario.noise.position
+    return max(scenario.noise.position, scenario.sensor.quantum(group.unit == "rad") / 2)
 
 
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:

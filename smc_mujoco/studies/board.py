@@ -11,7 +11,7 @@ from typing import NamedTuple
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, POWER, Effect, Rank, min_p
-from smc_mujoco.analysis.step_halving import APART, UNTRIED
+from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
@@ -19,18 +19,19 @@ from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
+MIN_TIMES = 1.03  # a lead over a law beyond the floor that is told; chosen
 MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
-SMALL = ", by less than the problem can show"
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
 MEDIANS = (
     f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share; "
     f"of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less."
 )
 MARKS = (
-    "Marked: no law is better, no run failed, and the samples are enough to see a lead. 'detects "
-    "24 %': a lead of 24 % between the law and the one in front would have been seen in "
+    "Marked: no law is better, every run has arrived, and the samples are enough to see a lead. "
+    "Arrived: the error ends within 10 % of the start, or 5 times what the sensor tells apart. "
+    "'detects 24 %': a lead of 24 % between the law and the one in front would have been seen in "
     f"{100 * POWER:g} % of such comparisons. 'by the step': the medians at the physics step and at "
-    f"half of it, which differ by more than {APART}."
+    f"half of it, which differ by more than {APART}; {RANGE}."
 )
 
 
@@ -54,19 +55,21 @@ class Lead(NamedTuple):
     law: str
     rival: str
     effect: Effect
-    # whether their medians differ by less than the problem can show, see `paired_runs.floor`
-    small: bool = False
+    floor: str = ""  # in words, if the law is below it and the rival is not
 
     @property
     def words(self) -> str:
         """The ratio with its interval, such as "0.88 of pid (0.84 to 0.92), ahead in 24 of 24
-        runs".
+        runs"; "a is below the sensor's 0.01 rad, b is not: at least 1.3 times less".
         """
         ratio, low, high = map(number, self.effect[:3])
+        if self.floor:
+            text = f"{self.law} is below {self.floor}, {self.rival} is not"
+            least = 1.0 / self.effect.high
+            return text if least < MIN_TIMES else f"{text}: at least {number(least)} times less"
         samples = "sets of gains" if self.effect.sets else "runs"
         ahead = f"ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
-        small = SMALL if self.small else ""
-        return f"{ratio} of {self.rival} ({low} to {high}), {ahead}{small}"
+        return f"{ratio} of {self.rival} ({low} to {high}), {ahead}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -83,6 +86,9 @@ class Block:
     # laws that no other is better than, but only because there are too few samples
     undecided: tuple[str, ...]
     worse: tuple[str, ...]  # laws that another is better than
+    below: tuple[str, ...]  # laws below the floor, which are not ranked among themselves
+    floor: str  # in words, such as "the sensor's 0.01 rad"; "" where it is not known
+    away: tuple[str, ...]  # laws with runs that have not arrived, which do not win
     ahead: str | None  # the law that is better than every other, laws with default gains included
     # None for one law, for "settles", or if the law in front has runs without a value
     lead: Lead | None
@@ -113,6 +119,19 @@ class Block:
         if self.ahead:
             return tuple(law for law in self.untuned if law != self.ahead)
         return ()
+
+    @property
+    def unranked(self) -> str:
+        """That several laws that no other is better than are below the floor; "" if they are
+        not.
+        """
+        low = [law for law in self.best if law in self.below]
+        if len(low) < 2:
+            return ""
+        names = joined(low)
+        if len(low) == len(self.medians) == 2:
+            names = "both"
+        return f"{names} below {self.floor}: not ranked"
 
     @property
     def sample(self) -> str:
@@ -221,10 +240,11 @@ class Board(Tables):
             return "one law"
         if self.barred:
             return f"none is named over {joined(self.barred)} with default gains"
-        if all(all(block.lacking.values()) for block in self.blocks):
-            return "every law has runs that fail"
-        if self.too_few:
-            return self.too_few
+        if all(len(block.away) == len(block.medians) for block in self.blocks):
+            return "every law has runs that fail or do not arrive"
+        unranked = dict.fromkeys(block.unranked for block in self.blocks if block.unranked)
+        if reason := "; ".join(unranked) or self.too_few:
+            return reason
         if not self.best:
             return "none is unbeaten in every condition"
         apart = self.cannot_tell
@@ -240,12 +260,15 @@ class Board(Tables):
     @property
     def cannot_tell(self) -> str:
         """That laws cannot be told apart, and the largest of the least leads that would have been
-        seen.
+        seen; which law is below the floor, where one is.
         """
-        seen = max(map(self.visible, self.best))
-        if math.isnan(seen):
+        for block in self.blocks:
+            if block.lead and block.lead.floor:
+                return block.lead.words
+        seen = [lead for lead in map(self.visible, self.best) if not math.isnan(lead)]
+        if not seen:
             return "cannot tell them apart"
-        return f"cannot tell them apart ({_detects(seen)})"
+        return f"cannot tell them apart ({_detects(max(seen))})"
 
     def visible(self, law: str) -> float:
         """Return the largest, over the blocks, of the least leads that would have been seen, a
@@ -273,12 +296,16 @@ class Board(Tables):
         return f"too few {noun} ({largest.samples}), {least} can decide (seeds, searches)"
 
     def failures(self, entry: Entry) -> str:
-        """Return how many of a law's runs failed, or never reach a time, such as "2 of 24 failed";
-        "" if none did.
+        """Return how many of a law's runs failed, have not arrived, or never reach a time, such as
+        "2 of 24 failed"; "" if none did.
         """
         if not entry.failed:
             return ""
-        how = "never" if self.unit == "s" else "failed"
+        how = "failed"
+        if self.unit == "s":
+            how = "never"
+        elif self.metric in CATALOGUE and not CATALOGUE[self.metric].error:
+            how = "not arrived"
         return f"{entry.failed} of {entry.runs} {how}"
 
 
@@ -316,6 +343,8 @@ def size(value: float, metric: str) -> str:
         return number(value)
     if metric == SETTLES:
         return f"{100 * value:.0f}"
+    if math.isinf(value) and CATALOGUE[metric].unit != "s" and not CATALOGUE[metric].error:
+        return "not arrived"
     return CATALOGUE[metric].text(value)
 
 
@@ -373,9 +402,14 @@ def _cell(board: Board, entry: Entry) -> Cell:
     median = size(entry.interval.median, board.metric)
     visible = board.visible(entry.law)
     blind = board.too_few or visible >= MAX_VISIBLE or board.barred
+    blind = blind or any(block.unranked and entry.law in block.below for block in board.blocks)
     below = [spread(entry.interval, board.metric)]
     if not math.isnan(visible):
         below.append(_detects(visible))
+    for block in board.blocks:
+        if entry.law in block.below:
+            below.append(f"below {block.floor}")
+            break
     alarms = [board.failures(entry)]
     changes = [block.by_step[entry.law] for block in board.blocks if entry.law in block.by_step]
     for before, after in changes[:1]:

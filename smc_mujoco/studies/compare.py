@@ -29,7 +29,6 @@ from smc_mujoco.simulation.conditions import Condition, applicable, find_conditi
 from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
@@ -211,7 +210,6 @@ def compare(
     seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = SEARCHES,
     tune: Truth = True,
     worst: "bool | Uncertainty" = False,
-    executor: "executors.Workers | None" = None,
     *,
     out: Annotated[str | os.PathLike[str], FilePath()] = "compared",
     metrics: Sequence[str] = METRICS,
@@ -248,7 +246,7 @@ def compare(
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
       worst: whether to search the worst case of each law on each plant too; or the class in which
         to search it.
-      executor, traces: as in `study`. Default: this machine, no traces.
+      traces: as in `study`. Default: none.
       out: folder for gains and runs.
       metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
@@ -265,7 +263,6 @@ def compare(
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
     """
-    workers = executors.as_executor("local" if executor is None else executor)
     for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     within = _class(worst)
@@ -291,7 +288,7 @@ def compare(
         tune and gains == "tuned",
         gains,
     )
-    table = trial.run(candidates, seeds, executor=workers, traces=traces)
+    table = trial.run(candidates, seeds, traces=traces)
     found = {}
     if worst:
         found = _worst_cases(trial, candidates, within, duration)

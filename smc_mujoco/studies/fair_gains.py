@@ -65,18 +65,20 @@ class Candidate(NamedTuple):
 
     def unseen(
         self, plant: Plant, goal: Objective, instances: Sequence[int], threads: int | None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return J on instances, that of one in four at half the physics step, and the sets'
-        numbers.
+    ) -> tuple[np.ndarray, ...]:
+        """Return J on instances, whether their runs have arrived, J of one in four at half the
+        physics step, and the sets' numbers.
         """
         from smc_mujoco.analysis.tuning.evaluator import objectives
 
         laws = [self(instance) for instance in instances]
-        values = objectives(plant, laws, goal, instances, threads)
+        values, arrived = objectives(plant, laws, goal, instances, threads)
         every = slice(None, None, REPEATED_SEEDS)
         halves = np.full(len(laws), math.nan)
-        halves[every] = objectives(plant, laws[every], goal, instances[every], threads, halved=True)
-        return values, halves, np.arange(len(laws)) % len(self.sets)
+        halves[every], _ = objectives(
+            plant, laws[every], goal, instances[every], threads, halved=True
+        )
+        return values, arrived, halves, np.arange(len(laws)) % len(self.sets)
 
 
 def law_or_template(law: Component | Template | str) -> Component | Template:
@@ -333,11 +335,11 @@ class Trial(NamedTuple):
             for plant in self.plants:
                 goal = self._goal(plant, self.starts)
                 least = len(goal.conditions) * goal.duration**2 / 2.0
-                runs = Unseen({}, {}, {}, least)
+                runs = Unseen({}, {}, {}, {}, least)
                 with contextlib.suppress(ScenarioError):
                     for candidate in candidates[plant.name]:
                         parts = candidate.unseen(plant, goal, self.seeds(count), self.threads)
-                        for of_law, values in zip(runs[:3], parts, strict=True):
+                        for of_law, values in zip(runs[:4], parts, strict=True):
                             of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
                         shown.advance(1.0)
                     found[plant.name] = runs

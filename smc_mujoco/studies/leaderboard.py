@@ -7,6 +7,7 @@ with several blocks wins in every one. The conclusions hold for the plants and c
 table, over initial states and noise, and over the gains with which the laws ran.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ class Unseen(NamedTuple):
     """J of the laws on one plant, on instances that no search has seen: law -> (instances,)."""
 
     values: Mapping[str, np.ndarray]  # s^2
+    arrived: Mapping[str, np.ndarray]  # whether all runs of an instance have arrived
     halves: Mapping[str, np.ndarray]  # at half the physics step, NaN where it was not computed
     sets: Mapping[str, np.ndarray]  # the number of the set of gains
     least: float  # s^2, J of an error that is X0 throughout
@@ -107,7 +109,12 @@ def objective_boards(
     compared = {}
     for plant, runs in unseen.items():
         compared[plant] = Comparison(
-            runs.values, EPS * runs.least, sets=runs.sets, relevant=relevant, halves=runs.halves
+            runs.values,
+            EPS * runs.least,
+            sets=runs.sets,
+            relevant=relevant,
+            halves=runs.halves,
+            arrived=runs.arrived,
         )
     limits = corrected_limits([*compared.values()])
     boards = []
@@ -122,7 +129,7 @@ def objective_boards(
                 metric=OBJECTIVE,
                 unit=UNITS[OBJECTIVE],
                 entries=_entries(comparison, sets, sources[plant]),
-                blocks=(_block((plant, "unseen runs"), seeds, comparison, 0, untuned),),
+                blocks=(_block((plant, "unseen runs"), seeds, comparison, 0, untuned, ""),),
                 family=_family(compared.values()),
                 relevant=relevant,
                 by_step=False,
@@ -158,7 +165,8 @@ def _board(
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
     blocks = []
     for at, k in enumerate(scores.blocks):
-        blocks.append(_block(group.blocks[k], group.seeds[k], comparison, at, untuned))
+        floor = paired_runs.floor_words(ran[k], metric)
+        blocks.append(_block(group.blocks[k], group.seeds[k], comparison, at, untuned, floor))
     repeated = not np.isnan(comparison.halves).all()
     return Board(
         group=group.name,
@@ -201,6 +209,7 @@ def _compared(
         relevant=relevant,
         halves=scores.halves,
         trends=scores.trends,
+        arrived=scores.arrived,
         first_order=[scenario is not None and first_order(scenario) for scenario in scenarios],
     )
 
@@ -211,6 +220,7 @@ def _block(
     comparison: Comparison,
     at: int,
     untuned: tuple[str, ...],
+    floor: str,
 ) -> Block:
     """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
     laws = np.array(comparison.laws)
@@ -232,9 +242,12 @@ def _block(
         lacking=dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True)),
         best=comparison.best[at],
         undecided=tuple(laws[undecided].tolist()),
+        below=tuple(laws[comparison.below[:, at]].tolist()),
+        floor=floor,
+        away=tuple(laws[comparison.away[:, at].any(axis=1)].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=comparison.winners[at],
-        lead=_lead(comparison, at, order),
+        lead=_lead(comparison, at, order, floor),
         level=bool(level),
         visible=_visible(comparison, at, order),
         by_step={law: change for law, change in changes.items() if change},
@@ -247,7 +260,7 @@ def _block(
     )
 
 
-def _lead(comparison: Comparison, at: int, order: Sequence[int]) -> Lead | None:
+def _lead(comparison: Comparison, at: int, order: Sequence[int], floor: str) -> Lead | None:
     """Return how the law in front of a block compares with its closest rival, that with the largest
     p-value; the order of laws is by failed runs, then by median.
     """
@@ -261,21 +274,24 @@ def _lead(comparison: Comparison, at: int, order: Sequence[int]) -> Lead | None:
     rival = _closest(comparison, at, first, order)
     names = comparison.laws[first], comparison.laws[rival]
     effect = comparison.effect(at, *names)
-    apart = abs(float(comparison.centres[rival, at] - comparison.centres[first, at]))
-    if effect.samples:
-        return Lead(*names, effect, apart < float(comparison.floors[at]))
+    arrives = math.isfinite(comparison.centres[rival, at])
+    if effect.samples and arrives and not comparison.unranked[at, first, rival]:
+        return Lead(*names, effect, floor if effect.below else "")
     return None
 
 
 def _closest(comparison: Comparison, at: int, first: int, order: Sequence[int]) -> int:
-    """Return the rival of a law with the largest p-value."""
+    """Return the rival of a law with the largest p-value, of those with a value in every run if
+    there are some.
+    """
     rivals = [i for i in order if i != first]
+    rivals = [i for i in rivals if not comparison.without_value[i, at]] or rivals
     return max(rivals, key=lambda i: comparison.p[at, first, i])
 
 
 def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str, float]:
-    """Return law -> the least lead that would have been seen between it and the law in front; {}
-    without a test.
+    """Return law -> the least lead that would have been seen between it and the law in front, if
+    neither is below the floor; {} without a test.
 
     For the law in front it is that over its closest rival.
     """
@@ -286,7 +302,9 @@ def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str,
     seen = {}
     for i in sorted(order):
         rival = i if i != first else _closest(comparison, at, first, order)
-        seen[names[i]] = comparison.visible(at, names[first], names[rival])
+        lead = comparison.visible(at, names[first], names[rival])
+        if not math.isnan(lead) and math.isfinite(comparison.centres[i, at]):
+            seen[names[i]] = lead
     return seen
 
 

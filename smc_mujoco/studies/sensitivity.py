@@ -1,6 +1,6 @@
 """What breaks a law: how much of a score's spread each uncertainty explains, and where runs fail.
 
-    found = smc.sensitivity(scenario, over=smc.Uncertainty(delay=(0.0, 0.02), mass=(0.7, 1.3)))
+    found = smc.sensitivity(scenario, within=smc.Uncertainty(delay=(0.0, 0.02), mass=(0.7, 1.3)))
 
 The uncertainties vary together, each uniformly within its bounds. An axis's first-order index is
 the share of the score's variance that the axis alone explains. Its total index also counts what it
@@ -12,7 +12,7 @@ positive, because scores are compared by their ratio. What chance decides, such 
 of noise, is an axis, too, so that it is not taken for the work of another. Intervals are bootstraps
 over the sampled points.
 
-A region where runs fail has bounds on at most two axes. Half of the runs choose it, and the other
+A region where runs fail has a bound on one or two axes, or two on one axis. Half of the runs choose it, and the other
 half, which are independent, give its rate. The axis to improve is chosen and told in the same way.
 """
 
@@ -75,7 +75,7 @@ HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 class Sensitivity(Tables, SobolResult):
     """What explains a law's score over a class of uncertainty, and where its runs fail."""
 
-    over: Uncertainty
+    within: Uncertainty
     improvement: Improvement | None  # None if no half of an axis is better
     runs: int  # number of all runs
 
@@ -108,8 +108,13 @@ class Sensitivity(Tables, SobolResult):
         for region in self.regions:
             rates = f"{_rate(region.rate)}, elsewhere {_rate(region.outside)}"
             lines.append(f"Failed where {_words(self.space, region.cuts)}: {rates}.")
+        if self.failed.any() and not self.regions:
+            lines.append("No bounds on one or two axes tell where.")
         if half := self.improvement:
             change = f"the median is {self.text(half.median)} in place of {self.text(half.before)}"
+            if half.failed_before:
+                share, before = 100 * half.failed, 100 * half.failed_before
+                change += f", and {share:.0f} % fail in place of {before:.0f} %"
             lines.append(f"Narrow first: to {_words(self.space, [half.half])}; {change}.")
         return lines
 
@@ -150,7 +155,7 @@ class Sensitivity(Tables, SobolResult):
         """Return the result as JSON data."""
         fields = "metric", "unit", "runs"
         data: dict[str, Any] = {name: getattr(self, name) for name in fields}
-        data |= {"over": dataclasses.asdict(self.over), "says": self.sentences}
+        data |= {"within": dataclasses.asdict(self.within), "says": self.sentences}
         indices = []
         for axis in self.axes:
             indices.append({"first": axis.first._asdict(), "total": axis.total._asdict()})
@@ -178,7 +183,7 @@ class Sensitivity(Tables, SobolResult):
 @constrained
 def sensitivity(
     scenario: Scenario,
-    over: Uncertainty | None = None,
+    within: Uncertainty | None = None,
     metric: str = METRIC,
     points: Annotated[int, Whole(low=8, high=2**16)] | None = None,
     seed: Seed = 0,
@@ -190,9 +195,9 @@ def sensitivity(
     Args:
       scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
         parameters.
-      over: the class. Its disturbance and its errors of measurement are axes with a level from 0 to
+      within: the class. Its disturbance and its errors of measurement are axes with a level from 0 to
         the bound, and random within it. Default: mass, friction, delay, noise, encoder, period and
-        bound, see `default_over`.
+        bound, see `default_class`.
       metric: name of any metric; more is worse. A run without a score counts as the worst.
       points: number of points, a power of 2; with k axes there are (k + 2) times as many runs.
         Default: as many as take up to about 20 s of one core, but at least 8, with which the Panda
@@ -208,16 +213,16 @@ def sensitivity(
         raise ScenarioError(
             f"sensitivity is of a Scenario, not {shown(scenario)}: give smc.Scenario(...)"
         )
-    if over is None:
-        over = default_over(scenario)
-    if not isinstance(over, Uncertainty):
+    if within is None:
+        within = default_class(scenario)
+    if not isinstance(within, Uncertainty):
         raise ScenarioError(
-            f"over is {shown(over)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))"
+            f"within is {shown(within)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))"
         )
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)
-    space = Space(scenario, over)
+    space = Space(scenario, within)
     k = len(space.names)
     if points is None:
         points = default_points(space.scenario_at(np.full(k, 0.5)), k)
@@ -251,7 +256,7 @@ def sensitivity(
     found = tuple(regions(space, shares, failed))
     return Sensitivity(
         scenario=scenario,
-        over=over,
+        within=within,
         metric=metric,
         unit=entry.unit_for(scenario.plant.units[0], scenario.efforts[0]),
         axes=tuple(sorted(axes, key=lambda axis: -axis.total.median)),
@@ -261,12 +266,12 @@ def sensitivity(
         failed=failed,
         unscored=int((~finite[halves]).sum()),
         regions=found,
-        improvement=improvement(space, shares, values),
+        improvement=improvement(space, shares, values, failed),
         runs=len(design),
     )
 
 
-def default_over(scenario: Scenario) -> Uncertainty:
+def default_class(scenario: Scenario) -> Uncertainty:
     """Return the default class: what the plant declares as `uncertain`, or its mass, and what
     machines differ in.
 
@@ -316,11 +321,24 @@ def _rate(rate: Interval) -> str:
 
 
 def _words(space: Space, cuts: Sequence[Cut]) -> str:
-    """Return cuts as words, such as "delay > 9 ms and mass < 0.8 of nominal"."""
+    """Return cuts as words, such as "delay > 9 ms and mass < 0.8 of nominal", "mass < 0.8 of
+    nominal or > 1.2 of nominal".
+    """
     words = []
     for cut in cuts:
-        bound = _with_unit(space.value(cut.axis, cut.share), space.ends[cut.axis][2])
-        words.append(f"{in_words(space.names[cut.axis])} {'<>'[cut.above]} {bound}")
+        low, high = (
+            _with_unit(space.value(cut.axis, share), space.ends[cut.axis][2])
+            for share in (cut.low, cut.high)
+        )
+        if cut.outside:
+            bounds = f"< {low} or > {high}"
+        elif cut.low == 0.0:
+            bounds = f"< {high}"
+        elif cut.high == 1.0:
+            bounds = f"> {low}"
+        else:
+            bounds = f"{low} to {high}"
+        words.append(f"{in_words(space.names[cut.axis])} {bounds}")
     return joined(words)
 
 

@@ -18,7 +18,6 @@ import re
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,9 +36,9 @@ from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors, run_key
+from smc_mujoco.studies import batches, run_key
 from smc_mujoco.studies import table as tables
-from smc_mujoco.studies.executors import Batch, ResultColumns
+from smc_mujoco.studies.batches import Batch
 from smc_mujoco.studies.table import Table
 
 if TYPE_CHECKING:
@@ -188,7 +187,6 @@ def study(
     scenarios: Iterable[Scenario],
     out: Annotated[str | os.PathLike[str], FilePath()],
     resume: bool = True,
-    executor: "executors.Workers" = "local",
     threads: int | None = None,
     progress: bool = False,
     traces: Traces = "none",
@@ -205,10 +203,7 @@ def study(
       scenarios: any number of Scenarios, such as those of `smc.grid`.
       out: folder of the study; it may contain the parts of other studies.
       resume: whether to keep the finished runs in the folder; False removes them first.
-      executor: "local", "dask://HOST:PORT" (or "tcp://HOST:PORT") for the workers of that
-        scheduler, a dask Client, or any concurrent.futures.Executor, whose workers run one
-        simulation each. The study does not close it.
-      threads: number of simulations at a time, if local; None for one per available core.
+      threads: number of simulations at a time; None for one per available core.
       progress: whether to show a progress bar.
       traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and
         condition: of a failed run, else of one that never settles, else of the one with the largest
@@ -218,10 +213,9 @@ def study(
         RK4, elsewhere one seed in four.
 
     Raises:
-      ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that
-        are missing or die. Finished runs stay.
+      ScenarioError: scenarios that cannot be run, or a folder that cannot be written. Finished
+        runs stay.
     """
-    where = executors.as_executor(executor)
     threads = cores(threads)
     store = Store(Path(out))
     folder = Path(out) / "traces"
@@ -235,7 +229,7 @@ def study(
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
         print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
-    _compute(missing, store, plants, where, threads, progress, folder if traces == "all" else None)
+    _compute(missing, store, plants, threads, progress, folder if traces == "all" else None)
     changes = {name: run_key.source(s) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():
         changes[name] = changes[name] | {"half_step": scores}
@@ -260,38 +254,25 @@ def _compute(
     missing: Mapping[str, Scenario],
     store: Store,
     plants: run_key.Hashes,
-    where: str | Executor,
     threads: int,
     progress: bool,
     traces: Path | None,
 ) -> None:
-    """Compute runs, given by key, store their rows as they finish, and save the traces of local
-    ones in a folder.
-    """
+    """Compute runs, given by key, store their rows as they finish, and save traces in a folder."""
     # made before any run: a law may change its globals
     first = {id(scenario): {"hash": key} for key, scenario in missing.items()}
 
-    def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
-        scenarios = [prepared.scenario for prepared in batch]
-        known = [run_key.row(s, plants) | first[id(s)] for s in scenarios]
-        store.add([row | result for row, result in zip(known, results, strict=True)])
-
-    def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
-        if traces:
-            for trace in finished:
-                trace.save(trace_file(traces, run_key.row(trace.scenario, plants)))
-        finish(batch, [executors.result_columns(trace) for trace in finished])
+    def finish(batch: Batch, finished: Sequence[Trace]) -> None:
+        rows = []
+        for prepared, trace in zip(batch, finished, strict=True):
+            row = run_key.row(prepared.scenario, plants) | first[id(prepared.scenario)]
+            if traces:
+                trace.save(trace_file(traces, row))
+            rows.append(row | batches.result_columns(trace))
+        store.add(rows)
 
     with counter(len(missing), sum(s.work for s in missing.values()), progress) as stepped:
-        if where == "local":
-            executors.compute_here(
-                executors.batches(missing.values()), threads, finish_here, stepped
-            )
-        else:
-            with executors.opened(where) as pool:
-                executors.compute_elsewhere(
-                    executors.batches(missing.values()), pool, finish, stepped
-                )
+        batches.compute(batches.batches(missing.values()), threads, finish, stepped)
 
 
 def _repeated(
@@ -311,7 +292,7 @@ def _repeated(
 
 def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store) -> dict[str, str]:
     """Return hash -> the scores of the repeated run as JSON; {} for one that failed."""
-    names = [metric.name for metric in metrics()]
+    names = ["arrived", *(metric.name for metric in metrics())]
     scores = {}
     for row in store.rows({half for half, _ in repeated.values()}):
         scores[row["hash"]] = to_json({name: row[name] for name in names if row[name] is not None})
@@ -368,6 +349,6 @@ def _save_traces(table: Table, choice: str, folder: Path, threads: int, progress
         if not (file := trace_file(folder, row)).exists():
             files[table.scenario(i)] = file
     with counter(len(files), sum(s.work for s in files), progress) as stepped:
-        for batch in executors.batches(files):
+        for batch in batches.batches(files):
             for i, trace in stream(batch, threads, stepped):
                 trace.save(files[batch[i].scenario])

@@ -11,7 +11,7 @@ Columns:
 - where its gains come from: `source`, a kind of `control.source`, and `search` as JSON, null if
   there was no search;
 - every metric of `smc.score`: null if the run failed or the metric does not apply, inf for "never";
-- how the run failed: `diverged_at` in s, and `failure`;
+- how the run failed: `diverged_at` in s, and `failure`; `arrived`, see `metrics.catalogue`;
 - what `leaderboard` charges: `half_step`, the scores of the same run at half the physics step, as
   JSON, null where it was not repeated; `trends`, the ratios of the metrics of the last part to
   those before it, see `ranking`, as JSON;
@@ -55,7 +55,7 @@ RESULT_COLUMNS = {
     "half_step": "string",
     "trends": "string",
 }
-RESULT_COLUMNS |= {"checked": "bool"}
+RESULT_COLUMNS |= {"arrived": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
 PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")

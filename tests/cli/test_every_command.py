@@ -36,9 +36,7 @@ CALLS = {
     "--worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
     "--figure f "
-    "--latex t.tex --executor dask://a:1 --traces all --seed 5 --json c.json --threads 2": [
-        "studies.compare.compare"
-    ],
+    "--latex t.tex --traces all --seed 5 --json c.json --threads 2": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [
@@ -46,7 +44,7 @@ CALLS = {
         "studies.leaderboard.leaderboard",
     ],
     "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
-    "--executor dask://a:1 --threads 2 --defaults --relevant 0.05": [
+    "--threads 2 --defaults --relevant 0.05": [
         "studies.study.study",
         "studies.leaderboard.leaderboard",
     ],

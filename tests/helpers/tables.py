@@ -15,6 +15,7 @@ TEXTS = {
     "failure": None,
     "half_step": None,
     "trends": None,
+    "arrived": True,
     "source": "yours",
     "search": None,
     "scenario": '{"plant": {}}',

@@ -36,17 +36,12 @@ REFUSED = {
         {"scenarios": [3]},
         {"scenarios": []},
         {"scenarios": "duffing"},
-        {"executor": "ray"},
-        {"executor": "dask://host"},
-        {"executor": "dask://:80"},
-        {"executor": 3},
     ],
     smc.compare: [
         {"metrics": ["itaee"]},
         {"laws": "clasical"},
         {"plants": "dufing"},
         {"conditions": "nois"},
-        {"executor": "ray"},
     ],
     smc.which: [
         {"needs": "fats"},

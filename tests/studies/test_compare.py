@@ -18,7 +18,7 @@ from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import options
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
-from smc_mujoco.studies import compare, executors, fair_gains, worst_case
+from smc_mujoco.studies import batches, compare, fair_gains, worst_case
 from smc_mujoco.studies.leaderboard import METRICS
 
 SHORT = {"duration": 0.5, "budget": 16, "progress": False}
@@ -108,7 +108,7 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
 
 def test_the_same_call_goes_on_from_its_folder(found, folder, monkeypatch):
     monkeypatch.setattr(search, "tune", None)  # would raise
-    monkeypatch.setattr(executors, "compute_here", lambda batches, *rest: [*batches].index(0))
+    monkeypatch.setattr(batches, "compute", lambda batches, *rest: [*batches].index(0))
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
     with pytest.raises(ValueError, match="0 is not in list"):  # no run is missing, so no batch
         smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=folder, **SHORT)
@@ -222,7 +222,6 @@ def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
 REFUSED = [
     (([my_law], "duffing", "noisy"), {}, "did you mean 'noise'"),
     (([my_law, my_law(lam=2.0)], "duffing"), {}, "two laws have the name 'my_law'"),
-    (([my_law], "duffing"), {"executor": "ray"}, "executor is 'ray'"),
     (([my_law], "duffing"), {"worst": 5}, "give True or a class, such as smc.Uncertainty"),
 ]
 

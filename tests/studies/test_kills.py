@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 LOADED = """
 import os, random, signal, sys, time
 from pathlib import Path
-from smc_mujoco.studies import executors
+from smc_mujoco.studies import batches
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.run_key import key
 from smc_mujoco.studies.study import Store, study
@@ -29,7 +29,7 @@ from smc_mujoco.simulation.callback import callback as compiled_callback, silenc
 from smc_mujoco.simulation.prepare import prepare
 import pyarrow.parquet
 
-out, executors.MAX_WORK = Path(sys.argv[1]), 60
+out, batches.MAX_WORK = Path(sys.argv[1]), 60
 plants, laws, conditions = ["duffing", "van_der_pol"], ["observer_free", "classical"], ["nominal", "noise"]
 scenarios = grid(plants, laws, conditions, 10, "study", 0.05)
 """
@@ -44,7 +44,7 @@ def told(pipe):
     # what a life does, as it does it: "run", "write", "wrote <hashes>", "collect"
     def tell(*words):
         os.write(pipe, " ".join(words).encode() + b"\\n")
-    run, add, collect = executors.run_batch, Store.add, Store.collect
+    run, add, collect = batches.run_batch, Store.add, Store.collect
     def simulated(*rest):
         tell("run")
         return run(*rest)
@@ -55,7 +55,7 @@ def told(pipe):
     def collecting(self, *given):
         tell("collect")
         collect(self, *given)
-    executors.run_batch, Store.add, Store.collect = simulated, adding, collecting
+    batches.run_batch, Store.add, Store.collect = simulated, adding, collecting
 
 def live(folder, doomed):
     # one life of the study; doomed(line) says whether it dies there

@@ -1,10 +1,6 @@
 """What worst cases, accuracies, needs and kept files say and are named, of made-up numbers."""
 
 import dataclasses
-import math
-import pickle
-import sys
-import threading
 from pathlib import Path
 
 import arms
@@ -14,7 +10,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import cache
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
 from smc_mujoco.simulation.conditions import find_condition
-from smc_mujoco.studies import executors, run_key, study, worst_case
+from smc_mujoco.studies import run_key, study, worst_case
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.worst_case import WorstCase, default_budget
 
@@ -153,25 +149,6 @@ SETUP = (
     2.0,
     None,
 )
-
-
-def test_what_cannot_be_sent_is_refused_with_the_cure_for_each_side(monkeypatch, refused):
-    refused(lambda: executors.packed(threading.Lock()), "plain functions")
-    monkeypatch.setattr(run_key, "key", lambda *_, **__: "other")
-    refused(lambda: executors.run_on_worker(pickle.dumps([RUN]), ["key"]), "classical", "mujoco")
-    monkeypatch.setitem(sys.modules, "cloudpickle", None)
-    refused(lambda: executors.packed(threading.Lock()), "pip install cloudpickle")
-
-
-def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):
-    """Pickle names it by `__main__`, which another process has not."""
-    names = {"__name__": "__main__"}
-    exec("def doubled(x):\n    return 2.0 * x", names)
-    monkeypatch.setattr(sys.modules["__main__"], "doubled", names["doubled"], raising=False)
-    sent = executors.packed(names["doubled"])
-    monkeypatch.delattr(sys.modules["__main__"], "doubled")
-    assert pickle.loads(sent)(3.0) == 6.0
-    assert executors.packed(math.hypot) == pickle.dumps(math.hypot)
 
 
 def test_a_part_with_scores_by_other_code_counts_as_not_done(tmp_path, monkeypatch):

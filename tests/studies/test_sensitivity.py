@@ -12,7 +12,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import sensitivity as module
 from smc_mujoco.analysis.worst_case.uncertainty import Members
-from smc_mujoco.studies.sensitivity import default_over, default_points
+from smc_mujoco.studies.sensitivity import default_class, default_points
 
 
 def scenario(**fields) -> smc.Scenario:
@@ -171,13 +171,57 @@ def test_a_planted_region_is_found_and_told_by_the_other_half(seed):
     failed[:256] &= np.arange(256) % 10 != 0  # the half that chooses
     failed[256:] &= np.arange(256) % 2 == 0  # the half that tells
     [region] = module.regions(space("a", "b", "c"), shares, failed)
-    assert sorted(region.cuts) == [module.Cut(0, True, 0.625), module.Cut(2, False, 0.5)]
+    assert sorted(region.cuts) == [module.Cut(0, low=0.625), module.Cut(2, high=0.5)]
     told = slice(256, None)
     assert region.rate.n == inside[told].sum()
     assert region.rate.median * region.rate.n == pytest.approx(failed[told].sum())
     assert region.rate.low < 0.5 < region.rate.high
     assert region.outside.median == 0.0
     assert region.outside.n == 256 - region.rate.n
+
+
+BORDERS = [  # where runs fail on an axis, the bounds that are found, and the half to narrow to
+    (lambda x: x > 0.82, {"low": 0.8125}, {"high": 0.5}),
+    (lambda x: x < 0.3, {"high": 0.3125}, {"low": 0.5}),
+    (
+        lambda x: (x < 0.17) | (x > 0.83),
+        {"low": 0.1875, "high": 0.8125, "outside": True},
+        {"low": 0.25, "high": 0.75},
+    ),
+    (
+        lambda x: (x < 0.33) | (x > 0.67),
+        {"low": 0.3125, "high": 0.6875, "outside": True},
+        {"low": 0.25, "high": 0.75},
+    ),
+    (lambda x: (x > 0.38) & (x < 0.62), {"low": 0.375, "high": 0.625}, None),
+    (lambda x: x > 2.0, None, {"high": 0.5}),
+]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("fails", "bounds", "half"), BORDERS)
+def test_failures_on_one_side_on_both_or_between_have_their_bounds(fails, bounds, half, axis):
+    """Of 32 points, as many as a design's quick half has; the score rises with the axis."""
+    shares = module.designs(32, 2, axis)[:64]
+    failed = fails(shares[:, axis])
+    values = np.where(failed, 9.0, 1.0 + shares[:, axis])
+    regions = module.regions(space("a", "b"), shares, failed)
+    better = module.improvement(space("a", "b"), shares, values, failed)
+    if bounds is None:
+        assert not regions
+    else:
+        (cut,) = regions[0].cuts
+        assert (cut.axis, cut.outside) == (axis, bounds.get("outside", False))
+        assert cut.low == pytest.approx(bounds.get("low", 0.0), abs=0.07)
+        assert cut.high == pytest.approx(bounds.get("high", 1.0), abs=0.07)
+        assert regions[0].rate.median > 0.7
+        assert regions[0].outside.median < 0.15
+    if half is None:
+        assert better is None or better.failed < better.failed_before
+    else:
+        assert better
+        assert better.half == module.Cut(axis, **half)
+        assert better.failed <= better.failed_before
 
 
 def test_failures_by_chance_have_no_region():
@@ -192,16 +236,17 @@ def test_an_axis_of_chance_bounds_no_region_and_is_not_improved():
     shares = np.random.default_rng(0).random((256, 2))
     axes = space("a", module.CHANCE)
     assert not module.regions(axes, shares, shares[:, 1] > 0.5)
-    better = module.improvement(axes, shares, 1.0 + 5.0 * shares[:, 0] + 9.0 * shares[:, 1])
+    values = 1.0 + 5.0 * shares[:, 0] + 9.0 * shares[:, 1]
+    better = module.improvement(axes, shares, values, np.zeros(256, bool))
     assert better
-    assert better.half == module.Cut(0, False, 0.5)
+    assert better.half == module.Cut(0, high=0.5)
 
 
 def test_the_improvement_is_told_by_the_half_that_did_not_choose_it():
     shares = np.random.default_rng(1).random((400, 2))
     # better above, in the half that tells
     values = np.where(np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1])
-    assert module.improvement(space("a", "b"), shares, values) is None
+    assert module.improvement(space("a", "b"), shares, values, np.zeros(400, bool)) is None
 
 
 def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_index_0():
@@ -285,7 +330,7 @@ def test_a_jitter_keeps_the_delays_of_a_fine_step_and_an_axis_of_one_value_is_re
 
 
 def test_the_default_class_has_the_axes_of_machines():
-    found = module.Space(base := scenario(), default_over(base))
+    found = module.Space(base := scenario(), default_class(base))
     assert set(found.names) == {
         "mass",
         "friction",
@@ -360,9 +405,9 @@ def test_what_cannot_be_answered_is_refused():
     over = smc.Uncertainty(mass=(0.7, 1.3))
     for given, fields, sentence in [
         (scenario(), {"points": 33}, "points is 33: give a power of 2, such as 32"),
-        (scenario(), {"over": 3}, "over is 3: give a class"),
+        (scenario(), {"within": 3}, "within is 3: give a class"),
         ("duffing", {}, "sensitivity is of a Scenario, not 'duffing'"),
         (scenario(), {"metric": "speed"}, "metric"),
     ]:
         with pytest.raises(smc.ScenarioError, match=sentence):
-            smc.sensitivity(given, **{"over": over} | fields)
+            smc.sensitivity(given, **{"within": over} | fields)

@@ -16,7 +16,7 @@ from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.studies import executors, run_key
+from smc_mujoco.studies import batches, run_key
 from smc_mujoco.studies import study as store
 from smc_mujoco.studies.run_key import condition
 from smc_mujoco.studies.study import study, trace_file, worst_rows
@@ -39,13 +39,13 @@ def bytes_of(out: Path) -> bytes:
 def ran(monkeypatch):
     """The scenarios of all runs so far."""
     found = []
-    honest = executors.run_batch
+    honest = batches.run_batch
 
     def counted(batch, *rest):
         found.extend(one.scenario for one in batch)
         return honest(batch, *rest)
 
-    monkeypatch.setattr(executors, "run_batch", counted)
+    monkeypatch.setattr(batches, "run_batch", counted)
     return found
 
 
@@ -56,7 +56,7 @@ def none_runs(monkeypatch):
     def refuse(*_: object) -> None:
         raise AssertionError("a finished run is run again")
 
-    return lambda: monkeypatch.setattr(executors, "run_batch", refuse)
+    return lambda: monkeypatch.setattr(batches, "run_batch", refuse)
 
 
 @smc.law_function
@@ -165,8 +165,6 @@ def test_what_the_grid_cannot_make_is_one_sentence(change, said):
 def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
     with pytest.raises(smc.ScenarioError, match="cannot study 3"):
         study([*small(), 3], tmp_path / "a")
-    with pytest.raises(smc.ScenarioError, match="executor is 'ray'"):
-        study(small(), tmp_path / "a", executor="ray")
     (tmp_path / "file").write_text("")
     with pytest.raises(smc.ScenarioError, match="cannot use"):
         study(small(), tmp_path / "file")
@@ -182,7 +180,7 @@ def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path,
         *small(1),
     ]
     study(failing, tmp_path / "together")
-    monkeypatch.setattr(executors, "MAX_WORK", 1)
+    monkeypatch.setattr(batches, "MAX_WORK", 1)
     table = study(failing, tmp_path / "alone")
     assert bytes_of(tmp_path / "together") == bytes_of(tmp_path / "alone")
     said = table.column("failure")
@@ -248,7 +246,7 @@ def other_scores(path: Path) -> None:
 
 @pytest.mark.parametrize("harm", [cut, foreign, other_scores, lambda path: path.write_bytes(b"")])
 def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, ran, harm):
-    monkeypatch.setattr(executors, "MAX_WORK", 50)
+    monkeypatch.setattr(batches, "MAX_WORK", 50)
     study(small(), tmp_path)
     before = bytes_of(tmp_path)
     parts = sorted((tmp_path / "parts").iterdir())
@@ -287,7 +285,7 @@ def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
 def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
     scenarios = small(seeds=4)
     study(scenarios, tmp_path / "one")
-    monkeypatch.setattr(executors, "MAX_WORK", 1)
+    monkeypatch.setattr(batches, "MAX_WORK", 1)
     monkeypatch.setattr(store, "MAX_OPEN_PARTS", 1)
     shuffled = []
     for i in np.random.default_rng(0).permutation(len(scenarios)):

@@ -25,6 +25,7 @@ from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Evaluation, Objecti
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.metrics.catalogue import arrived
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import (
@@ -298,8 +299,9 @@ def objectives(
     instances: Sequence[int] | None = None,
     threads: int | None = None,
     halved: bool = False,
-) -> np.ndarray:
-    """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo, and
+    whether all runs of an instance have arrived, (laws,).
 
     Args:
       laws: with their gains. Law i runs on instance i: its own starts and noise, one run for each
@@ -323,8 +325,10 @@ def objectives(
         cases = list(map(halved_step, cases))
     traces = run(cases, threads)
     found = []
+    there = []
     count = len(goal.conditions)
     for first in range(0, len(cases), count):
-        evaluation = goal.evaluation(cases[first], traces[first : first + count])
-        found.append(evaluation.objective)
-    return np.array(found)
+        runs = traces[first : first + count]
+        found.append(goal.evaluation(cases[first], runs).objective)
+        there.append(all(map(arrived, runs)))
+    return np.array(found), np.array(there)

@@ -121,9 +121,6 @@ def compare(
     latex: Annotated[
         Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")
     ] = None,
-    executor: Annotated[
-        str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")
-    ] = "local",
     rig: Annotated[
         str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")
     ] = None,
@@ -173,7 +170,6 @@ def compare(
             relevant,
             defaults,
             out,
-            executor,
             threads,
             terminal,
         )
@@ -188,7 +184,6 @@ def compare(
         seeds,
         tune,
         worst,
-        executor,
         out=out,
         duration=duration,
         starts=start,
@@ -221,7 +216,6 @@ def _compare_on_rig(
     relevant: float,
     defaults: bool,
     out: Path,
-    executor: str,
     threads: int | None,
     terminal: Terminal,
 ) -> None:
@@ -239,7 +233,7 @@ def _compare_on_rig(
     if searches is not None:
         found = ensemble.tuned(machine, chosen, searches, **tuning)
     scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, True, executor, threads, progress=True, half_steps=True)
+    table = study(scenarios, out, True, threads, progress=True, half_steps=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant)
     terminal.print(boards)
     for candidate in found:

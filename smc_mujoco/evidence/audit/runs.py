@@ -30,7 +30,7 @@ from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
-from smc_mujoco.studies.executors import result_columns
+from smc_mujoco.studies.batches import result_columns
 from smc_mujoco.studies.run_key import Hashes, key
 
 if TYPE_CHECKING:

@@ -1,0 +1,67 @@
+"""Batches hold every run once, and do not change what is found."""
+
+import pytest
+from helpers.runs import fails_late
+
+import smc_mujoco as smc
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies import batches
+
+
+def mixed() -> list[smc.Scenario]:
+    return grid(
+        ["duffing", "pendulum_network"],
+        ["classical", "none"],
+        ["nominal", "coulomb"],
+        3,
+        "study",
+        0.05,
+    )
+
+
+@pytest.mark.parametrize("steps", [1, 200, 10**9])
+def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, steps):
+    monkeypatch.setattr(batches, "MAX_WORK", steps)
+    scenarios = mixed()
+    found = list(batches.batches(scenarios))
+    assert sorted(map(id, scenarios)) == sorted(
+        id(one.scenario) for batch in found for one in batch
+    )
+    for batch in [[one.scenario for one in batch] for batch in found]:
+        assert (
+            len({(s.plant.name, s.resolved.integrator, s.resolved.physics_step) for s in batch})
+            == 1
+        )
+        assert len(batch) == 1 or sum(s.work for s in batch) <= steps
+
+
+def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
+    batch = []
+    for w in (1.0, 0.01, 0.02):
+        batch.append(smc.Scenario(plant="duffing", law=fails_late(when=w), duration=0.05))
+    together = []
+    for trace in batches.run_batch(batch, 2):
+        together.append(batches.result_columns(trace))
+    assert together == [
+        batches.result_columns(trace) for s in batch for trace in batches.run_batch([s], 1)
+    ]
+    assert [found["diverged_at"] for found in together] == [None, 0.011, 0.021]
+
+
+def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_heard():
+    made = list(batches.batches(mixed()))
+    finished = []
+    batches.compute(
+        made, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces]))
+    )
+    assert [batch for batch, _ in finished] == made
+    assert [[one.scenario for one in batch] for batch in made] == [done for _, done in finished]
+
+    for doomed in (made[0], made[-1]):
+
+        def full(batch, traces, doomed=doomed):
+            if batch is doomed:
+                raise smc.ScenarioError("no room")
+
+        with pytest.raises(smc.ScenarioError, match="no room"):
+            batches.compute(made, 1, full)
