@@ -317,7 +317,7 @@ def last_part(trace: Trace) -> slice:
 def travels(trace: Trace) -> bool:
     """Return whether a channel's reference travels, see the module's conventions."""
     steps = np.abs(np.diff(trace.r[last_part(trace)], axis=0))
-    if not steps.size:
+    if len(steps) < 2:  # one step may be a jump
         return False
     straight = np.ptp(steps, axis=0) <= STRAIGHT * steps.max(axis=0)
     return bool(np.any(straight & (steps.min(axis=0) > 0.0)))

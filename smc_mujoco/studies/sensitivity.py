@@ -12,8 +12,9 @@ positive, because scores are compared by their ratio. What chance decides, such 
 of noise, is an axis, too, so that it is not taken for the work of another. Intervals are bootstraps
 over the sampled points.
 
-A region where runs fail has a bound on one or two axes, or two on one axis. Half of the runs choose it, and the other
-half, which are independent, give its rate. The axis to improve is chosen and told in the same way.
+A region where runs fail has a bound on one or two axes, or two on one axis. Half of the runs choose
+it, and the other half, which are independent, give its rate. The axis to improve is chosen and told
+in the same way.
 """
 
 import dataclasses
@@ -195,9 +196,9 @@ def sensitivity(
     Args:
       scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
         parameters.
-      within: the class. Its disturbance and its errors of measurement are axes with a level from 0 to
-        the bound, and random within it. Default: mass, friction, delay, noise, encoder, period and
-        bound, see `default_class`.
+      within: the class. Its disturbance and its errors of measurement are axes with a level from 0
+        to the bound, and random within it. Default: mass, friction, delay, noise, encoder, period
+        and bound, see `default_class`.
       metric: name of any metric; more is worse. A run without a score counts as the worst.
       points: number of points, a power of 2; with k axes there are (k + 2) times as many runs.
         Default: as many as take up to about 20 s of one core, but at least 8, with which the Panda

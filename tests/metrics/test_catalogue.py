@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.metrics import catalogue as m
@@ -47,7 +48,20 @@ class Run:
     arrays = Trace.arrays
 
 
-def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=False, **fields):
+def run(
+    t,
+    x=0.0,
+    *,
+    r=0.0,
+    u=0.0,
+    s=0.0,
+    v=0.0,
+    reaction=0.0,
+    units=(),
+    free=False,
+    noise=0.0,
+    **fields,
+):
     """A Run; a signal may be a scalar, (K+1,) for one channel or (K+1, n).
 
     Without units all channels are in m; `free` if the second half of them has no actuators.
@@ -70,7 +84,11 @@ def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=Fa
         underactuated=free,
     )
     scenario = SimpleNamespace(
-        plant=mixed, efforts=mixed.efforts, law=SimpleNamespace(name="classical")
+        plant=mixed,
+        efforts=mixed.efforts,
+        law=SimpleNamespace(name="classical"),
+        noise=SimpleNamespace(position=noise),
+        sensor=None,
     )
     more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
     return Run(
@@ -807,3 +825,51 @@ def test_metrics_respect_their_orders(trace):
     if trace.x.shape[1] > 1:
         assert scores["mean_settling_time"] <= scores["settling_time"]
         assert scores["spread_bound"] <= 2 * scores["ultimate_bound"]
+
+
+TRAVELS = [  # a reference r(t) over 10 s, and whether it travels
+    (lambda t: 100.0 * t, True),
+    (lambda t: -0.01 * t, True),
+    (lambda t: np.maximum(t - 2.0, 0.0), True),  # a ramp that begins later
+    (lambda t: np.minimum(t, 2.0), False),  # and one that ends
+    (lambda t: np.where(t < 5.0, 0.0, 1.0), False),
+    (lambda t: np.sin(0.05 * t), False),
+    (lambda t: 0.0 * t, False),
+]
+
+
+@pytest.mark.parametrize(("reference", "travels"), TRAVELS)
+def test_a_speed_loop_is_never_settled_by_its_position_and_arrives_by_its_speed(reference, travels):
+    """A loop that follows r with a lag of 0.2 s, and one that rests where r begins."""
+    t = np.linspace(0.0, 10.0, 1001)
+    r = reference(t)
+    speed = np.gradient(r, t)
+    following = run(t, r - 0.2 * speed, r=r[:, None], v=speed)
+    assert math.isnan(m.settling_time(following)) == travels
+    assert m.arrived(following)
+    if travels:
+        resting = run(t, np.full(1001, r[0]), r=r[:, None], v=np.zeros(1001))
+        assert not m.arrived(resting)
+        assert math.isnan(m.settling_time(resting))
+
+
+@pytest.mark.parametrize(
+    ("ending", "noise", "there"),
+    [
+        (0.0, 0.0, True),
+        (0.149, 0.0, True),
+        (0.151, 0.0, False),
+        (-0.151, 0.0, False),
+        (0.3, 0.1, True),
+        (0.6, 0.1, False),
+        (math.pi, 0.0, False),  # a pendulum that hangs
+    ],
+)
+def test_a_run_has_arrived_within_ten_percent_of_its_start_or_five_sigma(ending, noise, there):
+    t = np.linspace(0.0, 10.0, 101)
+    assert m.arrived(run(t, np.where(t < 5.0, 1.5, ending), noise=noise)) is there
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "cart_pole", "quadrotor"])
+def test_without_a_law_no_plant_that_falls_or_swings_has_arrived(plant):
+    assert not m.arrived(smc.run(smc.Scenario(plant=plant, law="none", duration=3.0)))
