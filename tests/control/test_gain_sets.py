@@ -44,6 +44,14 @@ def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_s
             assert set(one) == set(search_space.box(law, scales)), name
 
 
+@pytest.mark.parametrize(("gain_set", "plant"), SETS)
+def test_every_shipped_set_is_within_its_laws_theorem(gain_set, plant):
+    """Of those that are not: python benchmarks/gains.py NAME."""
+    for name, known in shipped(gain_set, plant).items():
+        for i in range(len(known.sets)):
+            assert not gains.law(plant, name, gain_set, i).source.outside, (name, i)
+
+
 def test_run_i_of_a_law_has_gain_set_i():
     made = grid.grid("duffing", ["observer_free", "power_rate"], "nominal", 50)
     for name in ("observer_free", "power_rate"):
