@@ -147,6 +147,8 @@ def worker(job: Mapping[str, Any], report: Callable[[str], None]) -> dict[str, A
 
     report("reading its folder")
     entry = entries.read(job["folder"])
+    files = sorted(filter(Path.is_file, Path(job["folder"]).glob("*")))
+    beside = [hashlib.sha256(path.read_bytes()).hexdigest() for path in files]  # it may import them
     instances = range(job["instances"])
     failures = list[str]()
 
@@ -160,7 +162,7 @@ def worker(job: Mapping[str, Any], report: Callable[[str], None]) -> dict[str, A
         for name in job["problems"]:
             rows, failed = cached(
                 Path(job["parts"], f"{slug(name)}.json"),
-                [name, entry.digest, job["instances"], job["seed"]],
+                [name, entry.digest, beside, job["instances"], job["seed"]],
                 functools.partial(made, problem(name)),
                 lambda part, path: write_json(path, part),
                 read_json,

@@ -271,7 +271,7 @@ def _library(
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
     if path.suffix == ".c":
         file, warnings = build.library(path, symbol, flags, timeout)
-        return sandbox.Library(file, path, symbol, flags, timeout, warnings)
+        return sandbox.Library(file, path, symbol, timeout, warnings)
     try:
         copy = shutil.copy(
             path, build.fresh(path.suffix)
@@ -280,7 +280,7 @@ def _library(
         raise ScenarioError(
             f"{path} cannot be read ({error.strerror}): give one that can"
         ) from None
-    return sandbox.Library(Path(copy), path, symbol, flags, timeout)
+    return sandbox.Library(Path(copy), path, symbol, timeout)
 
 
 class About(NamedTuple):

@@ -62,7 +62,6 @@ class Library(NamedTuple):
     file: Path  # the library, compiled or copied
     path: Path  # the user's file
     symbol: str  # name of the law's function
-    flags: Sequence[str]  # of the compiler
     timeout: float  # of a trial, s
     warnings: Sequence[str] = ()  # of the compiler
 
