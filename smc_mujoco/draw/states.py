@@ -128,7 +128,7 @@ def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) ->
 def has_dry_friction(scenario: Scenario) -> bool:
     """Return whether dry friction can hold the machine, in its joints or under it."""
     plant = scenario.plant
-    if any(plant.parameters[name] > 0.0 for name in plant.dry):
+    if plant.rubs or any(plant.parameters[name] > 0.0 for name in plant.dry):
         return True
     if any((isinstance(f, Coulomb) and f.level > 0.0) or f.bristles for f in scenario.friction):
         return True

@@ -150,6 +150,8 @@ class Plant:
     smooth: bool = (
         True  # whether its model has no limits, contacts, dry friction and equality constraints
     )
+    # whether the joints of a user's model have dry friction, which is not counted in `smooth`
+    rubs: bool = False
     # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user
     # may meet. `smc.worst_case` varies these parameters if it is given no class
     uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(

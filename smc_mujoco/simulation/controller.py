@@ -52,7 +52,11 @@ from smc_mujoco.simulation.state import (
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
 LAST_STAGE = 1.0 - 1e-8
+<<<<<<< HEAD
 OTHER_CALLBACKS = len(slots())
+=======
+FAST_ROTOR = 12.0  # time constants in a step: with more, a rotor has no lag
+>>>>>>> d258c9ea (Friction of own files holds exactly; soft limits and bristles are told)
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
@@ -707,10 +711,13 @@ def _fly(sim, data, step, stage):
             if step > 0:
                 state.first = spun(rotor, state.first, state.second, sim.step)[0]
             lifted += thrust_at(rotor, state.first)
+        lifted = _command_rotors(sim, data, lifted)
+        _command_rotors(sim, data, lifted)
         for j in range(sim.actuators):
             rotor = rotor_at(data.actuator_user, j)
             state = state_at(sim.states, j)
-            state.second = speed_for(rotor, state.delayed) * max(0.0, 1.0 - rotor.sag * lifted)
+            if min(rotor.rise, rotor.fall) * sim.step > FAST_ROTOR:
+                state.first = state.second
     passed = sim.step * (0.5 if sim.stages == 1 else 0.5 * ((stage + 1) // 2))
     momentum = 0.0
     change = 0.0
@@ -729,6 +736,20 @@ def _fly(sim, data, step, stage):
     data.qfrc_applied[dof + 3] = -v[dof + 4] * momentum
     data.qfrc_applied[dof + 4] = v[dof + 3] * momentum
     data.qfrc_applied[dof + 5] = -change
+
+
+@njit(error_model="numpy")
+def _command_rotors(sim, data, lifted):
+    """Tell the rotors their speeds while all of them give the thrust `lifted`, N, and return what
+    they then give in the middle of the step.
+    """
+    after = 0.0
+    for j in range(sim.actuators):
+        rotor = rotor_at(data.actuator_user, j)
+        state = state_at(sim.states, j)
+        state.second = speed_for(rotor, state.delayed) * max(0.0, 1.0 - rotor.sag * lifted)
+        after += thrust_at(rotor, spun(rotor, state.first, state.second, 0.5 * sim.step)[0])
+    return after
 
 
 @njit(error_model="numpy")

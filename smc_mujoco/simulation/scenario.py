@@ -37,11 +37,12 @@ from smc_mujoco.mechanisms.hardware.drives import (
     drive_step,
 )
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
+from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
     Friction,
     NominalDrive,
+    joint_inertia,
     joint_names,
     moves_alone,
 )
@@ -90,6 +91,7 @@ DRIVE_STEPS = 4  # physics steps per control period: enough behind any drive, se
 MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
+MAX_LATENESS = 0.3  # stiffness times step over damping of bristles, chosen: rest errs by 20 % there
 MAX_ANGLE = (
     3.0 * math.pi
 )  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
@@ -344,7 +346,8 @@ class Scenario:
         """Whether MuJoCo integrates only the plant's equation, with or without drives."""
         if self.friction or self.contact.kind != "none" or self.mechanism != "equation":
             return False
-        return self.plant.smooth and all(part.drives for part in self.actuator)
+        smooth = self.plant.smooth and not self.plant.rubs
+        return smooth and all(part.drives for part in self.actuator)
 
     @property
     def exact_friction(self) -> bool:
@@ -356,9 +359,10 @@ class Scenario:
         Coulomb friction is MuJoCo's, and joints with a formula stick by bristles.
         """
         dry = [part for part in self.friction if not isinstance(part, Viscous)]
-        if len(dry) == 0 or self.integrator not in (None, "RK4"):
+        if not (dry or self.plant.rubs) or self.integrator not in (None, "RK4"):
             return False
-        if dry != [self.formula_friction] and not all(isinstance(part, Coulomb) for part in dry):
+        by_formula = dry == [self.formula_friction] and not self.plant.rubs
+        if not by_formula and not all(isinstance(part, Coulomb) for part in dry):
             return False
         if self.contact.kind != "none" or self.mechanism != "equation":
             return False
@@ -910,9 +914,22 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
 
 
 def _doubts(s: Resolved) -> Iterator[str]:
-    """Yield a sentence about each number that may be in degrees, and each motor that is too
-    weak.
+    """Yield a sentence about each number that may be in degrees, each motor that is too weak, and
+    bristles that are too stiff.
     """
+    for part in s.friction:
+        # the default's are those of the named condition
+        if isinstance(part, LuGre) and part.stiffness > LuGre.stiffness:
+            damping = part.damping
+            if damping is None:
+                damping = part.default_damping(joint_inertia(s.plant).min())
+            if part.stiffness * s.physics_step > MAX_LATENESS * damping:
+                yield (
+                    f"LuGre's bristles of stiffness {part.stiffness:g} and damping {damping:.3g} "
+                    f"are too stiff for a physics step of {s.physics_step:g} s: MuJoCo bends them a "
+                    "step late, and joints rest at wrong places. Give a physics_step of "
+                    f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
+                )
     # ramps may have many turns
     amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):

@@ -4,6 +4,7 @@ not.
 
 import dataclasses
 import math
+import re
 import warnings
 
 import pytest
@@ -125,3 +126,23 @@ def test_the_study_warns_of_nothing():
                 )
             except smc.ScenarioError:  # it is not for this plant
                 continue
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "double_pendulum"])
+@pytest.mark.parametrize("damping", [None, 5.0])
+@pytest.mark.parametrize("stiffness", [1e4, 1e5, 1e6])
+def test_bristles_too_stiff_for_the_step_are_told_and_those_of_the_step_told_are_not(
+    plant, damping, stiffness
+):
+    """With 1e5 a loop rested at a tenth of where the friction holds it, in silence."""
+    fields = {"plant": plant, "law": "none", "control_period": 1e-3}
+    fields["friction"] = smc.hardware.LuGre(0.3, 0.3, 0.1, stiffness, damping)
+    inertia = smc.plant(plant).load().dof_M0.min()
+    resolved = damping or 0.2 * math.sqrt(stiffness * inertia)
+    if stiffness * 2.5e-4 < 0.3 * resolved:
+        smc.Scenario(**fields)
+        return
+    with pytest.warns(smc.errors.ScenarioWarning, match="LuGre.*physics_step") as caught:
+        smc.Scenario(**fields)
+    step = float(re.search(r"physics_step of ([0-9.e-]+) or", str(caught[0].message))[1])
+    smc.Scenario(**fields, physics_step=1e-3 / math.ceil(1e-3 / step))

@@ -408,7 +408,8 @@ def gauges(scenario: Scenario) -> bool:
 
 def reaction_words(traces: Sequence[Trace]) -> str:
     """Return what the reaction of these traces consists of."""
-    if any(trace.scenario.plant.direct and not trace.scenario.plant.smooth for trace in traces):
+    plants = [trace.scenario.plant for trace in traces]
+    if any(plant.direct and (plant.rubs or not plant.smooth) for plant in plants):
         return "friction, limits and contact"
     runs = [trace.scenario for trace in traces if trace.scenario.realistic]
     kinds = {"friction": has_dry_friction, "contact": has_contact, "backlash": backlash_gap}

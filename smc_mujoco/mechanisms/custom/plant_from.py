@@ -19,6 +19,7 @@ import base64
 import dataclasses
 import math
 import os
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
@@ -41,6 +42,10 @@ if TYPE_CHECKING:
 
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
+GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of limits and contacts that give way by more
+# the solver's pass without softness, which a stuck joint does not creep after: the most iterations,
+# and their tolerance
+NOSLIP = 100, 1e-12
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"
 # dynamics of an actuator whose state changes even at ctrl = 0
@@ -76,10 +81,16 @@ class UserModel:
                 spec.add_sensor(name=f"x:{joint}", type=kinds.mjSENS_JOINTPOS, **on_joint)
                 spec.add_sensor(name=f"v:{joint}", type=kinds.mjSENS_JOINTVEL, **on_joint)
         # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
+        hard = False
         for part in (*spec.joints, *spec.tendons):
             if part.frictionloss > 0.0 and np.array_equal(part.solref_friction, SOFT_SOLREF):
                 part.solref_friction = HARD_SOLREF
                 part.solimp_friction = HARD_SOLIMP
+                hard = True
+        touches = any(geom.contype for geom in spec.geoms)
+        touches &= any(geom.conaffinity for geom in spec.geoms)
+        if hard and not (touches or spec.pairs or spec.option.noslip_iterations):
+            spec.option.noslip_iterations, spec.option.noslip_tolerance = NOSLIP
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
                 spec.delete(key)
@@ -178,7 +189,55 @@ def plant_from(
     # laws and gains refer to plants by name
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
-    return _plant(source, own.coerce(channels), name, keyframe, tip)
+    made = _plant(source, own.coerce(channels), name, keyframe, tip)
+    for sentence in soft(source.label, source.compiled(source.read()), keyframe):
+        warnings.warn(sentence, ScenarioWarning, users_stacklevel())
+    return made
+
+
+def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
+    """Return a sentence on joint limits, and one on contacts, that give way to a blow of 1 rad/s
+    (m/s) by more than GIVE.
+
+    A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
+    by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
+    impedance d. Here a is that of the weight at the start.
+    """
+    data = mujoco.MjData(model)
+    if keyframe is not None:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)
+    sentences = []
+
+    def tell(what: str, option: str, solref: np.ndarray, solimp: np.ndarray, load: float) -> None:
+        first, second = solref.T
+        # a time constant and a damping ratio, or a stiffness and a damping, both negative
+        w = np.where(first > 0.0, 1.0 / np.abs(first * second), np.sqrt(np.abs(first)))
+        z = np.where(first > 0.0, second, -second / (2.0 * w))
+        blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
+        rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
+        if blow > GIVE:
+            sentences.append(
+                f"the {what} of {label} give way by {1e3 * blow:.2g} mrad (mm) to a blow of 1 "
+                f"rad/s (m/s), and by about {1e3 * rest:.1g} to its weight: a smaller first number "
+                f"of {option} in the file makes them harder"
+            )
+
+    flags = mujoco.mjtDisableBit
+    off = model.opt.disableflags
+    limited = np.flatnonzero(model.jnt_limited)
+    if not off & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value):
+        pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
+        limits = model.jnt_solref[limited], model.jnt_solimp[limited]
+        tell("joint limits", "solreflimit", *limits, pushed)
+    touching = (model.geom_contype > 0) & np.any(model.geom_conaffinity)
+    if not off & (flags.mjDSBL_CONTACT.value | flags.mjDSBL_CONSTRAINT.value):
+        gravity = np.linalg.norm(model.opt.gravity)
+        tell(
+            "contacts", "solref", model.geom_solref[touching], model.geom_solimp[touching], gravity
+        )
+    return sentences
 
 
 def _plant(
@@ -230,6 +289,8 @@ def _plant(
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
     why_not = missing(model, joints, motors)
+    dry = model.dof_frictionloss > 0.0
+    rubs = bool(np.any(dry)) and np.all(model.dof_solref[dry] == SOFT_SOLREF)
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -245,7 +306,8 @@ def _plant(
         lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
         underactuated=len(joints) > len(pairs),
         direct=True,
-        smooth=smooth(model),
+        smooth=smooth(model, rubs),
+        rubs=rubs,
         unmodelled=why_not,
         limits=limits if any(limit < math.inf for limit in limits) else (),
         tip=tip or "",
@@ -260,16 +322,16 @@ def without_model(x, v, i, p):
     return math.nan, math.nan
 
 
-def smooth(model: mujoco.MjModel) -> bool:
-    """Return whether the model can have no constraint: no limits, dry friction, contacts or
-    equalities.
+def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
+    """Return whether the model can have no constraint: no limits, contacts, equalities, or dry
+    friction; of joints it does not count if it `rubs`.
     """
     flags = mujoco.mjtDisableBit
     if model.opt.disableflags & flags.mjDSBL_CONSTRAINT.value:
         return True
     touching = np.any((model.geom_contype > 0) | (model.geom_conaffinity > 0)) or model.npair
     limited = np.any(model.jnt_limited) or np.any(model.tendon_limited)
-    dry = np.any(model.dof_frictionloss) or np.any(model.tendon_frictionloss)
+    dry = np.any(model.tendon_frictionloss) or (np.any(model.dof_frictionloss) and not rubs)
     return not (
         (touching and not model.opt.disableflags & flags.mjDSBL_CONTACT.value)
         or (limited and not model.opt.disableflags & flags.mjDSBL_LIMIT.value)

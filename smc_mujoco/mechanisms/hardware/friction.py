@@ -151,8 +151,9 @@ class LuGre(Friction):
       stiffness: N m/rad (N/m), greater than 0. The default is chosen: a hundredth of the paper's
         1e5, whose bristles would oscillate at up to 900 rad/s on these plants. At up to 89 rad/s
         they are stable and resolved even at h = 1 ms. They bend by 0.1 mrad under 0.1 N m.
-      damping: N m s/rad (N s/m), 0 or more. It should be more than stiffness h, because MuJoCo
-        bends bristles a step late and they would oscillate. None: 0.2 sqrt(stiffness inertia), with
+      damping: N m s/rad (N s/m), 0 or more. It should be several times stiffness h, because
+        MuJoCo bends bristles a step late: they oscillate and joints rest at wrong places. A
+        scenario warns of stiffer ones than the default. None: 0.2 sqrt(stiffness inertia), with
         each joint's inertia at the plant's default parameters: 2.2 for the pendulum. This is a
         fifth of the paper's rule, chosen because implicitfast counts damping h as inertia, 0.4 % of
         the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
@@ -177,6 +178,10 @@ class LuGre(Friction):
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: "
                 "give static >= coulomb"
             )
+
+    def default_damping(self, inertia: np.ndarray) -> np.ndarray:
+        """Return the damping of bristles on joints of these inertias, kg m^2 (kg)."""
+        return RELATIVE_DAMPING * np.sqrt(self.stiffness * inertia)
 
     def structure(self) -> Hashable:
         return type(self), self.driven
@@ -204,7 +209,7 @@ class LuGre(Friction):
         for joint in joint_ids(model)[:count]:
             bristles.append(model.actuator(PASSIVE + model.joint(joint).name).id)
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
-        damping = RELATIVE_DAMPING * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)[:count]])
+        damping = self.default_damping(model.dof_M0[dof_ids(model)[:count]])
         yield Field(
             "actuator_dynprm",
             (bristles, DAMPING),

@@ -197,6 +197,13 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
 
 
 @functools.lru_cache(maxsize=32)
+def joint_inertia(plant: Plant) -> np.ndarray:
+    """Return the inertia of each channel's joint at the default parameters, (n,) kg m^2 (kg)."""
+    model = compiled(plant.spec())
+    return model.dof_M0[dof_ids(model)]
+
+
+@functools.lru_cache(maxsize=32)
 def moves_alone(plant: Plant) -> bool:
     """Return whether each joint of a plant has its own equation: constant inertia, a motor, and no
     constraint.

@@ -11,13 +11,15 @@ and its angular momentum h = sum of inertia spin W, along the body's third axis,
 with
 -w x (0, 0, h) - (0, 0, h'). spin is 1 counter-clockwise seen from above; the drag of a rotor's
 blades turns the body the other way, which is in the gear of its actuator. The supply sags: c is
-less by the share `sag` times the sum of all thrusts at the start of the physics step. The body's
+less by the share `sag` times the sum of all thrusts in the middle of the physics step. The body's
 drag is -R diag(drag) R' (v - wind), at its origin.
 
 The callback does this at every stage of a physics step, by the closed solution of W' under a
-constant c. So the speed is exact for whatever step, and RK4 keeps its order. Other integrators get
-the thrust at the middle of the step. The torque of h' is that at the stages: a rotor with inertia
-whose lag is shorter than some steps gets too much of it.
+constant c. So the speed is exact for whatever step, but for the sag, which changes within it. A
+rotor with more than 12 time constants in a step has its new speed at once. Poses err by the square
+of the step under RK4: measured orders are 2.0 in all sets of the quadrotor, also with sag. Other
+integrators get the thrust at the middle of the step. The torque of h' is that at the stages: a
+rotor with inertia whose lag is shorter than some steps gets too much of it.
 
 A model has its numbers in `actuator_user` (ROTOR) and `body_user` (drag), where a text `smc:rotors`
 says so.

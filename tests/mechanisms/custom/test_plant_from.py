@@ -7,7 +7,9 @@ import gc
 import importlib.util
 import math
 import pickle
+import re
 import shutil
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -645,25 +647,136 @@ def test_the_file_s_own_sensors_are_no_channels(arm):
     np.testing.assert_array_equal(trace.x, plainly.x)
 
 
-@pytest.mark.parametrize(
-    ("joint", "tendon"),
-    [
-        ('frictionloss="3"', ""),
-        ("", '<tendon><fixed frictionloss="3"><joint joint="j" coef="1"/></fixed></tendon>'),
-    ],
-    ids=["joint", "tendon"],
+LINK = (
+    '<geom type="capsule" fromto="0 0 0 {} 0 0" size=".02" mass="{}" contype="0" conaffinity="0"/>'
 )
-def test_dry_friction_of_the_file_holds_an_arm_that_weighs_less(joint, tendon):
-    """It weighs 2.45 N m when level. As MuJoCo's default it would sink by 0.06 rad in 2 s."""
-    text = f"""<mujoco><worldbody><body><joint name="j" axis="0 1 0" {joint}/>
-      <geom type="capsule" fromto="0 0 0 .5 0 0" size=".02" mass="1" contype="0"/></body>
-      </worldbody>{tendon}<actuator><motor joint="j"/></actuator></mujoco>"""
-    arm = smc.plant_from(text, ["j"])
-    trace = smc.run(smc.Scenario(plant=arm, law="none", duration=2.0))
-    assert np.abs(trace.x).max() < 1e-4
-    soft = text.replace('frictionloss="3"', 'frictionloss="3" solreffriction="0.02 1.5"')
-    kept = smc.plant_from(soft, ["j"]).load()
-    assert 1.5 in (*kept.dof_solref[:, 1], *kept.tendon_solref_fri[:, 1])
+FOREARM = f'<body pos=".3 0 0"><joint name="b" axis="0 1 0" {{}}/>{LINK.format(0.2, 0.5)}</body>'
+ACROSS = """<tendon><fixed frictionloss="9"><joint joint="a" coef="1"/><joint joint="b" coef=".3"/>
+  </fixed></tendon>"""
+# joint a, what it carries beside its link, the rest of the file
+DRY = {
+    "hinge": ('axis="0 1 0" frictionloss="3"', "", ""),
+    "light hinge": ('axis="0 1 0" frictionloss="3" damping=".01" stiffness="2"', "", ""),
+    "slide": ('type="slide" axis="0 0 1" frictionloss="25"', "", ""),
+    "arm": ('axis="0 1 0" frictionloss="9"', FOREARM.format('frictionloss=".8"'), ""),
+    "geared": ('axis="0 1 0" frictionloss="9" armature=".2"', FOREARM.format(""), ""),
+    "tendon": ('axis="0 1 0"', FOREARM.format('frictionloss=".8"'), ACROSS),
+}
+
+
+def dry_arm(kind):
+    """A plant with dry friction of its file, which needs a force to stay level."""
+    joint, carried, more = DRY[kind]
+    motors = '<motor joint="a"/>'
+    if carried:
+        motors += '<motor joint="b"/>'
+    if kind == "geared":
+        more = '<equality><joint joint1="b" polycoef="0 1 0 0 0"/></equality>'
+    text = f"""<mujoco><worldbody><body><joint name="a" {joint}/>{LINK.format(0.3, 0.5)}{carried}
+      </body></worldbody>{more}<actuator>{motors}</actuator></mujoco>"""
+    return text, smc.plant_from(text, ["a", "b"] if carried else ["a"])
+
+
+@smc.law_function(gains={"kp": 1.0, "kd": 1.0})
+def pd(y, gains, memory):
+    """A PD loop of its own: `pid` filters the rate."""
+    return -gains.kp * y.e - gains.kd * y.de, 0.0
+
+
+def set_valued(text, x0, kp, kd, duration):
+    """Where a PD loop on joints comes to rest: steps of 0.25 ms that end in friction's set."""
+    h = 2.5e-4
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    data = mujoco.MjData(model)
+    rows = []
+    levels = []
+    for dof in np.flatnonzero(model.dof_frictionloss):
+        rows.append(np.eye(model.nv)[dof])
+        levels.append(h * model.dof_frictionloss[dof])
+    for tendon in range(model.ntendon):
+        rows.append(model.wrap_prm[:2])
+        levels.append(h * model.tendon_frictionloss[tendon])
+    J = np.array(rows)
+    x = np.array(x0, float)
+    v = np.zeros(model.nv)
+    M = np.zeros((model.nv, model.nv))
+    pushed = np.zeros(len(J))
+    for k in range(round(duration / h)):
+        if k % 4 == 0:
+            u = np.clip(-kp * x - kd * v, -20.0, 20.0)
+        data.qpos[:] = x
+        data.qvel[:] = v
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fullM(model, data, M)
+        inverse = np.linalg.inv(M)
+        w = v + h * inverse @ (u + data.qfrc_passive - data.qfrc_bias)
+        delassus = J @ inverse @ J.T
+        for _ in range(10):
+            for i, level in enumerate(levels):
+                slip = J[i] @ w + delassus[i] @ pushed
+                pushed[i] = np.clip(pushed[i] - slip / delassus[i, i], -level, level)
+        w = w + inverse @ J.T @ pushed
+        x = x + 0.5 * h * (v + w)
+        v = w
+    return x
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{}, {"physics_step": 1e-3}, {"integrator": "RK4"}, {"integrator": "implicitfast"}],
+    ids=str,
+)
+@pytest.mark.parametrize("kind", DRY)
+def test_dry_friction_of_the_file_holds_what_weighs_less(kind, fields):
+    """MuJoCo's default sank by up to a radian in 10 s, its hardest by 1e-4 h times what it holds."""
+    _, plant = dry_arm(kind)
+    held = smc.run(smc.Scenario(plant=plant, law="none", x0=0.0, duration=3.0, **fields))
+    scenario = held.scenario
+    alone = len(DRY[kind][1]) == 0 and scenario.integrator != "implicitfast"
+    assert scenario.exact_friction == alone
+    assert np.abs(held.x[1000:] - held.x[1000]).max() < 2e-7
+    assert np.abs(held.x).max() < (3e-3 if kind == "geared" else 1e-6)  # the file's gear is soft
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hinge", "arm", "tendon"])
+def test_a_loop_rests_where_set_valued_friction_of_the_file_holds_it(kind):
+    text, plant = dry_arm(kind)
+    x0 = [0.3, -0.25][: plant.n]
+    law = pd(kp=40.0, kd=3.0)
+    common = {"plant": plant, "law": law, "x0": x0, "u_max": 20.0, "duration": 1.0}
+    exact = set_valued(text, x0, 40.0, 3.0, 1.0)
+    for fields in ({}, {"physics_step": 1e-3}, {"integrator": "RK4"}):
+        trace = smc.run(smc.Scenario(**common, **fields))
+        np.testing.assert_allclose(trace.x[-1], exact, rtol=0.02)
+
+
+def test_the_file_s_own_softness_of_dry_friction_stays():
+    text, _ = dry_arm("arm")
+    soft = text.replace('frictionloss=".8"', 'frictionloss=".8" solreffriction=".02 1.5"')
+    kept = smc.plant_from(soft, ["a", "b"]).load()
+    assert kept.dof_solref[1].tolist() == [0.02, 1.5]
+    assert kept.dof_solref[0, 0] < 1e-6
+
+
+@pytest.mark.filterwarnings("default:the joint limits of")
+@pytest.mark.parametrize("solref", [".02 1", ".03 .5", ".01 2", "-2500 -100"])
+@pytest.mark.parametrize("speed", [1.0, 4.0])
+def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
+    text = f"""<mujoco><worldbody><body><joint name="j" type="slide" axis="1 0 0" range="-50 40"
+      solreflimit="{solref}" limited="true"/>{LINK.format(0.3, 0.5)}</body></worldbody>
+      <compiler angle="radian"/><actuator><motor joint="j"/></actuator></mujoco>"""
+    with pytest.warns(smc.errors.ScenarioWarning, match="solreflimit") as caught:
+        plant = smc.plant_from(text, ["j"])
+    told = float(re.search(r"by ([0-9.]+) mrad", str(caught[0].message))[1])
+    trace = smc.run(smc.Scenario(plant=plant, law="none", x0=39.9, v0=speed, duration=0.5))
+    assert 1e-3 * told * speed == pytest.approx(trace.x.max() - 40.0, rel=0.1)
+    hard = text.replace(solref, ".004 1")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        smc.plant_from(hard, ["j"])
 
 
 def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
