@@ -52,11 +52,8 @@ from smc_mujoco.simulation.state import (
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
 LAST_STAGE = 1.0 - 1e-8
-<<<<<<< HEAD
 OTHER_CALLBACKS = len(slots())
-=======
 FAST_ROTOR = 12.0  # time constants in a step: with more, a rotor has no lag
->>>>>>> d258c9ea (Friction of own files holds exactly; soft limits and bristles are told)
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 

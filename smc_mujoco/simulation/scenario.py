@@ -926,8 +926,8 @@ def _doubts(s: Resolved) -> Iterator[str]:
             if part.stiffness * s.physics_step > MAX_LATENESS * damping:
                 yield (
                     f"LuGre's bristles of stiffness {part.stiffness:g} and damping {damping:.3g} "
-                    f"are too stiff for a physics step of {s.physics_step:g} s: MuJoCo bends them a "
-                    "step late, and joints rest at wrong places. Give a physics_step of "
+                    f"are too stiff for a physics step of {s.physics_step:g} s: MuJoCo bends them "
+                    "a step late, and joints rest at wrong places. Give a physics_step of "
                     f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
                 )
     # ramps may have many turns
