@@ -5,11 +5,13 @@
 A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches
 by a global name: constants by value, functions by their own code, objects by their class and by
 what pickle keeps of them. Functions and classes of Python and of the numerical packages count by
-name, since the versions of those packages are recorded. A law in C counts by its machine code. File
-names, line numbers and comments do not count. Hashes hold for one version of Python.
+name, since the versions of those packages are recorded. A law in C counts by its machine code, one
+in another file by its content. Names of files, line numbers and comments do not count. Hashes hold
+for one version of Python.
 """
 
 import contextlib
+import dataclasses
 import functools
 import hashlib
 import io
@@ -206,6 +208,12 @@ class _CodePickler(pickle._Pickler):
             contents = sorted(obj, key=repr)
         elif isinstance(obj, Mapping):
             contents = sorted(obj.items(), key=lambda item: repr(item[0]))
+        elif dataclasses.is_dataclass(obj) and hasattr(obj, "digest"):
+            # a file counts by its content: its folder does not compare
+            values = [
+                getattr(obj, field.name) for field in dataclasses.fields(obj) if field.compare
+            ]
+            contents = [type(obj), *values]
         if contents is NotImplemented:
             return contents
         return (str, (f"{type(obj).__name__} {kind}",), contents)

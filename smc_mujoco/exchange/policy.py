@@ -111,9 +111,9 @@ class Controller(Policy):
 
 @dataclasses.dataclass(frozen=True)
 class File:
-    """A policy in a file. Two are equal if path and content are."""
+    """A policy in a file. Two are equal if their content is."""
 
-    path: str
+    path: str = dataclasses.field(compare=False)
     digest: str  # of its bytes
 
     def __call__(self, observation: np.ndarray) -> Any:

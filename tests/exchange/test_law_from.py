@@ -1,5 +1,6 @@
 """A law from elsewhere comes through one door, and is the law that its own reader makes."""
 
+import functools
 import math
 
 import numpy as np
@@ -7,7 +8,10 @@ import pytest
 from helpers.plants_ab import called
 
 import smc_mujoco as smc
+from smc_mujoco.common import fingerprint
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.exchange.fmu.load import FmuLaw
+from smc_mujoco.exchange.policy import File, Policy
 
 RUN = {"plant": "duffing", "duration": 0.2, "u_max": 6.0}
 LEAD = (
@@ -150,3 +154,24 @@ def test_a_system_that_is_not_linear_is_refused_with_a_cure_that_works(refused):
     )
     assert "control.linearize(system, x0, u0)" in refused(lambda: smc.law_from(system))
     assert smc.law_from(control.linearize(system, 0.0, 0.0)).name == "linear_controller"
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    "made",
+    [
+        functools.partial(
+            FmuLaw, name="a", inputs=(), outputs=("u",), constants=(), parameters=(), period=None
+        ),
+        lambda path, digest: Policy(File(path, digest), "a", False, "u_max"),
+    ],
+    ids=["fmu", "network"],
+)
+def test_a_law_s_file_counts_by_its_content_and_not_by_its_folder(made):
+    """Two people with one file in two folders get the same bytes of a table."""
+    here, there, other = (
+        made(path=path, digest=digest)
+        for path, digest in (("/anna/a.fmu", "1"), ("/bert/a.fmu", "1"), ("/anna/a.fmu", "2"))
+    )
+    assert here == there != other
+    assert fingerprint.of(here) == fingerprint.of(there) != fingerprint.of(other)
