@@ -19,9 +19,7 @@ All searches advance together, a batch of runs per round.
 
 import dataclasses
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -30,7 +28,6 @@ from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.constraints import Truth, constrained
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
@@ -398,10 +395,3 @@ def margins_of(
         )
         for i, ((base, kind), search) in enumerate(zip(cells, searches, strict=True))
     ]
-
-
-def save(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
-    """Write margins to a .json file. NaN and infinity are words there, see `files.plain`."""
-    return write_json(
-        with_ending(path, ".json"), [dataclasses.asdict(margin) for margin in margins]
-    )

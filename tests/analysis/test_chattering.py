@@ -17,12 +17,13 @@ from smc_mujoco.analysis.chattering import (
     Chattering,
     _assumptions,
     cycles,
-    save,
+    rows,
     switches,
 )
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
+from smc_mujoco.common.files import plain
 from smc_mujoco.design import chattering, describing_function
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
@@ -417,7 +418,7 @@ def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
             assert not [other for other in others if other in said]
 
 
-def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, snapshot):
+def test_a_file_of_predictions_has_what_was_predicted_and_measured(snapshot):
     run = smc.Scenario(plant="duffing", law=smc.law("classical", k=2.0, c=3.0))
     sure = Chattering(
         amplitude=0.5,
@@ -435,16 +436,10 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, sna
     )
     possible = Chattering(amplitude_range=(0.0, 0.6), frequency_range=(18.0, 21.0))
     changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
-    path = save(
-        [run, run],
-        [sure, possible],
-        [(0.4, 19.0), (math.nan, math.nan)],
-        changes,
-        tmp_path / "a.json",
-    )
+    measured = [(0.4, 19.0), (math.nan, math.nan)]
     said = []
-    for one in json.loads(path.read_text()):
-        said.append(json.dumps(one))
+    for one in rows([run, run], [sure, possible], measured, changes):
+        said.append(json.dumps(plain(one)))
     assert [*said, bool(sure), bool(possible), *(one.marked for one in changes)] == snapshot
 
 

@@ -4,30 +4,19 @@ one.
 
 import dataclasses
 import importlib
-import json
 import math
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.margins import COARSE, FINE, Margin
+from smc_mujoco.analysis.margins import COARSE, FINE
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Plant
 
 margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
 
 BASE = scenarios.scenario("duffing", "observer_free", duration=4.0)
-ROUGH = Margin(
-    plant="p",
-    law="l",
-    kind="delay",
-    value=math.nan,
-    unit="s",
-    resolution=0.1,
-    searched=1.0,
-    theory=math.inf,
-)
 
 
 @pytest.fixture(scope="module")
@@ -279,13 +268,3 @@ def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
             search.levels, np.round(np.divide(search.levels, least)) * least, rtol=1e-12, atol=0.0
         )
         assert search.resolution(0.0) % least == pytest.approx(0.0)
-
-
-# files and the command
-
-
-def test_margins_survive_their_file(found, tmp_path):
-    path = margins.save([*found, ROUGH], tmp_path / "margins.json")
-    *again, rough = json.loads(path.read_text(), parse_constant=pytest.fail)
-    assert [margins.Margin(**entry) for entry in again] == found
-    assert (rough["value"], rough["theory"]) == ("NaN", "Infinity")

@@ -489,8 +489,7 @@ def _task(
             return task
         task = task._replace(inside=random.uniform(low, high))
     raise ScenarioError(
-        f"no gains of {law.name} in the box of its search hold "
-        f"{' and '.join(first.law.template.conditions)}: "
+        f"no gains of {law.name} in the box of its search hold the conditions of its theorem: "
         "give other gains that the search holds, or outside_theorem=True"
     )
 

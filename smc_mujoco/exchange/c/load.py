@@ -203,14 +203,14 @@ def law_from_c(
         _try(library, about)
     law = CLaw(library.path, symbol, library.file)
     law.set_up(len(about.gains), about.memory, name)
-    words = {"requires_model": about.modelled, "joint": bool(about.joints)}
     return template_decorator(
         "law",
         about.gains,
         about.memory,
         relative_degree=about.degree,
         plants=plants,
-        **words,
+        requires_model=about.modelled,
+        joint=bool(about.joints),
     )(law)
 
 

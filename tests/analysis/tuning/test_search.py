@@ -344,6 +344,7 @@ def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lif
     monkeypatch.setattr(search.Trials, "_costs", seen)
     found = tune(plant, law, 24, objective=LEAN, searches=1)
     template = found.law.template
+    assert template is not None
     names = tuple(found.bounds)
     held = dict(found.law.gains)
 
