@@ -217,6 +217,7 @@ scene = smc.Scene(title="Short", conditions={"nominal": {"only": run}})
 """)
     code = """
 from smc_mujoco import *
+from smc_mujoco.envs import *
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common import gl
 names = [name for name in plants() if name != "quadrotor"]

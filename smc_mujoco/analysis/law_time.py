@@ -12,17 +12,16 @@ law `pid` is timed in turn with it, on the same measurements.
 # (an intrinsic is called without its typing context)
 import dataclasses
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from smc_mujoco.common.jit import NotCompilable, call
-from smc_mujoco.control.law import Law, Measurement, law
-from smc_mujoco.simulation import cfunctions
-from smc_mujoco.simulation.python_controller import Controller
-from smc_mujoco.simulation.python_functions import Failure
-from smc_mujoco.simulation.run import run
+from smc_mujoco.control.law import Law, law
+from smc_mujoco.simulation import callback, cfunctions, state
+from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.scenario import Scenario
 
 LONGEST = 2.0  # s of a run, with the approach and some rest of most; chosen
@@ -39,33 +38,21 @@ class LawTime(NamedTuple):
     ratio: float  # of the median to that of `pid` on the same measurements
 
 
-class _Listener:
-    """In place of a controller's law: keeps what channel 0 measures, and gives the u of a run."""
-
-    def __init__(self, u: np.ndarray):
-        self.name = "listener"
-        self.u = u
-        self.seen = list[Measurement]()
-
-    def __call__(self, i: int, y: Measurement) -> tuple[float, float]:
-        if i == 0:
-            self.seen.append(y)
-        return float(self.u[len(self.seen) - 1, i]), 0.0
-
-
 def law_time(scenario: Scenario) -> LawTime | None:
-    """Return the time of a scenario's law in channel 0; None if it is of many joints, does not
-    compile, or fails.
+    """Return the time of a scenario's law in its last channel; None if it is of many joints, does
+    not compile, or fails.
     """
     of_channel = scenario.resolved.law
     if of_channel.joint:
         return None
-    timed = of_channel.of_channel(0)
+    timed = of_channel.of_channel(scenario.plant.driven - 1)
     reference = law("pid")
     try:
         cfunctions.compile_component(timed)
-        seen = _measured(scenario)
-    except (NotCompilable, Failure):
+    except NotCompilable:
+        return None
+    seen = _measured(scenario)
+    if not len(seen):
         return None
     # in turn, as loads come and go
     rounds = []
@@ -77,18 +64,19 @@ def law_time(scenario: Scenario) -> LawTime | None:
 
 
 def _measured(scenario: Scenario) -> np.ndarray:
-    """Return what the law measures in channel 0 in a run, (samples, fields of a Measurement)."""
-    trace: Any = run(
-        dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST))
-    )
-    controller = Controller(trace.scenario)
-    listener = _Listener(trace.u)
-    controller.law = listener  # pyright: ignore[reportAttributeAccessIssue]
-    for k in np.flatnonzero(np.isfinite(trace.u).all(axis=1)).tolist():
-        controller(k, float(trace.t[k]), trace.x[k], trace.v[k])
-    if not listener.seen:
-        raise Failure("the run has no sample")
-    return np.array(listener.seen)
+    """Return what the law measures last at each sample of a run, (samples, fields of a
+    Measurement).
+    """
+    short = dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST))
+    seen = []
+    with callback.installed():
+        batch = ScenarioBatch([prepare(short)], threads=1)
+        for k in range(short.samples):
+            batch.advance_to((k + 1) * short.steps)
+            if batch.records["failure"][0] != state.FINE:
+                break
+            seen.append(batch.records["y"][0].item())
+    return np.array(seen)
 
 
 def _round(timed: Law, seen: np.ndarray) -> np.ndarray:

@@ -213,7 +213,8 @@ def suggesting(kind: type[T]) -> type[T]:
     def made(self: T, *args: Any, **fields: Any) -> None:
         for name in fields:
             if name not in names:
-                hint = str(unknown("field", name, names)).partition(": ")[2]
+                meant = getattr(kind, "meant", {}).get(name, name)
+                hint = str(unknown("field", meant, names)).partition(": ")[2]
                 raise TypeError(
                     f"{kind.__name__}() got an unexpected keyword argument {name!r}: {hint}"
                 )

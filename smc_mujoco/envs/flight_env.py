@@ -70,27 +70,44 @@ class FlightEnv(PlantEnv):
     ) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         x0, v0 = self.setting.draw_start(random, options)
-        start = dataclasses.replace(
-            self.setting.flown, x0=tuple(x0.tolist()), v0=tuple(v0.tolist())
-        )
-        with callback.installed():
-            self.batch = ScenarioBatch([prepare(start)], threads=1)
-        place = int(self.batch.records["law"]["memory"][0])
-        self.memory = state.view(self.batch.packed[0].numbers, place, (len(x0),))
+        self.start = dataclasses.replace(self.setting.flown, x0=x0, v0=v0)
         self.episodes += 1
-        self.sample = 0
+        self.fly([])
         self.read_state(data)
+
+    def fly(self, wrenches: list[np.ndarray]) -> None:
+        """Begin at the start, and take a control period under each force and torque, (6,)."""
+        self.flown: list[np.ndarray] = []
+        self.sample = 0
+        with callback.installed():
+            self.batch = ScenarioBatch([prepare(self.start)], threads=1)
+        place = int(self.batch.records["law"]["memory"][0])
+        self.memory = state.view(self.batch.packed[0].numbers, place, (6,))
+        for wrench in wrenches:
+            self.fly_on(wrench)
+
+    def fly_on(self, wrench: np.ndarray) -> None:
+        """Take a control period under a force and a torque in the axes of the world, (6,)."""
+        self.memory[:] = wrench
+        self.flown.append(wrench)
+        self.sample += 1
+        with callback.installed():
+            self.batch.advance_to(self.sample * self.setting.scenario.steps)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but MuJoCo's batch, which cannot be copied: a copy flies its episode again."""
+        return super().__getstate__() | {"batch": None, "memory": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.fly(self.flown)
 
     def advance(self, action: Any) -> None:
         """Take one control period and read the pose."""
         share = 0.5 + 0.5 * self.setting.command(action)
         wrench = (self.least + share * (self.most - self.least)) @ self.wrenches
         attitude = rotation.quaternion(*self.x[3:])
-        self.memory[:3] = rotation.turned(attitude, *wrench[:3])
-        self.memory[3:] = wrench[3:]
-        self.sample += 1
-        with callback.installed():
-            self.batch.advance_to(self.sample * self.setting.scenario.steps)
+        self.fly_on(np.array([*rotation.turned(attitude, *wrench[:3]), *wrench[3:]]))
         self.read_state(self.data)
 
     def read_state(self, data: mujoco.MjData) -> None:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
+from smc_mujoco.common.text import counted
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -154,8 +155,12 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[flo
         values = items_of(name, value)
     n = s.plant.n
     if len(values) not in (1, n):
+        wanted = "one number"
+        if n > 1:
+            wanted += f", or {n}"
         raise ScenarioError(
-            f"{name} has {len(values)} values for {n} channels: give one number or {n}"
+            f"{name} has {len(values)} values, and {s.plant.name} {counted(n, 'channel')}: give "
+            f"{wanted}"
         )
     return tuple(
         number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values * (n // len(values))

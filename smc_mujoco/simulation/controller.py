@@ -188,7 +188,7 @@ def _diverged(sim, data):
 def _interfered(sim):
     """Return whether other code has set a callback of MuJoCo's, perhaps in another thread."""
     slots = integers(sim.slots)
-    for i in range(OTHER_CALLBACKS):
+    for i in range(OTHER_CALLBACKS):  # noqa: SIM110  # numba knows no generator
         if integers(slots[i])[0] != 0:
             return True
     return False

@@ -167,7 +167,7 @@ def grid(
     """
     if not isinstance(seeds, Iterable):
         seeds = range(whole("seeds", seeds, 1, MAX_ITEMS))
-    seeds = listed("seeds", seeds)
+    seeds = [whole("a seed", seed, 0, GRID_SEEDS - 1) for seed in listed("seeds", seeds)]
     plants = listed("plants", plants)
     laws = listed_laws(laws)
     conditions = listed("conditions", conditions)

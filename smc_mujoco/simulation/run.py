@@ -16,14 +16,14 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from typing import Annotated, overload
+from typing import Annotated, Any, overload
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import fingerprint, guard
-from smc_mujoco.common.constraints import Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, users_stacklevel
+from smc_mujoco.common.constraints import Flag, Whole, constrained
+from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
@@ -111,17 +111,26 @@ def run(
     and a run fails if other code sets one, or takes its control callback away. Ctrl-C is heard
     within seconds; a compiled law of yours that never returns then computes on until Python ends.
     """
-    if isinstance(scenarios, str):
-        raise ScenarioError(
-            f"cannot run {scenarios!r}: give smc.Scenario(plant={scenarios!r}, law='pid')"
-        )
-    prepared = list(map(prepare, [scenarios] if isinstance(scenarios, Scenario) else scenarios))
+    shown_bar = Flag()("progress", progress)
+    prepared = list(map(prepare, one_or_several(scenarios)))
     work = sum(item.scenario.work for item in prepared)
-    with bar(counted(len(prepared), "run"), work, shown=progress) as progress_bar:
+    with bar(counted(len(prepared), "run"), work, shown=shown_bar) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
     if isinstance(scenarios, Scenario):
         return traces[0]
     return [traces[i] for i in range(len(prepared))]
+
+
+def one_or_several(scenarios: Any) -> Iterable[Scenario | Prepared]:
+    """Return one scenario, or what yields several, as the latter."""
+    if isinstance(scenarios, Scenario):
+        return [scenarios]
+    iterable = isinstance(scenarios, Iterable) and getattr(scenarios, "shape", None) != ()
+    if iterable and not isinstance(scenarios, str):
+        return scenarios
+    raise ScenarioError(
+        f"cannot run {shown(scenarios)}: give smc.Scenario(plant='duffing', law='pid'), or several"
+    )
 
 
 def stream(
@@ -131,7 +140,9 @@ def stream(
 ) -> Iterator[tuple[int, Trace]]:
     """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
-    for batch in _batches(enumerate(map(prepare, scenarios)), threads):
+    if not callable(report):
+        raise ScenarioError(f"report is {shown(report)}: give a function of a number of steps")
+    for batch in _batches(enumerate(map(prepare, one_or_several(scenarios))), threads):
         indices, items = zip(*batch, strict=True)
         if items[0].why_not:
             words = f"{items[0].why_not}; it is called in Python"

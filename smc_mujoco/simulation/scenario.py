@@ -11,7 +11,7 @@ import functools
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 import mujoco
 import numpy as np
@@ -96,6 +96,8 @@ MAX_ANGLE = (
     3.0 * math.pi
 )  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
+LONG_TIME = 1.0  # s; chosen: an input delay or a control period that is as long may be in ms
+LARGE_FACTOR = 15.0  # chosen: a mismatch that is as large may be in percent
 MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 
 Out = TypeVar("Out")
@@ -175,10 +177,18 @@ class Scenario:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
 
     Warns:
-      ScenarioWarning: a start or a reference that may be in degrees; or a DCMotor that cannot hold
-      a joint where it
-        starts, though a force of u_max could.
+      ScenarioWarning: a start or a reference that may be in degrees, a delay in ms, a mismatch in
+        percent; or a DCMotor that cannot hold a joint where it starts, though a force of u_max
+        could.
     """
+
+    # other names of fields -> ours, for the error that an unknown field raises
+    meant: ClassVar[Mapping[str, str]] = {
+        "controller": "law",
+        "system": "plant",
+        "dt": "control_period",
+        "delay": "input_delay",
+    }
 
     # converted in this order
     plant: Plant = field(coerce.plant)
@@ -914,8 +924,8 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
 
 
 def _doubts(s: Resolved) -> Iterator[str]:
-    """Yield a sentence about each number that may be in degrees, each motor that is too weak, and
-    bristles that are too stiff.
+    """Yield a sentence about each number that may be in degrees, ms or percent, each motor that is
+    too weak, and bristles that are too stiff.
     """
     for part in s.friction:
         # the default's are those of the named condition
@@ -930,6 +940,13 @@ def _doubts(s: Resolved) -> Iterator[str]:
                     "a step late, and joints rest at wrong places. Give a physics_step of "
                     f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
                 )
+    for what in ("input_delay", "control_period"):
+        if (seconds := getattr(s, what)) >= LONG_TIME:
+            yield f"{what} is {seconds:g} s: if it is {seconds:g} ms, give {seconds / 1e3:g}"
+    for name, factor in s.mismatch.items():
+        if factor >= LARGE_FACTOR and name not in s.plant.added:
+            fact = f"the true {name} of {s.plant.name} is {factor:g} times the nominal one"
+            yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
     # ramps may have many turns
     amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):

@@ -3,6 +3,7 @@ space.
 """
 
 import dataclasses
+import itertools
 import math
 import os
 import re
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
 from smc_mujoco.mechanisms.inverse_kinematics import solve
 from smc_mujoco.mechanisms.named import as_plant
@@ -25,6 +26,7 @@ SECOND_SPELLINGS = ("s", "sec", "second", "seconds")
 KNOT_SPACING = (
     0.01  # s, of a path in space; chosen: between knots the tip leaves its path by micrometres
 )
+MAX_POINTS = 10_000_000  # of a series; chosen: a trace has about as many samples at most
 MAX_KNOTS = 1_000_000  # of a path in space: minutes of computing
 
 
@@ -240,9 +242,12 @@ def _floats(what: str, items: object) -> tuple[float, ...]:
         items = items.tolist()
     if not isinstance(items, Iterable) or isinstance(items, str | bytes | dict | set):
         raise ScenarioError(f"{what} are {shown(items)}: give a sequence of numbers")
+    values = list(itertools.islice(items, MAX_POINTS + 1))
+    if len(values) > MAX_POINTS:
+        raise ScenarioError(f"{what} are more than {MAX_POINTS:,}: give fewer")
     return tuple(
         x if type(x) is float and math.isfinite(x) else number(f"{what}[{i}]", x)
-        for i, x in enumerate(items)
+        for i, x in enumerate(values)
     )
 
 
@@ -321,10 +326,9 @@ def cartesian_path(
         array = np.asarray(points, float)
     except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
         array = np.empty(0)
-    if array.shape != (len(times), 3):
+    if array.ndim != 2 or array.shape[1] != 3:
         raise ScenarioError(
-            f"points are {shown(points)}: give a position (x, y, z) in m for each of {len(times)} "
-            "times"
+            f"points are {shown(points)}: give positions (x, y, z) in m, one a time"
         )
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
     first = path[0].times[0]
@@ -339,7 +343,7 @@ def cartesian_path(
     if x0 is None:
         start = plant.x0
     else:
-        start = tuple(number("x0", x) for x in x0)
+        start = tuple(number("x0", x) for x in items_of("x0", x0))
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
     if site is not None:

@@ -2,6 +2,9 @@
 passes.
 """
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -94,6 +97,21 @@ def test_copies_move_like_single_environments():
         np.testing.assert_array_equal(observations[1], observation)
         assert rewards[1] == reward
     assert truncated.all()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+@pytest.mark.parametrize("steps", [0, 3])
+def test_a_copy_flies_on_from_where_its_original_is(steps, copied):
+    original = FlightEnv("quadrotor", "track", {"duration": 0.1})
+    original.reset(seed=1)
+    thrusts = np.random.default_rng(0).uniform(-1.0, 1.0, (steps + 3, 4))
+    for action in thrusts[:steps]:
+        original.step(action)
+    other = copied(original)
+    for action in thrusts[steps:]:
+        expected = original.step(action)
+        np.testing.assert_array_equal(other.step(action)[0], expected[0])
+    np.testing.assert_array_equal(other.reset()[0], original.reset()[0])
 
 
 def test_what_is_no_free_body_or_wants_copies_is_told_where_to_go():

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 
+from helpers.python_controller import Controller
 from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled, torque
@@ -21,7 +22,6 @@ from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
 from smc_mujoco.simulation.prepare import motors_at_start, pause_phase
-from smc_mujoco.simulation.python_controller import Controller
 from smc_mujoco.simulation.python_functions import Failure, evaluate, evaluate_friction
 from smc_mujoco.simulation.run import DISTURBANCE_NOT_FINITE, PLANT_DIVERGED
 from smc_mujoco.simulation.scenario import Scenario

@@ -7,11 +7,12 @@ import math
 
 import numpy as np
 import pytest
+from helpers import python_controller
 from numba import njit
 from scipy import stats
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import philox, python_controller
+from smc_mujoco.simulation import philox
 
 LARGEST_SEED = 2**53 - 1
 

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 from helpers import arms
+from helpers.python_controller import Controller
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.python_controller import Controller
 from smc_mujoco.simulation.python_functions import Failure
 
 NOISE = smc.Noise(position=0.001, velocity=0.01)

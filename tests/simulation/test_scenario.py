@@ -376,9 +376,31 @@ def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(ref
 
 
 @pytest.mark.parametrize(
+    ("plant", "x0", "words"),
+    [
+        ("duffing", [0.1, 0.2], "2 values, and duffing 1 channel: give one number$"),
+        ("cart_pole", [0.1] * 3, "3 values, and cart_pole 2 channels: give one number, or 2$"),
+    ],
+)
+def test_a_start_of_another_size_names_the_sizes_that_there_are(plant, x0, words):
+    for name in ("x0", "v0"):
+        with pytest.raises(smc.ScenarioError, match=f"^{name} has {words}"):
+            smc.Scenario(plant=plant, law="none", **{name: x0})
+
+
+@pytest.mark.parametrize("given", [5, 0.5, None, "duffing", np.array(1.0), np.timedelta64(1, "s")])
+def test_what_is_no_scenario_is_refused_by_run_and_stream_alike(given, refused):
+    refused(lambda: smc.run(given), "give smc.Scenario(")
+    refused(lambda: list(smc.stream(given)), "give smc.Scenario(")
+
+
+@pytest.mark.parametrize(
     ("make", "meant"),
     [
         (lambda: smc.Scenario(plant="duffing", delay=0.02), "'input_delay'"),
+        (lambda: smc.Scenario(plant="duffing", controller="pid"), "'law'"),
+        (lambda: smc.Scenario(plant="duffing", dt=0.01), "'control_period'"),
+        (lambda: smc.Scenario(system="duffing"), "'plant'"),
         (lambda: dataclasses.replace(smc.Scenario(plant="duffing", law="pid"), noize=1), "'noise'"),
         (lambda: smc.Uncertainty(delai=(0.0, 0.01)), "'delay'"),
     ],

@@ -65,6 +65,30 @@ def test_angles_of_several_turns_may_be_degrees():
         assert [warning.filename for warning in caught] == [__file__]
 
 
+@pytest.mark.parametrize(
+    ("fields", "cure"),
+    [
+        ({"input_delay": 1.0}, "1 ms, give 0.001"),
+        ({"input_delay": 5.0}, "5 ms, give 0.005"),
+        ({"control_period": 2.0}, "2 ms, give 0.002"),
+        ({"mismatch": {"mass": 30.0}}, "30 % more, give 1.3"),
+        ({"mismatch": {"l": 15.0}}, "15 % more, give 1.15"),
+    ],
+)
+def test_a_number_that_may_be_in_ms_or_percent_is_questioned(fields, cure):
+    plain = smc.Scenario(plant="inverted_pendulum", law="none", duration=6.0)
+    with pytest.warns(smc.errors.ScenarioWarning, match=f": if it is {cure}$"):
+        dataclasses.replace(plain, **fields)
+
+
+def test_long_delays_and_large_factors_that_may_be_meant_are_not_questioned():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for fields in ({"input_delay": 0.99}, {"mismatch": {"mass": 14.9}}):
+            smc.Scenario(plant="inverted_pendulum", law="none", **fields)
+        smc.Scenario(plant="panda", law="none", mismatch={"payload": 20.0})
+
+
 def test_turns_ramps_places_and_what_is_no_angle_are_no_degrees():
     for fields in (
         {"x0": 1.5 * math.tau},

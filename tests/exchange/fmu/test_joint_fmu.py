@@ -12,13 +12,13 @@ from helpers import arms  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 from helpers.flights import recorded, scenarios  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
+from helpers.python_controller import Controller  # noqa: E402
 from numba import njit  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.control.joint_law import coriolis, jacobian, product  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
-from smc_mujoco.simulation.python_controller import Controller  # noqa: E402
 
 pytestmark = needs_compiler
 

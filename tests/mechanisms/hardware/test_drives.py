@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers.models import build
+from helpers.python_controller import Controller
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
@@ -16,7 +17,6 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, drive_step, rippled
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
-from smc_mujoco.simulation.python_controller import Controller
 
 H = 2.5e-4  # s
 RK4 = mujoco.mjtIntegrator.mjINT_RK4

@@ -4,7 +4,7 @@ simulator.
     readings -> noise, encoder -> velocity estimator -> law -> saturation
 
 It calls laws, estimators and signals as the Python functions they are, and has none of the
-callback's code. Agents act by it, and the tests compare the callback with it.
+callback's code, which the tests compare with it.
 """
 
 import math
