@@ -33,10 +33,6 @@ CATALOGUES = {
 }
 # Relative degree -> what a law acts on.
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
-ARRIVALS = {
-    "s": "s = 0 after a finite time",
-    "e": "e = 0 after a finite time",
-}  # of `Template.finite_time`
 LINES = re.compile(r"(?<=\S)\n(?=(?!Sources?:)\S)")  # ends of lines within a paragraph
 CALL_TEMPLATES = {  # kind of component -> how a user makes one
     "law": "smc.law({})",
@@ -134,13 +130,16 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
             [*template.conditions, *(f"{words} (advice)" for words in template.advice)]
         )
         or "none on the gains alone",
-        "degree": _degree(template),
         "family": template.family,
-        "promises": _promises(template),
         "package": package,
         "use": CALL_TEMPLATES[template.kind].format(call),
     }
     if template.kind == "law":
+        degree = template.relative_degree
+        rows["degree"] = f"{degree}: acts on {DEGREES.get(degree, 'joints')}"
+        rows["properties"] = ", ".join(
+            name for name, needed in PROPERTIES.items() if needed.holds(template)
+        )
         rows["reads"] = ", ".join(name for name in Measurement._fields if name in reads(template))
         rows["plants"] = ", ".join(template.plants) or "all with an actuator at each joint"
     _print_rows(rows, console)
@@ -156,34 +155,3 @@ def _gains(template: Template) -> Iterable[str]:
         yield f"{name:{width}} = {gain.default:<8g}{allowed}".rstrip()
     if not template.gains:
         yield "none"
-
-
-def _promises(template: Template) -> str:
-    """Return what theory says about a law's u and its convergence, in words; "" for surfaces and
-    estimators.
-    """
-    if template.kind != "law":
-        return ""
-    promises = []
-    if template.continuous:
-        promises.append("a continuous u")
-    if template.finite_time in ARRIVALS:
-        promises.append(ARRIVALS[template.finite_time])
-    for name in template.accuracy:
-        order = template.order(name, template.defaults)
-        promises.append(f"|{name}| of order {order:.3g} in the control period")
-    return ", ".join(promises)
-
-
-def _degree(template: Template) -> str:
-    """Return the relative degree in words: of a law's sliding variable, or of a surface; "" for an
-    estimator.
-    """
-    degree = template.relative_degree
-    if template.kind == "law":
-        if degree in DEGREES:
-            return f"{degree}: acts on {DEGREES[degree]}"
-        return str(degree)
-    if template.kind == "surface":
-        return f"{degree}: for the laws of that degree"
-    return ""

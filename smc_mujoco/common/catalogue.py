@@ -27,9 +27,9 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint
 from types import ModuleType
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown, users_stacklevel, words
+from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, words
 
 NAME = operator.attrgetter("name")
 PREFIX = "smc_mujoco."
@@ -159,7 +159,6 @@ class Catalogue(Mapping[str, T_co]):
         return name in self.own or name in self.added
 
     def __iter__(self) -> Iterator[str]:
-        _warn_of_unknown_groups()
         for name in sorted({*self.own, *self.added}):
             try:
                 self[name]
@@ -170,20 +169,6 @@ class Catalogue(Mapping[str, T_co]):
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
-
-    @overload
-    def get(self, key: str, /) -> T_co | None: ...
-    @overload
-    def get(self, key: str, default: T_co | U, /) -> T_co | U: ...
-    def get(self, key: str, default: Any = None, /) -> Any:
-        """Return an entry, or the default if there is none of that name or it cannot be loaded."""
-        try:
-            return self[key]
-        except KeyError:
-            return default
-        except ScenarioError as error:
-            warn(str(error))
-            return default
 
     def __or__(self, other: Mapping[str, U]) -> "Catalogue[T_co | U]":
         """Return the entries of both.
@@ -282,14 +267,6 @@ def warn(message: str) -> None:
     if message not in _warned:
         _warned.add(message)
         warnings.warn(message, PackageWarning, users_stacklevel())
-
-
-def _warn_of_unknown_groups() -> None:
-    """Warn of entry points in groups that do not exist."""
-    for group, (point, *_) in _points().items():
-        if group not in KINDS:
-            package = point.dist.name if point.dist else point.value
-            warn(f"package {package!r}: {unknown('group of entry points', group, KINDS)}")
 
 
 # finding entries

@@ -36,8 +36,6 @@ from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 SEAL_SIZE = hashlib.sha256().digest_size
-# in the cache: functions of one name, such as laws that are written from numbers
-MAX_FILES_OF_A_NAME = 64
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
@@ -377,29 +375,16 @@ class Cache:
             return
         path = self._path(signature, library.codegen)
         content = internals.dumps(result._reduce())
-        with contextlib.suppress(OSError, ScenarioError):  # nowhere to write
-            with replacing(path) as file:
-                file.write_bytes(_seal(path, content) + content)
-            self._remove_oldest()
+        # there may be nowhere to write
+        with contextlib.suppress(OSError, ScenarioError), replacing(path) as file:
+            file.write_bytes(_seal(path, content) + content)
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         """Return the path of a signature's file for this machine."""
         made_by = (self.key.used, str(signature), codegen.magic_tuple(), numba.__version__)
         digest = hashlib.sha256(repr(made_by).encode()).hexdigest()
-        return self.folder / f"{self._stem}-{digest[:32]}.code"
-
-    @property
-    def _stem(self) -> str:
-        return self.key.name[:80]  # a file's name has 255 bytes at most
-
-    def _remove_oldest(self) -> None:
-        """Remove files of other functions of this name, those written first, beyond
-        MAX_FILES_OF_A_NAME.
-        """
-        files = self.folder.glob(f"{self._stem}-{'?' * 32}.code")
-        written = sorted(files, key=lambda path: path.stat().st_mtime)
-        for path in written[:-MAX_FILES_OF_A_NAME]:
-            path.unlink()
+        # a file's name has 255 bytes at most
+        return self.folder / f"{self.key.name[:80]}-{digest[:32]}.code"
 
 
 def _seal(path: Path, content: bytes) -> bytes:

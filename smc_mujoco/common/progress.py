@@ -1,18 +1,11 @@
-"""Progress of work that takes more than two seconds: a bar on a terminal and in a notebook, lines
-in a log.
-"""
+"""Progress of work that takes more than two seconds: a bar on a terminal, lines elsewhere."""
 
 import contextlib
-import html
 import math
-import shutil
 import sys
-import textwrap
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
-
-from smc_mujoco.common.html import in_notebook
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,7 +13,6 @@ if TYPE_CHECKING:
 # called with the work done and the whole work, which may be an estimate
 Report = Callable[[float, float], None]
 SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left
-DRAWING_PERIOD = 0.2  # s between two drawings of a notebook's bar
 LINE_PERIOD = 10.0  # s between two lines of a log
 
 
@@ -97,10 +89,7 @@ def bar(
     from rich.console import Console
 
     console = Console(stderr=True)
-    if in_notebook():
-        with _in_cell() as draw:
-            yield Bar(what, whole, counted, draw, DRAWING_PERIOD)
-    elif console.is_terminal:
+    if console.is_terminal and not console.is_jupyter:
         with _on_terminal(what, whole, counted, console) as draw:
             yield Bar(what, whole, counted, draw)
     else:
@@ -112,47 +101,6 @@ def bar(
             LINE_PERIOD,
             LINE_PERIOD,
         )
-
-
-def note(text: str) -> None:
-    """Say something about work that begins, on stderr."""
-    width = shutil.get_terminal_size().columns
-    print(
-        textwrap.fill(text, width, break_long_words=False, break_on_hyphens=False),
-        file=sys.stderr,
-        flush=True,
-    )
-
-
-def about(seconds: float) -> str:
-    """Return a duration in words that promise no more than they know: "about 40 s", "about 3
-    minutes".
-    """
-    if seconds < 95.0:
-        return f"about {max(1, round(seconds, -1 if seconds > 10.0 else None)):.0f} s"
-    return f"about {round(seconds / 60.0):.0f} minutes"
-
-
-@contextlib.contextmanager
-def _in_cell() -> Iterator[Callable[[Bar], None]]:
-    """Yield what draws a bar in a notebook's cell, where it vanishes in the end.
-
-    Rich would need ipywidgets.
-    """
-    from IPython.display import HTML, display
-
-    cell: Any = display(HTML(""), display_id=True)
-
-    def draw(bar: Bar) -> None:
-        value = ""
-        if bar.whole:
-            value = f' value="{bar.share:.3f}" max="1"'
-        cell.update(HTML(f"<progress{value}></progress> {html.escape(str(bar))}"))
-
-    try:
-        yield draw
-    finally:
-        cell.update(HTML(""))
 
 
 @contextlib.contextmanager

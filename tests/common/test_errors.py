@@ -109,9 +109,6 @@ REFUSED = [  # call, what the sentence says
     ),
 ]
 NAMES = {  # what is typed -> what is said of it
-    "STA": "did you mean 'super_twisting'?",
-    "STSMC": "did you mean 'super_twisting'?",
-    "TSM": "did you mean 'terminal'?",
     "STX": "choose from lqr, super_twisting, terminal",
     "sta": "choose from lqr, super_twisting, terminal",
     "Terminal": "did you mean 'terminal'?",

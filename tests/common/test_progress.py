@@ -1,9 +1,5 @@
 """Progress in a notebook: a bar in the cell, without a warning, and nothing left of it."""
 
-import re
-import sys
-import types
-import warnings
 from unittest.mock import MagicMock, call
 
 import pytest
@@ -11,51 +7,6 @@ import pytest
 from smc_mujoco.common import progress
 
 pytestmark = pytest.mark.quick
-
-
-class ZMQInteractiveShell:
-    """What get_ipython returns in a notebook, by the name that rich looks at."""
-
-
-@pytest.fixture
-def cell(monkeypatch) -> list[str]:
-    """A notebook's cell: what it showed, in order."""
-    shown: list[str] = []
-    handle = types.SimpleNamespace(update=shown.append)
-    ipython = types.ModuleType("IPython")
-    display = types.ModuleType("IPython.display")
-    display.HTML = str
-    display.display = lambda text, display_id: shown.append(text) or handle
-    ipython.display = display
-    monkeypatch.setitem(sys.modules, "IPython", ipython)
-    monkeypatch.setitem(sys.modules, "IPython.display", display)
-    monkeypatch.setattr("builtins.get_ipython", ZMQInteractiveShell, raising=False)
-    return shown
-
-
-def test_a_notebook_gets_a_bar_that_moves_and_vanishes_without_a_warning(cell, monkeypatch, capsys):
-    clock = iter(range(100))
-    monkeypatch.setattr(progress.time, "monotonic", lambda: float(next(clock)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with progress.bar("runs <b>", 8.0) as bar:
-            bar.advance(2.0)
-            bar.reached(4.0, 8.0)
-            bar.says("nearly & done")
-    shares = []
-    for text in cell[1:4]:
-        shares.append(re.findall(r'value="([^"]+)"', text))
-    assert shares == [["0.250"], ["0.500"], ["0.500"]]
-    assert "runs &lt;b&gt; 25 %" in cell[1]
-    assert "nearly &amp; done 50 %" in cell[3]
-    assert cell[-1] == ""
-    assert capsys.readouterr() == ("", "")
-
-
-def test_the_bar_vanishes_when_the_work_fails(cell):
-    with pytest.raises(ZeroDivisionError), progress.bar("runs", 2.0) as bar:
-        bar.advance(1 / 0)
-    assert cell[-1] == ""
 
 
 def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monkeypatch):

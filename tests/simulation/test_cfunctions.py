@@ -18,7 +18,7 @@ from numba import njit
 from numba.extending import overload
 
 import smc_mujoco as smc
-from smc_mujoco.common import fingerprint, jit
+from smc_mujoco.common import fingerprint
 from smc_mujoco.common.jit import NUMBERS
 from smc_mujoco.common.numba_internals import FunctionIdentity
 from smc_mujoco.control.law import Measurement
@@ -140,7 +140,7 @@ def test_what_numba_compiles_in_place_of_a_function_tells_laws_apart():
     assert [force(overloaded(number)) for number in (6.0, 7.0)] == [18.0, 21.0]
 
 
-def test_laws_of_one_name_are_all_kept_and_of_very_many_the_last(monkeypatch):
+def test_laws_of_one_name_are_all_kept():
     """Laws that are written from numbers have one name, such as linear controllers, and so have the
     laws of scripts.
     """
@@ -148,8 +148,6 @@ def test_laws_of_one_name_are_all_kept_and_of_very_many_the_last(monkeypatch):
     for factor in (1.0, 2.0, 3.0):
         laws.append(mine(f"{factor} * gains.k"))
     assert [hits(law) for law in laws + laws] == [0, 0, 0, 1, 1, 1]
-    monkeypatch.setattr(jit, "MAX_FILES_OF_A_NAME", 2)
-    assert [hits(mine(f"{factor} * gains.k")) for factor in (4.0, 3.0, 4.0, 1.0)] == [0, 1, 1, 0]
 
 
 def test_a_law_with_a_very_long_name_is_kept():

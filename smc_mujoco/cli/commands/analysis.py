@@ -14,7 +14,6 @@ from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-    from smc_mujoco.control.law import Law
     from smc_mujoco.simulation.scenario import Scenario
 
 Bound = Annotated[
@@ -160,10 +159,7 @@ def margins(
         )
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
-    words = (
-        f"{counted(len(results), 'margin')}, {options.gains_used(chosen, gains)}, "
-        f"{terminal.seconds:.0f} s"
-    )
+    words = f"{counted(len(results), 'margin')}, set of gains {gains}, {terminal.seconds:.0f} s"
     terminal.note(words, "dim", wrap=True)
     terminal.finish([dataclasses.asdict(margin) for margin in results])
 
@@ -217,22 +213,21 @@ def worst(
     payload=0:2
     """
     with delay_ctrl_c():
+        from smc_mujoco.control.source import in_words
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
     terminal = Terminal(json)
     within = _within(disturbance, bound)
     options.check_files(None, *files(out))
-    chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
+    cases = _attacked_cases(plant, law, condition, duration, gains)
     results = WorstCases(
         worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases
     )
     terminal.print(results)
-    terminal.note(
-        f"{sum(case.tried for case in results)} runs, {options.gains_used(chosen, gains)}",
-        "dim",
-        wrap=True,
-    )
+    sources = {case.nominal.law.name: [case.nominal.law.source] for case in results}
+    runs = sum(case.tried for case in results)
+    terminal.note(f"{runs} runs, {in_words(sources)}", "dim", wrap=True)
     terminal.finish([case.about() for case in results])
     if out:
         results.figure(out)
@@ -286,12 +281,8 @@ def sensitivity(
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
     terminal.print(found)
-    terminal.note(
-        f"{found.runs} runs, {len(found.values)} of them independent, "
-        f"{options.gains_used([chosen], gains)}",
-        "dim",
-        wrap=True,
-    )
+    runs = f"{found.runs} runs, {len(found.values)} of them independent"
+    terminal.note(f"{runs}, gains: {scenario.law.source}", "dim", wrap=True)
     terminal.finish(found.about())
     if out:
         found.figure(out)
@@ -322,9 +313,9 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
 
 def _attacked_cases(
     plant: str, law: list[str] | None, condition: str, duration: float, gains: str
-) -> "tuple[list[str | Law], list[list[Scenario]]]":
-    """Return the laws to attack, and the scenarios of each: one on a plant, one for each parameter
-    set of a rig.
+) -> "list[list[Scenario]]":
+    """Return the scenarios of each law to attack: one on a plant, one for each parameter set of a
+    rig.
     """
     from smc_mujoco.common import annexes
     from smc_mujoco.control import gain_sets
@@ -339,11 +330,10 @@ def _attacked_cases(
         ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
-        cases = [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
-        return [runs[0].law for runs in cases], cases
+        return [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
     chosen = options.laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
-    return chosen, [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
+    return [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
 
 
 def chatter(
@@ -385,6 +375,7 @@ def chatter(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
+        from smc_mujoco.control.source import in_words
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import jointed
         from smc_mujoco.metrics.limit_cycle import channel_cycle
@@ -409,9 +400,8 @@ def chatter(
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     assumed = dict.fromkeys(words for cycle in cycles for words in cycle.assumptions)
     terminal.note("assumed: " + "; ".join(assumed), wrap=True)
-    terminal.note(
-        f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True
-    )
+    sources = {scenario.law.name: [scenario.law.source] for scenario in cases}
+    terminal.note(f"{in_words(sources)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     terminal.finish(rows(cases, cycles, measured, changes))
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist

@@ -255,22 +255,6 @@ def law(text: str) -> "str | Law":
     return from_text.law(text)
 
 
-def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
-    """Return where the laws' gains come from, in words. Laws given by name have the set `gains`."""
-    from smc_mujoco.control import source
-
-    of_set = source.Source(
-        kind={"default": source.DEFAULT, "study": source.STUDY}.get(gains, source.SHIPPED)
-    )
-    named = {law: [of_set] for law in laws if isinstance(law, str)}
-    words = source.in_words(
-        named | {law.name: [law.source] for law in laws if not isinstance(law, str)}
-    )
-    if named:
-        return f"{words or 'no gains'}, set {gains!r}"
-    return words or "no gains"
-
-
 def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
     """Return the conditions of the option --condition: names and files, as a,b, or a text with a
     colon.

@@ -201,7 +201,8 @@ def film(
         fps = WEBP_FPS if ending == ".webp" else FPS
     if ending == ".webp" and span is None:
         span = (0.0, 4.0)
-    size = size or (SMALL_SIZE if ending in ("", ".webp") else FULL_SIZE)
+    if size is None:
+        size = SMALL_SIZE if ending in ("", ".webp") else FULL_SIZE
     frames = Frames(traces, labels, title, size, fps, speed, camera, at, span)
     if path is None:
         return frames
