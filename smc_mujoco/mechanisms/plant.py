@@ -12,7 +12,7 @@ import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -72,14 +72,6 @@ class Variant(NamedTuple):
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
 
 
-class Nominal(Protocol):
-    """Function that returns f and g of channel i, from x and v of all channels, (n,) each, and
-    nominal parameters p.
-    """
-
-    def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
-
-
 # What a nominal model reads: a channel i, their number n, the addresses of measured x, v and of the
 # last u, (n,) each.
 SEEN = np.dtype([(name, "i8") for name in ("i", "n", "x", "v", "u")])
@@ -120,7 +112,9 @@ class Plant:
     build: Callable[[int], mujoco.MjSpec]  # n -> the ideal mechanism with the default parameters
     # the model fields which the parameters set
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
-    nominal: Nominal  # f and g of the plant's equation
+    # (x, v, i, p) -> f and g of channel i, from x and v of all channels, (n,) each, and nominal
+    # parameters p
+    nominal: Any
     lane: tuple[float, float, float]  # m, offset between machines that stand side by side in a film
     # Kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs
     contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(
@@ -220,6 +214,11 @@ class Plant:
         without actuator.
         """
         return self.n // 2 if self.underactuated else self.n
+
+    @property
+    def by_mujoco(self) -> bool:
+        """Whether MuJoCo computes its nominal model, a `custom.nominal_model.NominalModel`."""
+        return hasattr(self.nominal, "native_dynamics")
 
     @property
     def free(self) -> int:

@@ -27,11 +27,6 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
-from smc_mujoco.mechanisms.custom.nominal_model import (
-    NominalModel,
-    native_coriolis,
-    native_jacobian,
-)
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
@@ -150,7 +145,7 @@ def _compile(s: Resolved) -> None:
         cfunctions.signal_values(signal)  # refuses data that compiled code would misread
     for component in filter(None, (*s.law.parts, s.surface, s.velocity)):
         cfunctions.compile_component(component)
-    if not isinstance(s.plant.nominal, NominalModel):
+    if not s.plant.by_mujoco:
         cfunctions.compile_nominal(s.plant)
     for signal in signals:
         cfunctions.compile_signal(signal)
@@ -346,7 +341,7 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: Functions) ->
         fields["dynamics" if s.law.joint else "nominal"] = _function(
             nominal, nominal.values, buffer
         )
-    elif not isinstance(s.plant.nominal, NominalModel):
+    elif not s.plant.by_mujoco:
         fields["nominal"] = _function(buffer.nominal(s.plant), known_values(s), buffer)
     signals = {"feedforward": s.feedforward}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
@@ -467,8 +462,7 @@ def _joint_measurement(
     fields: dict[str, Any] = {"joint": arrays | {"head": head}}
     if nominal is not None:
         fields["handle"] = {
-            "coriolis": native_coriolis().address,
-            "jacobian": native_jacobian().address,
+            **s.plant.nominal.handles(),
             "parameters": functions["dynamics"]["parameters"],
             "unit": s.nominal_drive.gain,
         }
@@ -479,7 +473,7 @@ def _native_nominal(s: Resolved) -> Native | None:
     """Return the nominal model for one simulation if MuJoCo computes it and the law uses it, else
     None.
     """
-    if not isinstance(s.plant.nominal, NominalModel):
+    if not s.plant.by_mujoco:
         return None
     if not s.law.joint:
         return s.plant.nominal.native(dict(zip(s.plant.parameters, known_values(s), strict=True)))

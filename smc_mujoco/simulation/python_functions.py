@@ -22,7 +22,6 @@ from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement, measurement_of, stored_dtype
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import SEEN, Plant, Values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
@@ -179,11 +178,11 @@ class NominalDynamics:
         return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
 
     @property
-    def nominal(self) -> NominalModel | None:
-        """The nominal model of all joints, if the plant has one and the law may use it."""
-        model = self.scenario.plant.nominal
-        if isinstance(model, NominalModel) and self.scenario.resolved.model != "none":
-            return model
+    def nominal(self) -> Any:
+        """The NominalModel of all joints, if the plant has one and the law may use it, or None."""
+        plant = self.scenario.plant
+        if plant.by_mujoco and self.scenario.resolved.model != "none":
+            return plant.nominal
         return None
 
 
@@ -217,7 +216,7 @@ def evaluate_nominal(
     """
     name = f"the nominal model of {plant.name}"
     inputs = (x, v, i, values)
-    if isinstance(plant.nominal, NominalModel):
+    if plant.by_mujoco:
         inputs = (*inputs, u)
     return called(name, "the two numbers f, g", 2, plant.nominal, *inputs)
 

@@ -26,7 +26,6 @@ from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, suits
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import (
@@ -845,7 +844,7 @@ def check_free_body(s: Resolved) -> None:
 
 def check_inertia(s: Resolved) -> None:
     """Check that the nominal M of a law of many joints can be inverted at the start."""
-    if s.law.joint and s.model != "none" and isinstance(s.plant.nominal, NominalModel):
+    if s.law.joint and s.model != "none" and s.plant.by_mujoco:
         M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
         if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(

@@ -15,7 +15,6 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Dynamics, Values
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import MAX_CONTROL
@@ -52,7 +51,7 @@ class Controller:
         self.scale = math.prod(part.scale for part in scenario.actuator)
         known = zip(scenario.plant.parameters, known_values(self.scenario), strict=True)
         self.values = Values(**dict(known))
-        if isinstance(scenario.plant.nominal, NominalModel):  # compiles now, not at the first call
+        if scenario.plant.by_mujoco:  # compiles now, not at the first call
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.values)
         self.last_u = np.zeros(n)  # commands of the last sample
         self.told = np.zeros(n)  # other forces on the joints, for a law with the true model
@@ -248,7 +247,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
     if scenario.resolved.model == "none":
         return Dynamics(np.eye(n), np.zeros(n), np.zeros(n))
     values = Values(**plant.parameters)
-    if isinstance(plant.nominal, NominalModel):
+    if plant.by_mujoco:
         try:
             M, h, g = plant.nominal.dynamics(x, v, values)
         except USER_EXCEPTIONS as error:

@@ -220,7 +220,9 @@ class Loop:
         command = self.delayed
         v = data.qvel[self.channels["shaft"]]
         if self.drive_step:
-            self.rise = self.controller.scale * self.drive_step.rise(command, self.first)
+            self.rise = self.controller.scale * (
+                self.drive_step.rise_first * (self.first - command)
+            )
             command, self.first, self.second = self.drive_step(command, self.first, self.second, v)
         control = self.middle = self.controller.scale * command
         control = control - self.rise

@@ -22,7 +22,6 @@ from numba import njit, types
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.jit import Key, call, call_callback, compiled, pointer, record_at
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import SEEN, Plant
 from smc_mujoco.simulation import callback, cfunctions, state
 from smc_mujoco.simulation.cfunctions import seen_at
@@ -49,12 +48,7 @@ def fits(prepared: Prepared) -> bool:
     under RK4.
     """
     s = prepared.scenario.resolved
-    other = (
-        isinstance(s.plant.nominal, NominalModel)
-        or s.plant.unmodelled
-        or s.plant.direct
-        or s.plant.free
-    )
+    other = s.plant.by_mujoco or s.plant.unmodelled or s.plant.direct or s.plant.free
     plain = s.plain_equation and not s.actuator and s.sensor is None and s.integrator == "RK4"
     on_joints = not any(d.cartesian or isinstance(d, Push) for d in s.disturbance)
     return bool(plain and on_joints and not other and not prepared.why_not)

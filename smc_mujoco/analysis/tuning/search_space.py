@@ -45,7 +45,6 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import Gain, Unit
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import SPREAD, START_CURE
 
@@ -107,7 +106,7 @@ def scales(
     """
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
-    if plant.pose and isinstance(plant.nominal, NominalModel):
+    if plant.pose and plant.by_mujoco:
         M = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M
         limits = plant.limits
         force, torque = (min([u_max, *limits[i : i + 3]]) for i in (0, 3))

@@ -62,46 +62,14 @@ _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.
 # Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom;
 # addresses of model and data, of their arrays, and of arrays of this simulation's own: the
 # channels' places, the state that was evaluated, a unit force and its acceleration.
-NOMINAL = floats(
-    [
-        "n",
-        "driven",
-        "nv",
-        "model",
-        "data",
-        "qpos",
-        "qvel",
-        "ctrl",
-        "acceleration",
-        "places",
-        "x",
-        "v",
-        "unit",
-        "moved",
-    ]
-)
+NOMINAL = floats("n driven nv model data qpos qvel ctrl acceleration places x v unit moved".split())
 # The same for M, h and g; then the tip's site or -1, whether h is of passive forces alone, and
 # whether to compute g.
 DYNAMICS = floats(
-    [
-        "n",
-        "nv",
-        "model",
-        "data",
-        "qpos",
-        "qvel",
-        "bias",
-        "passive",
-        "actuator",
-        "places",
-        "dense",
-        "v",
-        "moves",
-        "site",
-        "alone",
-        "at_rest",
-        "quaternion",
-    ]
+    """
+    n nv model data qpos qvel bias passive actuator places dense v moves site alone
+    at_rest quaternion
+    """.split()
 )
 # Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels
 # come first.
@@ -219,6 +187,11 @@ class NominalModel:
             rows = np.zeros((3, model.nv))
             mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
         return rows[:, places["qvel"]]
+
+    @staticmethod
+    def handles() -> dict[str, int]:
+        """Return the addresses of the C functions of C and of the tip's Jacobian."""
+        return {"coriolis": native_coriolis().address, "jacobian": native_jacobian().address}
 
     def native_dynamics(
         self, parameters: Mapping[str, float], tip: str, at_rest: bool = True

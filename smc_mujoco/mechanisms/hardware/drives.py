@@ -352,10 +352,6 @@ class DriveStep(NamedTuple):
         passing = force - 0.5 * gap * np.abs(gap) / self.reach
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 
-    def rise(self, u: np.ndarray, first: np.ndarray) -> np.ndarray:
-        """Return by how much the force rises in a step of RK4 from its middle to its last stage."""
-        return self.rise_first * (first - u)
-
 
 def rippled(motor, V, x, v):
     """Return the voltage at which an even motor has the torque of a motor with ripple, at V, x and
