@@ -30,7 +30,6 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.python_functions import evaluate
 from smc_mujoco.simulation.signals import Push
 
 if TYPE_CHECKING:
@@ -156,7 +155,7 @@ def contacts(trace: Trace) -> Contacts:
         data.xfrc_applied[:] = 0.0
         for body, push in pushes:
             force = np.array([push.x, push.y, push.z])
-            data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * force
+            data.xfrc_applied[body, :3] += push.value(trace.t[k], push)[0] * force
         mujoco.mj_forward(model, data)
         _add_contacts(model, data, contacts, k)
     for values in contacts:

@@ -32,7 +32,7 @@ from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import cfunctions, philox, python_functions, state
+from smc_mujoco.simulation import cfunctions, philox, state
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
@@ -42,7 +42,6 @@ from smc_mujoco.simulation.model import (
     mixer,
     with_values,
 )
-from smc_mujoco.simulation.python_functions import PythonFunction
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
@@ -173,7 +172,7 @@ class Packed:
     references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
-    python: list[PythonFunction]  # the functions that are called in Python
+    python: list[Any]  # the PythonFunctions that are called
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
 
 
@@ -239,11 +238,11 @@ class Functions(state.Buffer):
         super().__init__()
         self.s = s
         self.called = called
-        self.python: list[PythonFunction] = []
+        self.python: list[Any] = []
 
     def component(self, c: Component) -> Any:
         """Return a law, a surface or an estimator."""
-        return self._made(cfunctions.compile_component, python_functions.of_component, c, self.s)
+        return self._made(cfunctions.compile_component, "of_component", c, self.s)
 
     def laws(self) -> list[Component]:
         """Return the laws of the driven channels, or one for all.
@@ -258,21 +257,23 @@ class Functions(state.Buffer):
 
     def signal(self, signal: Signal) -> Any:
         """Return a reference, a disturbance or another signal."""
-        return self._made(cfunctions.compile_signal, python_functions.of_signal, signal)
+        return self._made(cfunctions.compile_signal, "of_signal", signal)
 
     def nominal(self, plant: Plant) -> Any:
         """Return a nominal model that is not MuJoCo's."""
-        return self._made(cfunctions.compile_nominal, python_functions.of_nominal, plant)
+        return self._made(cfunctions.compile_nominal, "of_nominal", plant)
 
     def friction(self, formula: Sliding) -> Any:
         """Return a friction by a formula."""
-        return self._made(cfunctions.compile_friction, python_functions.of_friction, formula)
+        return self._made(cfunctions.compile_friction, "of_friction", formula)
 
-    def _made(self, compiler: Callable, caller: Callable, thing: Any, *arguments: Any) -> Any:
+    def _made(self, compiler: Callable, caller: str, thing: Any, *arguments: Any) -> Any:
         if not self.called:
             with contextlib.suppress(NotCompilable):
                 return compiler(thing)
-        self.python.append(caller(thing, *arguments))
+        from smc_mujoco.simulation import python_functions
+
+        self.python.append(getattr(python_functions, caller)(thing, *arguments))
         return self.python[-1]
 
 

@@ -262,6 +262,12 @@ class PythonFunction:
         self.call = C_FUNCTION(call)
         self.address: int = ctypes.cast(self.call, ctypes.c_void_p).value or 0
 
+    def told(self, channel: int) -> str:
+        """Return what was raised in words, with the channel if the function was called for one."""
+        if isinstance(self.error, Failure) and self.error.channel is not None:
+            self.error.channel = channel
+        return str(self.error)
+
 
 @contextlib.contextmanager
 def hearing_ctrl_c(functions: Sequence[PythonFunction]) -> Iterator[None]:

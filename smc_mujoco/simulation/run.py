@@ -27,11 +27,10 @@ from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
-from smc_mujoco.simulation import callback, python_functions, state
+from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.prepare import Prepared, pack, prepare
-from smc_mujoco.simulation.python_functions import Failure
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import PLANT_DIVERGED as PLANT_DIVERGED_SHORT
 from smc_mujoco.simulation.trace import Trace, from_log
@@ -429,9 +428,13 @@ class ScenarioBatch:
         try:
             if self.endless:
                 self.apply_in_thread(action, alive)
-            else:
+            elif called:
+                from smc_mujoco.simulation import python_functions
+
                 with python_functions.hearing_ctrl_c(called):
                     action(alive)
+            else:
+                action(alive)
         except SimulationError as error:
             for i in error.ids:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
@@ -519,7 +522,7 @@ class ScenarioBatch:
         """
         for function in self.packed[i].python:
             if function.error is not None:
-                return told(function.error, int(self.records["seen"]["i"][i]))
+                return function.told(int(self.records["seen"]["i"][i]))
         return ""
 
     def law_failure(self, i: int) -> str:
@@ -544,12 +547,14 @@ class ScenarioBatch:
             memory = memory[channel]
             y = state.address(self.records[i : i + 1]) + state.AT.y
         if not self.packed[i].python:
+            from smc_mujoco.simulation import python_functions
+
             function = python_functions.of_component(law, s)
             outputs = np.empty(2 * width)
             places = (y, 0, memory.ctypes.data, outputs.ctypes.data)
             function.call(*map(python_functions.pointer, places))
             if function.error is not None:
-                return told(function.error, channel)
+                return function.told(channel)
         if record["failure"] == state.LAW_RAISED:
             return ""
         u, sliding = commands[:, channel % width].tolist()
@@ -559,10 +564,3 @@ class ScenarioBatch:
 def _of_package(scenario: Scenario) -> bool:
     """Return whether the law's functions are of this package."""
     return all(fingerprint.ours(part.function) for part in scenario.law.parts)
-
-
-def told(error: BaseException, channel: int) -> str:
-    """Return an exception of a function in words, with its channel if it was called for one."""
-    if isinstance(error, Failure) and error.channel is not None:
-        error.channel = channel
-    return str(error)

@@ -922,6 +922,17 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
     return compiled(spec)
 
 
+def _doubtful_units(s: Resolved) -> Iterator[str]:
+    """Yield a sentence about each number that may be in ms or percent."""
+    for what in ("input_delay", "control_period"):
+        if (seconds := getattr(s, what)) >= LONG_TIME:
+            yield f"{what} is {seconds:g} s: if it is {seconds:g} ms, give {seconds / 1e3:g}"
+    for name, factor in s.mismatch.items():
+        if factor >= LARGE_FACTOR and name not in s.plant.added:
+            fact = f"the true {name} of {s.plant.name} is {factor:g} times the nominal one"
+            yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
+
+
 def _doubts(s: Resolved) -> Iterator[str]:
     """Yield a sentence about each number that may be in degrees, ms or percent, each motor that is
     too weak, and bristles that are too stiff.
@@ -939,13 +950,7 @@ def _doubts(s: Resolved) -> Iterator[str]:
                     "a step late, and joints rest at wrong places. Give a physics_step of "
                     f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
                 )
-    for what in ("input_delay", "control_period"):
-        if (seconds := getattr(s, what)) >= LONG_TIME:
-            yield f"{what} is {seconds:g} s: if it is {seconds:g} ms, give {seconds / 1e3:g}"
-    for name, factor in s.mismatch.items():
-        if factor >= LARGE_FACTOR and name not in s.plant.added:
-            fact = f"the true {name} of {s.plant.name} is {factor:g} times the nominal one"
-            yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
+    yield from _doubtful_units(s)
     # ramps may have many turns
     amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
