@@ -181,6 +181,7 @@ def test_a_page_has_the_equation_and_the_units_of_a_plant(generator, name):
     assert rest.strip(" .\n")
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path, known):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: make docs does")
     pytest.importorskip("mkdocstrings_handlers.python")
