@@ -62,14 +62,46 @@ _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.
 # Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom;
 # addresses of model and data, of their arrays, and of arrays of this simulation's own: the
 # channels' places, the state that was evaluated, a unit force and its acceleration.
-NOMINAL = floats("n driven nv model data qpos qvel ctrl acceleration places x v unit moved".split())
+NOMINAL = floats(
+    [
+        "n",
+        "driven",
+        "nv",
+        "model",
+        "data",
+        "qpos",
+        "qvel",
+        "ctrl",
+        "acceleration",
+        "places",
+        "x",
+        "v",
+        "unit",
+        "moved",
+    ]
+)
 # The same for M, h and g; then the tip's site or -1, whether h is of passive forces alone, and
 # whether to compute g.
 DYNAMICS = floats(
-    """
-    n nv model data qpos qvel bias passive actuator places dense v moves site alone
-    at_rest quaternion
-    """.split()
+    [
+        "n",
+        "nv",
+        "model",
+        "data",
+        "qpos",
+        "qvel",
+        "bias",
+        "passive",
+        "actuator",
+        "places",
+        "dense",
+        "v",
+        "moves",
+        "site",
+        "alone",
+        "at_rest",
+        "quaternion",
+    ]
 )
 # Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels
 # come first.

@@ -41,7 +41,21 @@ ROTORS_TEXT = "smc:rotors"  # name of a text in models whose actuators are rotor
 # linear [N s/rad], square [N s^2/rad^2], rise and fall [1/s], rise2 and fall2 [1/rad], inertia [kg
 # m^2], spin [1 or
 # -1], fade [1], sag [1/N], start: the speed at which a run begins [rad/s]
-ROTOR = floats("linear square rise rise2 fall fall2 inertia spin fade sag start".split())
+ROTOR = floats(
+    [
+        "linear",
+        "square",
+        "rise",
+        "rise2",
+        "fall",
+        "fall2",
+        "inertia",
+        "spin",
+        "fade",
+        "sag",
+        "start",
+    ]
+)
 DRAG_AXES = 3  # numbers in `body_user`: drag along the axes of the body, N s/m
 rotor_at = record_at(ROTOR)
 
