@@ -3,7 +3,6 @@ whole and inside.
 """
 
 import dataclasses
-import math
 import re
 
 import numpy as np
@@ -24,8 +23,6 @@ from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.draw.page import DPI
 from smc_mujoco.draw.pareto import pareto
-from smc_mujoco.evidence.accuracy.orders import orders
-from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation.trace import PLANT_DIVERGED
 
@@ -163,41 +160,6 @@ def balance():
     return nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
 
 
-def accuracy(
-    law: str, plant: str = "duffing", order: float = 1.9, theory: float | None = 2.0
-) -> Accuracy:
-    """Errors of two starts that fall with a power of the period; the longest period is not in the
-    fit.
-    """
-    periods = (4e-3, 2e-3, 1e-3, 5e-4)
-    errors = tuple(tuple(start * (1e3 * h) ** 2 for h in periods) for start in (0.3, 0.5))
-    scaling = Scaling(
-        errors=errors,
-        used=periods[1:],
-        order=order,
-        low=1.8,
-        high=2.1,
-        theory=theory,
-        why="",
-    )
-    names = {
-        "plant": plant,
-        "condition": "slow_noise",
-        "law": law,
-        "gains": "shipped",
-        "unit": "m",
-    }
-    return Accuracy(
-        **names,
-        periods=periods,
-        e=scaling,
-        s=scaling,
-        runs=8,
-        failed=0,
-        floor=1e-9,
-    )
-
-
 def basins() -> list[Basin]:
     outcome = np.array(
         [[CONVERGES, CONVERGES, DOES_NOT], [CONVERGES, UNDECIDED, DOES_NOT]], np.int8
@@ -222,11 +184,6 @@ def basins() -> list[Basin]:
     ]
 
 
-LAWS = [
-    accuracy("super_twisting"),
-    accuracy("classical", theory=None),
-    accuracy("adaptive", order=math.nan),
-]
 PAGES = {
     "machines": lambda: figure(machines()),
     "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
@@ -235,10 +192,6 @@ PAGES = {
     "signals": lambda: signals(conditions(), None, "Duffing"),
     "lags": lags,
     "balance": balance,
-    "orders": lambda: orders(
-        [accuracy("super_twisting"), accuracy("super_twisting", "van_der_pol")]
-    ),
-    "orders of laws": lambda: orders(LAWS, size="ieee-column"),
     "maps": lambda: region.draw(basins()),
 }
 
@@ -583,7 +536,6 @@ REFUSED = {  # call -> arguments, and what replaces them
             {"panels": []},
         ],
     ),
-    orders: ({"rows": []}, [{}]),
     region.draw: ({"maps": []}, [{}]),
     pareto: ({"tunings": []}, [{}]),
     smc.plot: ({"table": ONE}, [{}]),
@@ -644,31 +596,3 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
         "3",
         "4",
     ]
-
-
-@pytest.mark.parametrize("order", [1.9, math.nan])
-def test_marks_of_errors_are_means_of_all_starts_with_the_slopes_of_fit_and_theory(
-    order,
-):
-    page = orders([accuracy("super_twisting", order=order)])
-    for ax in page.axes:
-        marks = {places(line)[0, 0]: line for line in ax.lines if line.get_marker() == "o"}
-        means = {}
-        for h, largest in {
-            4: 8,
-            2: 2,
-            1: 0.5,
-            0.5: 0.125,
-        }.items():
-            means[h] = math.sqrt(0.6) * largest
-        assert {h: places(line)[0, 1] for h, line in marks.items()} == pytest.approx(means)
-        assert [h for h, line in marks.items() if line.get_mfc() == "none"] == [4.0]
-        ends = []
-        for line in ax.lines:
-            if len(places(line)) == 2:
-                ends.append(places(line))
-        slopes = []
-        for x, y in (pair.T for pair in ends):
-            if x[0] != x[1]:
-                slopes.append(np.log(y[0] / y[1]) / np.log(x[0] / x[1]))
-        assert slopes == pytest.approx([2.0, 1.9] if order == 1.9 else [])

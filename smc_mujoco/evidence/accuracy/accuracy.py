@@ -19,16 +19,13 @@ exact friction, keeps the scenario's step.
 import dataclasses
 import itertools
 import math
-import os
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
-from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
@@ -37,7 +34,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds
 from smc_mujoco.draw.style import law_colour
-from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, Scaling, scaling
+from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, scaling
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last_part
@@ -47,9 +44,6 @@ from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import MIN_TIME, Scenario
 from smc_mujoco.simulation.signals import Noise
 from smc_mujoco.simulation.trace import Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
 # chosen: a disturbance that every law can bear, and that leaves smooth laws an error
@@ -91,38 +85,6 @@ class AccuracyTable(Tables, list[Accuracy]):
             *tables[:-1],
             *(dataclasses.replace(last, notes=[*last.notes, KEY]) for last in tables[-1:]),
         ]
-
-    def plot(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
-        """Draw error over control period, both logarithmic; title, size, format and fig are as in
-        `smc.figure`.
-        """
-        from smc_mujoco.evidence.accuracy.orders import orders
-
-        return orders(self, path, **options)
-
-    def save(self, path: str | os.PathLike) -> Path:
-        """Write a .json file that `load` reads."""
-        return write_json(with_ending(path, ".json"), [dataclasses.asdict(row) for row in self])
-
-
-def load(path: str | os.PathLike) -> AccuracyTable:
-    """Read the table that `AccuracyTable.save` wrote."""
-    with reading(
-        path, "file of accuracies", "give a .json file that AccuracyTable.save wrote"
-    ) as file:
-        rows = [_with_tuples(entry) for entry in read_json(file)]
-        return AccuracyTable(
-            Accuracy(**row | {name: Scaling(**row[name]) for name in QUANTITIES}) for row in rows
-        )
-
-
-def _with_tuples(data: Any) -> Any:
-    """Return the data of a file with tuples for its lists."""
-    if isinstance(data, dict):
-        return {name: _with_tuples(value) for name, value in data.items()}
-    if isinstance(data, list):
-        return tuple(map(_with_tuples, data))
-    return data
 
 
 def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:

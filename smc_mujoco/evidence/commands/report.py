@@ -34,10 +34,9 @@ def report(
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which
     controller, where, how sure.
 
-    The report has the tables of `smc-mujoco compare`; the paper's claims; margins; regions of
-    attraction; real machines; films. The file OUT/report.html needs no network and no other file;
-    the data are in the same folder. You can stop the command at any time, and continue by starting
-    it again.
+    The report has the tables of `smc-mujoco compare`; the paper's claims; margins; films. The file
+    OUT/report.html needs no network and no other file; the data are in the same folder. You can
+    stop the command at any time, and continue by starting it again.
 
     With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html,
     evidence.json and checks.svg.

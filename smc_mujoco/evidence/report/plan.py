@@ -7,9 +7,7 @@ from typing import TypeVar
 
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.progress import Report, bar
-from smc_mujoco.evidence.accuracy.accuracy import DEFAULT_SEEDS, PERIODS
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import flight
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent
@@ -28,14 +26,6 @@ class Plan:
     worst: bool  # whether each law's worst case is searched too
     claims: tuple[str, ...] | None = None  # ids of the claims to judge; None for all
     kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")  # of margins
-    regions: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")  # plants with maps
-    points: tuple[int, int] = (32, 32)  # of a map, across and up
-    accurate: tuple[str, ...] = ("duffing",)  # plants on which accuracy is measured
-    periods: tuple[float, ...] = PERIODS  # control periods of these measurements, s
-    accuracy_starts: int = DEFAULT_SEEDS  # initial states of these measurements
-    rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")
-    flights: tuple[str, ...] = ("nominal", *flight.CONDITIONS)
-    flight_seeds: int = GRID.seeds
     scenes: tuple[str, ...] = scenarios.PLANTS  # plants whose runs are shown
     filmed: int = len(scenarios.PLANTS)  # how many of these are filmed
     scene: float = 5.0  # duration of traces and films, s
@@ -47,13 +37,6 @@ QUICK = Plan(
     grid=dataclasses.replace(QUICK_GRID, seeds=12),
     worst=False,
     kinds=("delay", "disturbance"),
-    regions=("inverted_pendulum",),
-    points=(16, 16),
-    periods=(4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3),
-    accuracy_starts=1,
-    rigs=("qube_servo",),
-    flights=("nominal", "steady wind of 3 m/s", "a rotor loses 20 %"),
-    flight_seeds=12,
     scenes=QUICK_GRID.plants,
     filmed=1,
 )

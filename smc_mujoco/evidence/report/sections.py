@@ -1,7 +1,7 @@
 """The sections of a report: tables of `compare`, pictures of `draw`, films, and a paper's claims.
 
 If the work is killed and started again, the comparison continues where it stopped, and all else
-with the first margin, map, film or list of claims that is missing.
+with the first margin, film or list of claims that is missing.
 """
 
 import dataclasses
@@ -15,44 +15,29 @@ from typing import Any
 from markupsafe import Markup
 
 from smc_mujoco.analysis import margins as margin_search
-from smc_mujoco.analysis import region_of_attraction as maps
 from smc_mujoco.analysis.margins import MARGIN_KINDS, Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import capital, number
-from smc_mujoco.control.law import laws as known_laws
-from smc_mujoco.draw import dot_plot, figure, region
+from smc_mujoco.draw import dot_plot, figure
 from smc_mujoco.draw.film import film as video
-from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, accuracy
-from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims, summary
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import flight, page
+from smc_mujoco.evidence.report import page
 from smc_mujoco.evidence.report.page import Section, heading, picture, tables, text
 from smc_mujoco.evidence.report.plan import GAINS, Work
-from smc_mujoco.evidence.rigs import ensemble, twin_figures
-from smc_mujoco.evidence.rigs.figure import twins_figure
-from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
-from smc_mujoco.simulation.conditions import condition, find_condition
-from smc_mujoco.simulation.grid import grid as make_grid
+from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.compare import Compared, compare
-from smc_mujoco.studies.leaderboard import leaderboard
-from smc_mujoco.studies.study import study
-from smc_mujoco.studies.table import Table
 
 METRICS = ("settling_time", "itae", "ultimate_bound", "tv_rate")  # one a wish: fast, calm, ...
-DRONE, FLIGHT_DURATION = "quadrotor", 6.0  # s
-FLIGHT_METRICS = ("ultimate_bound", "tv_rate")
 FILM_SIZE, FILM_RATE = (960, 540), 20  # px; 1/s
-ACCURACY_CONDITIONS = ("constant", "coulomb")  # a steady force, and dry friction
 UNBEATEN = (
     "A law is unbeaten in a condition if no other is shown to be better there, if none of its runs "
     "fails, and if no other is shown to settle in more runs. It wins if it is shown to be better "
@@ -64,7 +49,7 @@ LIMITS = (
     "Seeds change the start, the noise, and the search from which gains come. Everything else "
     "changes by condition only.",
     "All laws have one bound on u and one control period. With others the order may change.",
-    "A margin or a map is what runs showed. It is no proof.",
+    "A margin is what runs showed. It is no proof.",
 )
 
 
@@ -98,10 +83,6 @@ def write(work: Work) -> Path:
             comparison(compared),
             Section("claims", "The paper's claims", [page.claims(judged)]),
             margins(work),
-            regions(work),
-            accuracies(work),
-            machines(work),
-            flights(work),
             Section("films", "Films and traces", shown),
             method(work, compared),
         ],
@@ -259,107 +240,6 @@ def margin_table(plant: str, found: Sequence[Margin]) -> Tabular:
         below = "" if theory is None else f"theory {number(theory)}"
         rows.setdefault(margin.law, [margin.law]).append(Cell(value, below))
     return Tabular(headings=["law", *heads], rows=list(rows.values()), title=plant)
-
-
-def regions(work: Work) -> Section:
-    """Return maps of regions of attraction."""
-    plan = work.plan
-    parts = []
-    for plant in plan.regions:
-        found = []
-        for law in scenarios.LAWS:
-            found.append(
-                work.kept(
-                    f"region-{plant}-{law}.json",
-                    [plan.points, GAINS],
-                    lambda report, plant=plant, law=law: maps.basin(
-                        plant, law, plan.points, gains=GAINS, threads=work.threads, report=report
-                    ),
-                    maps.Basin.save,
-                    maps.load,
-                )
-            )
-        parts.append(
-            picture(
-                lambda path, found=found: region.draw(found, path),
-                f"{plant}: the states from which a law brings it to rest.",
-            )
-        )
-    return Section("regions", "Regions of attraction", parts)
-
-
-def accuracies(work: Work) -> Section:
-    """Return how the errors of laws fall with the control period."""
-    plan = work.plan
-    found = work.kept(
-        "accuracy.json",
-        [plan.accurate, plan.grid.laws, plan.periods, plan.accuracy_starts, GAINS],
-        lambda report: accuracy(
-            plan.grid.laws,
-            plan.accurate,
-            plan.periods,
-            ACCURACY_CONDITIONS,
-            plan.accuracy_starts,
-            GAINS,
-            threads=work.threads,
-            report=report,
-        ),
-        AccuracyTable.save,
-        load_accuracy,
-    )
-    drawn = picture(
-        lambda path: found.plot(path, format="svg"),
-        "Largest error without noise over the control period. Dashed: the slope of theory.",
-    )
-    return Section("accuracy", "Accuracy without noise", [drawn, *tables(found.tables)])
-
-
-def machines(work: Work) -> Section:
-    """Return laws compared on every parameter set of real machines, and how good the twins are."""
-    grid = work.plan.grid
-    parts = [
-        text(
-            "A rig is a real machine as data. Its records do not fix its parameters, so each law "
-            "runs on every set that fits them."
-        )
-    ]
-    for name in work.plan.rigs:
-        rig = find_rig(name)
-        table = ran(work, name, ensemble.runs(rig, seeds=grid.seeds, duration=grid.duration))
-        parts += [heading(rig.label), *tables(leaderboard(table, METRICS, defaults=True).tables)]
-    drawn = picture(
-        lambda path: twins_figure(twin_figures.rows(), path),
-        "Figures of public records: of the twin over those of the machine. 1 is equal.",
-    )
-    return Section("rigs", "Real machines", [*parts, drawn])
-
-
-def flights(work: Work) -> Section:
-    """Return laws of flight compared on a quadrotor."""
-    plan = work.plan
-    drone = find_plant(DRONE)
-    names = [name for name in known_laws(drone) if name != "none"]
-    conditions = []
-    for name in plan.flights:
-        if name in flight.CONDITIONS:
-            conditions.append(condition(name, **flight.CONDITIONS[name]))
-        else:
-            conditions.append(find_condition(name))
-    runs = make_grid(drone, names, conditions, plan.flight_seeds, "default", FLIGHT_DURATION)
-    table = ran(work, DRONE, runs)
-    drawn = picture(
-        lambda path: dot_plot.plot(table, path, FLIGHT_METRICS, "Flight: medians"),
-        "How far laws of flight are off, and how much they move the rotors.",
-    )
-    boards = leaderboard(table, FLIGHT_METRICS, by=("plant", "condition"), defaults=True)
-    gains = text("All laws have their default gains.")
-    return Section("flight", "Flight", [gains, drawn, *tables(boards.tables)])
-
-
-def ran(work: Work, name: str, runs: Sequence[Scenario]) -> Table:
-    """Return the table of runs that a folder keeps."""
-    folder = work.folder / name
-    return study(runs, folder, threads=work.threads, progress=work.progress)
 
 
 def scenes(work: Work) -> list[Markup]:

@@ -37,14 +37,9 @@ TINY = dataclasses.replace(
     QUICK,
     grid=GRID,
     kinds=("delay",),
-    regions=("duffing",),
-    points=(3, 2),
     claims=("3", "18"),
     scenes=("duffing",),
     scene=0.1,
-    flights=("payload of 19 %",),
-    flight_seeds=2,
-    periods=(4e-3, 2e-3),
 )
 BROWSERS = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome")
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
@@ -109,13 +104,8 @@ def test_its_tables_are_those_of_compare(made, folder):
 
 def test_a_second_call_computes_nothing(made, folder, monkeypatch):
     before = made.read_bytes()
-    for name in ("audit", "accuracy"):
-        monkeypatch.delattr(sections, name)
-    for module, name in (
-        (sections.margin_search, "margins"),
-        (sections.maps, "basin"),
-    ):
-        monkeypatch.delattr(module, name)
+    monkeypatch.delattr(sections, "audit")
+    monkeypatch.delattr(sections.margin_search, "margins")
     monkeypatch.setattr(sections, "FILM_SIZE", (320, 180))
     monkeypatch.setattr(sections.video, "film", None)
     assert len(report(folder, plan=TINY).read_bytes()) == pytest.approx(len(before), rel=0.01)
