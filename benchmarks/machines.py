@@ -1,5 +1,4 @@
-"""What simulation said of real machines, and what these did: the rows of
-smc_mujoco/evidence/rigs/twin_figures.json.
+"""What simulation said of real machines, and what these did: the rows of twin_figures.json.
 
     python benchmarks/machines.py FOLDER [--seeds N] [--write]
 
@@ -23,15 +22,16 @@ from pathlib import Path
 import numpy as np
 import programs
 import stepper_figures as stepper
+import twin_figures
+from twin_figures import Order, TwinFigure
 
 import smc_mujoco as smc
 from smc_mujoco.common.version import versions
-from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.evidence.rigs.rig import Rig, percentages
-from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 from smc_mujoco.simulation.time_series import TimeSeries
 
 STEP = Path(__file__).parents[1] / "tests" / "evidence" / "rigs" / "qube_servo_3_step.csv"
+FIGURE = Path(__file__).parents[1] / "docs" / "rigs.svg"
 EMPS_RECORD = {"rms error": 0.5814, "largest error": 0.8522}  # mm, of the public record
 # of ten free falls while the swings are 8 to 25 degrees: figure -> its unit, and the machine's
 FALLS = {"frequency": ("Hz", 2.432), "damping ratio": ("", 0.0261)}
@@ -267,7 +267,9 @@ def main() -> None:
     parser.add_argument(
         "--seeds", type=int, default=4, help="of each law on each set of the stepper"
     )
-    parser.add_argument("--write", action="store_true", help="replace the rows of the package")
+    parser.add_argument(
+        "--write", action="store_true", help="replace the rows, and draw docs/rigs.svg"
+    )
     given = parser.parse_args()
     rows: list[TwinFigure | Order] = []
     for name, records in FILES.items():
@@ -302,6 +304,8 @@ def main() -> None:
             )
     if given.write:
         twin_figures.FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        _, picture = twin_figures.twins_figure(twin_figures.rows(), FIGURE)
+        picture.unlink()  # as PNG
 
 
 if __name__ == "__main__":

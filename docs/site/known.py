@@ -59,7 +59,6 @@ OTHERS = {  # title -> names of modules that are no public names
     testing.plugin.step_response
     testing.plugin.smc_golden
     testing.response.StepResponse
-    evidence.audit.mutants.survivors
     """,
 }
 

@@ -43,7 +43,6 @@ def certificate(plant="duffing", law="observer_free", gains=None, parts=PARTS, *
         "u_max": 6.0,
         "unit": its.unit,
         "disturbance": 2.0,
-        "slope": None,
         "plant": {
             "name": plant,
             "n": its.n,

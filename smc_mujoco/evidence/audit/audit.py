@@ -24,8 +24,6 @@ from smc_mujoco.evidence.audit.paper import paper as find_paper
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
-
     from smc_mujoco.evidence.audit.runs import Result, Runs, Used
     from smc_mujoco.studies.table import Table
 
@@ -60,16 +58,6 @@ class Audit:
         from smc_mujoco.evidence.audit import evidence
 
         return write_json(with_ending(path, ".json"), evidence.document(self))
-
-    def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
-        """Draw every check as a multiple of its threshold, a row for each claim; options as of
-        `smc.figure`.
-        """
-        from smc_mujoco.evidence.audit.figure import figure
-
-        return figure(
-            self.claims, f"Claims of {self.paper.authors}: {self.paper.title}", path, **options
-        )
 
     def _repr_html_(self) -> str:
         return self.claims._repr_html_()

@@ -7,9 +7,9 @@ import dataclasses
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from smc_mujoco.common.text import number
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
 
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.trace import Trace
-
 # Condition -> unit of its margin (x: unit of position, F: of force), and what it asks.
 CONDITIONS = {
     "damping": ("F s/x", "D(x) >= 0 for every x"),
@@ -33,15 +30,11 @@ CONDITIONS = {
     "local": ("F/x", "sigma'(0) c > phi'(0)"),
     "start": ("", "the scenario's start lies in the region"),
     "reaching": ("F", "k > |phi + (M c - D) v| + d0"),
-    "integral": ("F/s", "k2 > d'"),
-    "slope": ("F/s", "|delta'| <= L"),
-    "clamp": ("F", "|w| <= w_max"),
 }
 THEOREMS = {  # theorem -> what it proves where its conditions hold
     "saturated PD": "without d every start comes to rest at 0",
     "level sets": "whatever d does within its bound, W falls between two of its levels",
     "reaching": "s = 0 is reached and kept, and x decays on it",
-    "super-twisting": "s = s' = 0 is reached (Moreno and Osorio 2012)",
 }
 NOT_ABOUT = (
     "no theorem here is about sampling, delay, noise, estimators, dry friction, contact, drives, "
@@ -173,12 +166,7 @@ class Certificate:
                 found.append((theorem, "end in |x| up to", end, x))
             elif "X" in part and part["holds"]:
                 found.append((theorem, "|x| up to", part["X"], x))
-                gains = self.data["law"]["gains"]
-                if part.get("S"):
-                    found.append((theorem, "|s| up to", part["S"], f"{x}/s"))
-                elif "p" in gains:
-                    time = part["X"] ** (1.0 - gains["p"]) / (gains["b"] * (1.0 - gains["p"]))
-                    found.append((theorem, "on s = 0 at x = 0 after", time, "s"))
+                found.append((theorem, "|s| up to", part["S"], f"{x}/s"))
         return tuple(found)
 
     @property
@@ -198,8 +186,6 @@ class Certificate:
         if self.data["disturbance"]:
             unit = EFFORT[self.data["unit"]]
             under = f"|d| <= {self.data['disturbance']:g} {unit}"
-            if self.data["slope"]:
-                under += f" and |d'| <= {self.data['slope']:g} {unit}/s"
             what = "d is any force with"
             if self.theorems == ("saturated PD",):
                 what = "nothing is proven under"
@@ -217,14 +203,13 @@ class Certificate:
         bound.
 
         Args:
-          x, v: positions and velocities, arrays of one shape, rad or m and per second; w of
-            super_twisting is 0.
+          x, v: positions and velocities, arrays of one shape, rad or m and per second.
         """
         x, v = np.asarray(x, float), np.asarray(v, float)
         inside = np.full(x.shape, self.stable and not self.data["disturbance"])
         if part := self._part("level sets"):
             inside |= self.level(x, v) <= part["outer"]
-        if (part := self._part("reaching", holding=True)) and part["S"]:
+        if part := self._part("reaching", holding=True):
             inside |= (np.abs(x) <= part["X"]) & (
                 np.abs(v + self.data["law"]["gains"]["c"] * x) <= part["S"]
             )
@@ -293,27 +278,6 @@ class Certificate:
             made = cls(data=json.loads(file.read_text(encoding="utf-8")))
             made.sentences  # noqa: B018  # raises if the file is no certificate
             return made
-
-    def figure(
-        self,
-        path: str | os.PathLike[str] | None = None,
-        traces: "Sequence[Trace]" = (),
-        worst_of: int = 0,
-    ):
-        """Draw the state plane: region, level sets, bound, and runs, such as the worst found.
-
-        Args:
-          path: of the files PATH.svg and PATH.png, or of a .pdf; None: nothing is written.
-          traces: runs of the same plant.
-          worst_of: of how many runs they are the worst found; 0: of none.
-
-        Raises:
-          ScenarioError: an unknown kind of file, or a network, whose states do not fit into a
-            plane.
-        """
-        from smc_mujoco.evidence.certificates.figure import draw
-
-        return draw(self, traces, path, worst_of)
 
 
 def finite(value: float) -> float | None:

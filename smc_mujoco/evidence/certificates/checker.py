@@ -5,11 +5,11 @@ This file imports neither the maker of certificates nor the simulator. It has th
 plants and laws itself, derives each theorem's conditions from them, and encloses every number in a
 ball (python-flint's arb). A plant obeys
 
-    M x'' = A sin x + B x + C x^3 - (E + F x^2) x' + u + d + springs,    |d| <= d0,    |d'| <= slope
+    M x'' = A sin x + B x + C x^3 - (E + F x^2) x' + u + d + springs,    |d| <= d0
 
 where springs of stiffness kc join the neighbours of a network. A law is u = -sigma(s), s = x' + c
-x, where sigma(s) is lam tanh(s), K sat(a s / K) or k sgn(s), which the actuator clips at u_max, or
-one of the laws "terminal" and "super_twisting". All are odd: x >= 0 is all.
+x, where sigma(s) is lam tanh(s), K sat(a s / K) or k sgn(s), which the actuator clips at u_max. All
+are odd: x >= 0 is all.
 """
 
 import hashlib
@@ -26,9 +26,9 @@ except ImportError:
 
 FORMAT = "smc-certificate/1"
 TEXTS = {"format", "name", "mechanism", "unit", "theorem", "seal"}  # what may have a text
-ABSENT = {"u_max", "slope", "w_max", "boxes"}  # what may be null: an infinite number
+ABSENT = {"u_max", "boxes"}  # what may be null: an infinite number
 FIELDS = {
-    "the certificate": "format plant law u_max unit disturbance slope parts seal",
+    "the certificate": "format plant law u_max unit disturbance parts seal",
     "plant": "name n parameters mechanism",
     "law": "name gains",
     "inverted_pendulum": "m l b grav",
@@ -39,13 +39,10 @@ FIELDS = {
     "observer_free": "lam k1",
     "boundary_layer": "k c phi",
     "classical": "k c",
-    "terminal": "k b p bound",
-    "super_twisting": "k1 k2 c w_max",
     "lqr": "q1 q2 r a1 a2 b",
     "saturated PD": "theorem holds conditions V",
     "level sets": "theorem holds conditions x s W start P inner outer bound",
     "reaching": "theorem holds conditions X S",
-    "super-twisting": "theorem holds conditions P L q X",
 }
 MAY_LACK = {"P"}  # of level sets
 MAX_HALVINGS = 6  # of a box in both directions
@@ -163,13 +160,11 @@ def equation(plant):
 
 def feedback(law, u_max):
     """Return sigma: its kind, largest value K (None: unbounded), slope a at 0 (None: it switches),
-    slope c of s; gains; its `force` before the actuator; `room`, the force to spare and the size of
+    slope c of s; its `force` before the actuator; `room`, the force to spare and the size of
     the terms that it sums.
     """
     g = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None})
     name = law["name"]
-    if name == "super_twisting":
-        return Space(kind=None, c=g.c, g=g, theorems={"super-twisting"})
     theorems = {"saturated PD", "level sets"}
     if name == "lqr":
         k1 = (g.a1 + (g.a1 * g.a1 + g.b * g.b * g.q1 / g.r).sqrt()) / g.b
@@ -177,12 +172,8 @@ def feedback(law, u_max):
         K = u_max and arb(u_max)  # the actuator's bound is part of a linear law
         room = arb(0), 0
         c = k1 / k2
-        return Space(kind="sat", K=K, a=k2, c=c, g=g, force=k2, room=room, theorems=theorems)
-    if name == "terminal":
-        need(g.b > 0 and g.bound >= 0 and bool(0.5 < g.p < 1), "1/2 < p < 1 on v + b [x]^p")
-        f = Space(kind="sgn", K=g.k, a=None, c=arb(1), theorems={"saturated PD", "reaching"})
-        force = g.k + g.bound
-    elif name == "observer_free":
+        return Space(kind="sat", K=K, a=k2, c=c, force=k2, room=room, theorems=theorems)
+    if name == "observer_free":
         f = Space(kind="tanh", K=g.lam, a=g.lam, c=g.k1, theorems=theorems)
         force = g.lam
     elif name == "boundary_layer":
@@ -192,14 +183,11 @@ def feedback(law, u_max):
         need(name == "classical", f"law {name}")
         f = Space(kind="sgn", K=g.k, a=None, c=g.c, theorems=theorems | {"reaching"})
         force = g.k
-    f.g = g
     f.force = force
     f.room = arb(0), 0
     if u_max is not None:
-        f.room = u_max - force, abs(force)
-        if name != "terminal":  # what the actuator clips is part of the law
-            f.K = f.K.min(arb(u_max))
-            f.room = f.room[0].max(arb(0)), abs(force)
+        f.K = f.K.min(arb(u_max))  # what the actuator clips is part of the law
+        f.room = (u_max - force).max(arb(0)), abs(force)
     return f
 
 
@@ -246,8 +234,7 @@ def saturated(doc, part, e, f):
     state. Its term of sigma is force / c times the integral of sigma / force over c y.
 
     V' = -D v^2 - v (sigma(v + c x) - sigma(c x)), sigma never falls, and LaSalle's theorem leaves
-    the origin alone if (1 - m) sigma(c x) >= phi(x) for x > 0, m > 0. On s = v + b [x]^p the same
-    holds with sgn(x) for sigma(c x).
+    the origin alone if (1 - m) sigma(c x) >= phi(x) for x > 0, m > 0.
     """
     V = {
         "v^2": e.M / 2,
@@ -257,8 +244,6 @@ def saturated(doc, part, e, f):
         "x^4": -e.C / 4,
         "springs": e.kc / 2,
     }
-    if "p" in vars(f.g):  # a terminal surface
-        V |= {"b": f.g.b, "p": f.g.p}
     need(part["V"].keys() == V.keys(), "the terms of V")
     for name, value in V.items():
         equal(part["V"][name], value, f"the coefficient of {name} in V")
@@ -421,80 +406,23 @@ def reaching(doc, part, e, f):
     """Check that k > |phi + (M c - D) v| + d0 for |x| <= X and |s| <= S <= c X, so that s = 0 is
     reached and kept.
 
-    Then x' = -c x. On a terminal surface the same is checked at s = 0, where x = 0 after X^(1 - p)
-    / (b (1 - p)).
+    Then x' = -c x.
     """
-    g = f.g
     d0 = arb(doc["disturbance"])
     X = arb(part["X"])
     S = arb(part["S"])
-    terminal = "b" in vars(g)
-    if terminal:
-        strip = S == 0
-    else:
-        strip = S >= 0 and f.c * X >= S
-    need(e.n == 1 and X >= 0 and strip, "|s| <= c X")
+    need(e.n == 1 and X >= 0 and S >= 0 and f.c * X >= S, "|s| <= c X")
 
     def push(a, b, s):
         x = hull(a, b)
         D = e.E + e.F * x**2
-        if not terminal:
-            return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
-        v, vs = (g.b * hull(a**power if a > 0 else 0, b**power) for power in (g.p, 2 * g.p - 1))
-        term = g.b * g.p * vs
-        return abs(phi(e, x) + D * v + term.min(g.bound) - e.M * term) + d0
+        return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
 
     edges = [X * i / 64 for i in range(65)]
     strips = [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
     least = min((f.K - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
     need(bool(X > 0) is bool(least > 0), "reaching")
-    return {"reaching": (least, g.k), "actuator": f.room}
-
-
-def super_twisting(doc, part, e, f):
-    """Check Moreno & Osorio's form: z' P z with z = ([s]^(1/2), w + delta) falls where z' P z <= q
-    and |x| <= X.
-
-    M s' = -k1 z1 + z2, z2' = -k2 sgn(s) + delta', delta = phi + (M c - D) v + d, and |delta'| <= L
-    there. The form falls if A' P + P A < 0 at both ends of L, A = [[-k1 / 2M, 1 / 2M], [-k2 +- L,
-    0]].
-    """
-    g = f.g
-    p, q, r = map(arb, part["P"])
-    L = arb(part["L"])
-    size = arb(part["q"])
-    X = arb(part["X"])
-    det = p * r - q * q
-    for end in (L, -L):
-        a = -g.k1 / (2 * e.M)
-        b = 1 / (2 * e.M)
-        low = end - g.k2
-        n11 = 2 * (a * p + low * q)
-        n12 = b * p + a * q + low * r
-        n22 = 2 * b * q
-        need(n11 < 0 and n11 * n22 - n12 * n12 > 0, f"a falling form at L = {end}")
-    z1 = (size * r / det).sqrt()
-    z2 = (size * p / det).sqrt()
-    positive = p > 0 and det > 0 and size > 0 and L > 0
-    need(positive and e.n == 1 and z1 * z1 <= g.c * X, "a positive form, |s| <= c X")
-    v = z1 * z1 + g.c * X
-    x = hull(-X, X)
-    lag = e.M * g.c - hull(e.E, e.E + e.F * X * X)
-    rate = e.A * x.cos() + e.B + 3 * e.C * x * x - g.c * lag
-    fast = abs(lag) * (g.k1 * z1 + z2) / e.M + 2 * abs(e.F) * X * v * v
-    w = z2 + abs(phi(e, x)) + abs(lag) * v + doc["disturbance"]
-    top = arb(0)
-    if doc["u_max"] is not None:
-        top = (doc["u_max"] - w - g.k1 * z1).lower()
-    slack = (L - abs(rate) * v - fast - doc["slope"]).lower()
-    derived = {
-        "integral": (g.k2 - doc["slope"], abs(g.k2) + doc["slope"]),
-        "slope": (slack, L),
-        "actuator": (top, w + g.k1 * z1),
-    }
-    if "w_max" in vars(g):
-        derived["clamp"] = (g.w_max - w).lower(), w
-    return derived
+    return {"reaching": (least, f.force), "actuator": f.room}
 
 
 def seal(doc):
@@ -513,7 +441,6 @@ THEOREMS = {
     "level sets": levels,
     "saturated PD": saturated,
     "reaching": reaching,
-    "super-twisting": super_twisting,
 }
 
 
@@ -528,11 +455,10 @@ def check(doc):
         fields(doc)
         e = equation(doc["plant"])
         f = feedback(doc["law"], doc["u_max"])
-        strong = f.kind is None or ((f.K is None or f.K > 0) and (f.a is None or f.a > 0))
+        strong = (f.K is None or f.K > 0) and (f.a is None or f.a > 0)
         unit = "rad" if "pendulum" in doc["plant"]["name"] else "m"
-        bounds = doc["disturbance"] >= 0 and (doc["slope"] or 0) >= 0
-        sound = e.M > 0 and f.c > 0 and strong
-        need(sound and bounds and doc["unit"] == unit, "plant, law, bounds and unit")
+        sound = e.M > 0 and f.c > 0 and strong and doc["disturbance"] >= 0
+        need(sound and doc["unit"] == unit, "plant, law, bounds and unit")
         theorems = [part["theorem"] for part in doc["parts"]]
         known = 0 < len(theorems) == len(set(theorems)) and set(theorems) <= f.theorems
         need(known, "a theorem of this law")

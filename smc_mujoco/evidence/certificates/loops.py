@@ -74,10 +74,10 @@ def _loop(
         def sigma(s):  # pyright: ignore[reportRedeclaration]
             return np.clip(law.lam * np.tanh(s), -top, top)
 
-    elif law.name in ("classical", "terminal", "super_twisting"):
-        k = min(getattr(law, "k", 0.0), top)
+    elif law.name == "classical":
+        k = min(law.k, top)
         steep = math.inf
-        c = getattr(law, "c", 1.0)
+        c = law.c
 
         def sigma(s):  # pyright: ignore[reportRedeclaration]
             return k * np.sign(s)

@@ -18,7 +18,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import ScenarioError, shown
@@ -34,7 +33,7 @@ BOX_COUNTS = (64, 256, 1024, 4096)  # tried in turn
 SET_FACTOR = 0.98  # factor on the largest set that a condition allows: chosen
 # where a law has them, its theorems need them > 0
 POSITIVE_GAINS = ("lam", "k", "k1", "c", "phi", "q1")
-LAWS = ("observer_free", "boundary_layer", "lqr", "classical", "terminal", "super_twisting")
+LAWS = ("observer_free", "boundary_layer", "lqr", "classical")
 # theorem, its data -> its margins, None where it is refused
 Judge = Callable[[str, dict], dict[str, Any] | None]
 PLANTS = (
@@ -49,14 +48,12 @@ PLANTS = (
 def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificate:
     """Return what is proven of a scenario's law on its plant, checked in ball arithmetic.
 
-    Laws: observer_free, boundary_layer, lqr, classical, terminal, super_twisting; all without the
-    nominal model or a separate surface. Plants: the pendulums and
-    their networks, duffing and van_der_pol, with any parameters and mismatch, and with 0 as the
-    goal.
+    Laws: observer_free, boundary_layer, lqr, classical; all without the nominal model or a separate
+    surface. Plants: the pendulums and their networks, duffing and van_der_pol, with any parameters
+    and mismatch, and with 0 as the goal.
 
     Args:
-      within: disturbances in addition to the scenario's own, as of `worst_case`: bounds of |d| and,
-        for super_twisting, of |d'|. None: the scenario's own disturbance and no other.
+      within: disturbances in addition to those of the scenario, a bound of |d|; None: no other.
 
     Raises:
       ScenarioError: a pair for which there is no theorem, a disturbance without a bound, or a class
@@ -74,11 +71,9 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     _check(scenario)
     plant = scenario.plant
     law = scenario.law
-    d0, rate = _bounds(scenario)
+    d0 = _bound(scenario)
     if within is not None:
-        more, faster = _class(within)
-        d0 += more
-        rate += faster
+        d0 += _class(within)
     values = vars(plant.values(scenario.mismatch))
     document: dict[str, Any] = {
         "format": checker.FORMAT,
@@ -95,7 +90,6 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
         "u_max": finite(scenario.limits[0]),
         "unit": plant.unit,
         "disturbance": d0,
-        "slope": finite(rate),
     }
     document["parts"] = _parts(document, scenario, checker)
     document["seal"] = checker.seal(document)
@@ -116,8 +110,6 @@ def _check(scenario: Scenario) -> None:
     zero = [name for name in POSITIVE_GAINS if law.uniform and law.gains.get(name, 1.0) <= 0.0]
     refused = {
         f"{law.name} with {' and '.join(zero)} not above 0": zero,
-        f"super_twisting on the {plant.n} pendulums of a network": law.name == "super_twisting"
-        and plant.n > 1,
         "model='nominal'": scenario.resolved.model != "none",
         "a surface": scenario.surface is not None,
         "a feedforward": scenario.feedforward is not None,
@@ -132,10 +124,9 @@ def _check(scenario: Scenario) -> None:
             raise ScenarioError(f"there is no theorem for {what}: certify a scenario without it")
 
 
-def _bounds(scenario: Scenario) -> tuple[float, float]:
-    """Return bounds of |d| and |d'| of a scenario's disturbance."""
-    bound = 0.0
-    slope = 0.0
+def _bound(scenario: Scenario) -> float:
+    """Return the bound of |d| of a scenario's disturbance."""
+    total = 0.0
     for signal in scenario.disturbance:
         bounds = bounds_of(signal)
         if bounds is None:
@@ -143,23 +134,21 @@ def _bounds(scenario: Scenario) -> tuple[float, float]:
                 f"{type(signal).__name__} has no bound: leave it out, and give "
                 "within=smc.Uncertainty(disturbance=...)"
             )
-        bound += bounds[0]
-        slope += bounds[1]
-    return bound, slope
+        total += bounds[0]
+    return total
 
 
-def _class(within: Uncertainty) -> tuple[float, float]:
-    """Return the bounds of |d| and |d'| of a class."""
+def _class(within: Uncertainty) -> float:
+    """Return the bound of |d| of a class."""
     if not isinstance(within, Uncertainty):
         raise ScenarioError(
             f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
         )
     if within != Uncertainty(disturbance=within.disturbance, slope=within.slope):
         raise ScenarioError(
-            "a certificate is about disturbances alone: give a class with disturbance and slope "
-            "only"
+            "a certificate is about disturbances alone: give a class with a disturbance only"
         )
-    return within.disturbance, math.inf if within.slope is None else within.slope
+    return within.disturbance
 
 
 def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
@@ -183,8 +172,6 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
             return False
         return True
 
-    if law.name == "super_twisting":
-        return [_super_twisting(document, loop, law, judge)]
     parts = [_saturated(document, loop, terms, law, judge)]
     if document["plant"]["n"] > 1:
         return parts
@@ -193,12 +180,12 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     else:
         reach = 3.0 * max(map(abs, scenario.plant.x0))  # chosen
     box = None
-    if law.name in ("classical", "terminal"):
-        reaching = _reaching(0.5 * loop.c if law.name == "classical" else 0.0, reach, judge)
+    if law.name == "classical":
+        reaching = _reaching(0.5 * loop.c, reach, judge)
         box = reaching["X"], reaching["S"]
         parts.append(reaching)
     bounded = document["disturbance"] > 0.0 or not parts[0]["holds"]
-    if bounded and law.name != "terminal" and f.room[0] >= 0:
+    if bounded:
         x0 = scenario.resolved.x0[0]
         v0 = scenario.resolved.v0[0]
         start = x0, v0 + loop.c * x0
@@ -231,7 +218,7 @@ def _saturated(
     if law.name == "observer_free":
         force = law.lam
     elif law.name != "lqr":
-        force = law.k + getattr(law, "bound", 0.0)
+        force = law.k
     V = {
         "v^2": loop.M / 2.0,
         "sigma": force / loop.c,
@@ -240,8 +227,6 @@ def _saturated(
         "x^4": -C / 4.0,
     }
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
-    if law.name == "terminal":
-        V |= {"b": law.b, "p": law.p}
     for told in _restoring(loop, terms):
         if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
             part = _part("saturated PD", margins | {"restoring": told["margin"]}, V=V)
@@ -330,64 +315,3 @@ def _cell(levels: search.Levels, x: float, s: float) -> float:
     i = int(np.searchsorted(levels.x, x, side="right")) - 1
     j = int(np.searchsorted(levels.s, s, side="right")) - 1
     return float(levels.W[i : i + 2, j : j + 2].max())
-
-
-def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Judge) -> dict:
-    """Return the largest set that Moreno & Osorio's quadratic form proves."""
-    slope = document["slope"]
-    if slope is None:
-        raise ScenarioError(
-            "super_twisting needs a bound of d': give one, as in "
-            "smc.Uncertainty(disturbance=1.0, slope=2.0)"
-        )
-
-    def proven(data: dict) -> bool:
-        margins = judge("super-twisting", data)
-        return margins is not None and min(map(float, margins.values())) > 0.0
-
-    best = None
-    for L in law.k2 * np.linspace(0.05, 0.95, 19):
-        P = _form(law.k1 / loop.M, law.k2, L, loop.M) if slope < L else None
-        if P is None:
-            continue
-        data = functools.partial(_ellipse, P, L, loop.c)
-        size = search.largest(lambda q, data=data: proven(data(10.0**q)), -12.0, 6.0)
-        found = data(SET_FACTOR * 10.0**size)
-        if proven(found) and (best is None or best["X"] < found["X"]):
-            best = found
-    if best is None:
-        raise ScenarioError(
-            f"found no quadratic form for super_twisting with k1 = {law.k1:g}, k2 = {law.k2:g}, "
-            f"|d| <= {document['disturbance']:g} and |d'| <= {slope:g}: give larger gains, or a "
-            "smaller disturbance"
-        )
-    return _judged("super-twisting", best, judge)
-
-
-def _ellipse(P: np.ndarray, L: float, c: float, q: float) -> dict:
-    """Return the data of the set z' P z <= q, z1 = [s]^(1/2), where |x| <= X = max |s| / c."""
-    X = q * float(np.linalg.inv(P)[0, 0]) / c * (1.0 + 1e-9)
-    return {"P": [P[0, 0], P[0, 1], P[1, 1]], "L": float(L), "q": q, "X": X}
-
-
-def _form(k1: float, k2: float, L: float, M: float) -> np.ndarray | None:
-    """Return P > 0 with A' P + P A < 0 for A = [[-k1 / 2, 1 / 2M], [-k2 +- L, 0]], or None."""
-    ends = [np.array([[-k1 / 2.0, 1.0 / (2.0 * M)], [end - k2, 0.0]]) for end in (-L, L)]
-
-    def shape(z):
-        return np.array([[math.exp(z[0]), z[1]], [z[1], 1.0]])
-
-    def worst(z):
-        P = shape(z)
-        scale = np.diag(np.diag(P) ** -0.5)
-        rates = [np.linalg.eigvalsh(scale @ (A.T @ P + P @ A) @ scale).max() for A in ends]
-        return max(*rates, -np.linalg.eigvalsh(P).min())
-
-    found = []
-    for share in (0.3, 1.0):
-        z = [math.log(2.0 * k2 * M + 0.5 * (k1 * M) ** 2), -k1 * M / 2.0 * share]
-        found.append(minimize(worst, z, method="Nelder-Mead"))
-    best = min(found, key=lambda one: one.fun)
-    if best.fun < 0.0 and np.linalg.det(shape(best.x)) > 0.0:
-        return shape(best.x)
-    return None

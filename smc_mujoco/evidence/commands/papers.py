@@ -1,16 +1,13 @@
 """smc-mujoco claims: audits of the claims of papers."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.interrupts import delay_ctrl_c
-
-if TYPE_CHECKING:
-    from smc_mujoco.evidence.audit.audit import Audit
 
 
 def claims(
@@ -36,9 +33,6 @@ def claims(
         Path | None,
         typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
     ] = None,
-    mutants: Annotated[
-        bool, typer.Option("--mutants", help="List claims that no broken law loses.")
-    ] = False,
     threads: options.Threads = None,
     papers: Annotated[bool, typer.Option("--papers", help="List the papers instead.")] = False,
     new: Annotated[
@@ -61,8 +55,7 @@ def claims(
     gains is "not shown" if a search finds no example. Claims that you name are shown in full. All
     of Gaber's, the default, take minutes.
 
-    A second audit with the same versions writes the same file of --evidence, to the last bit. With
-    --mutants the exit code is 1 if an audit of some claim cannot fail.
+    A second audit with the same versions writes the same file of --evidence, to the last bit.
 
     Example: smc-mujoco claims 3 18 --gains tuned
 
@@ -71,7 +64,7 @@ def claims(
     Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json
     """
     if papers or new or check:
-        audited = ("ids", "gains", "quick", "paper", "evidence", "mutants", "threads")
+        audited = ("ids", "gains", "quick", "paper", "evidence", "threads")
         options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
         _papers(papers, new, check, Terminal(json))
         return
@@ -86,42 +79,17 @@ def claims(
     about = find_paper(paper or DEFAULT_PAPER)
     sets = None if gains is None else options.names(gains)
     writable(evidence and with_ending(evidence, ".json"))
-    asked = about, ids or None, sets, quick, threads
     with bar("claims", counted=True) as drawn:
-        done = audit(*asked, report=drawn.reached)
+        done = audit(about, ids or None, sets, quick, threads, report=drawn.reached)
     if evidence:
         evidence = done.save(evidence)
     tables.print_claims(done.claims, terminal, full=bool(ids))
-    kept = mutants and _kept(done, asked, terminal)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if quick:
         terminal.note("quick: coarser grids than the claims say, and fewer sets of gains", "dim")
     if evidence:
         terminal.wrote(evidence)
     terminal.finish(document(done.claims))
-    if kept:
-        raise SystemExit(1)
-
-
-def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
-    """Print the claims that no mutant loses, and those that cannot be lost; return whether any is
-    in the first list.
-
-    `asked`: the first arguments of `survivors`.
-    """
-    from smc_mujoco.common.progress import bar
-    from smc_mujoco.evidence.audit.mutants import survivors
-
-    with bar("mutants", counted=True) as drawn:
-        kept = survivors(*asked, report=drawn.reached)
-    lines = [f"claim {id} is {why}" for id, why in kept.items()]
-    terminal.note(
-        "\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be."
-    )
-    for entry in [done.paper.claims[claim.id] for claim in done.claims]:
-        if entry.immune:
-            terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
-    return bool(kept)
 
 
 def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Terminal) -> None:

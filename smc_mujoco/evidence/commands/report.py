@@ -38,8 +38,8 @@ def report(
     OUT/report.html needs no network and no other file; the data are in the same folder. You can
     stop the command at any time, and continue by starting it again.
 
-    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html,
-    evidence.json and checks.svg.
+    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html and
+    evidence.json.
 
     Example: smc-mujoco report --quick --out look
 

@@ -22,7 +22,7 @@ def rig(
             metavar="RIG",
             help=(
                 "A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint. "
-                "None: all machines."
+                "None: lists the rigs."
             ),
         ),
     ] = None,
@@ -30,10 +30,7 @@ def rig(
         list[Path] | None,
         typer.Argument(
             metavar="FILE",
-            help=(
-                "Records: CSV or npz files of columns; with --fit also traces. None: what the twin "
-                "said of the public records, and what the machine did."
-            ),
+            help=("Records: CSV or npz files of columns; with --fit also traces."),
         ),
     ] = None,
     columns: options.Columns = None,
@@ -94,7 +91,7 @@ def rig(
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in
     rad and time in s. The first line of a CSV file has the names of the columns.
 
-    Without a file: what the twin said of each public record, and what the machine did.
+    Without a rig: the rigs that there are.
 
     Example: smc-mujoco rig
 
@@ -118,40 +115,24 @@ def rig(
         values = options.numbers(given, "--set", "M=5,b=8")
         wanted = options.names(quantities)
         data = _fit(name, files or [], named, wanted, values, starts, seed, figure, terminal)
-    elif name is None or not files:
-        _report(name or "", figure, terminal)
-    elif len(files) > 1:
-        raise ScenarioError(f"{len(files)} records: give one, or --fit")
+    elif name is None:
+        _list(terminal)
+    elif not files or len(files) > 1:
+        raise ScenarioError(f"{len(files or ())} records of {name}: give one file, or --fit")
     else:
         wanted = options.names(sets)
         _repeat(name, files[0], named, wanted, start, duration, figure, film, terminal)
     terminal.finish(data)
 
 
-def _report(name: str, figure: Path | None, terminal: Terminal) -> None:
-    """Show what twins said of public records, of one machine or of all."""
+def _list(terminal: Terminal) -> None:
+    """List the rigs."""
     with delay_ctrl_c():
-        from smc_mujoco.common.files import writable
-        from smc_mujoco.evidence.commands import tables
-        from smc_mujoco.evidence.rigs import twin_figures
-        from smc_mujoco.evidence.rigs.figure import twins_figure
-        from smc_mujoco.evidence.rigs.rig import rig as find_rig
+        from smc_mujoco.cli import tables
+        from smc_mujoco.evidence.rigs.rig import catalogue
 
-    writable(figure)
-    rows = twin_figures.rows(name)
-    if not rows:
-        raise ScenarioError(
-            f"no public record of {name} is known here: give one, a CSV or npz file"
-        )
-    if figure:
-        terminal.wrote(*twins_figure(rows, figure))
-    if name:
-        terminal.print(tables.figures_of_twin(find_rig(name).label, rows))
-    else:
-        terminal.print(tables.machines(rows))
-    if orders := twin_figures.orders(name):
-        terminal.print(tables.orders(orders))
-    terminal.note(twin_figures.ABOUT, wrap=True)
+    rows = [(name, known.label) for name, known in catalogue().items()]
+    terminal.print(tables.catalogue("Rigs", rows))
 
 
 def _fit(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from statistics import median_low
@@ -17,9 +16,7 @@ from smc_mujoco.common.text import capital, number
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measured
 from smc_mujoco.evidence.certificates.certificate import Certificate
-from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.evidence.rigs.identify import Identified
-from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
 # questions have their own.
@@ -120,80 +117,6 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     for name, fit in by_name.items():
         table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
     return table
-
-
-def machines(rows: Sequence[TwinFigure]) -> Table:
-    """Return how far twins are from their machines, by what their records were used for."""
-    right = functools.partial(Column, justify="right", no_wrap=True)
-    table = titled(
-        "How far the twin is from the machine",
-        Column("machine", no_wrap=True),
-        Column("records\nare", no_wrap=True),
-        right("\nrows"),
-        right("median\n%"),
-        right("largest\n%"),
-        right("within\nrange"),
-        right("public\n%"),
-        pad_edge=False,
-    )
-    for group in twin_figures.summaries(rows):
-        table.add_row(*group.cells)
-    return table
-
-
-def orders(by_laws: Sequence[Order]) -> Table:
-    """Return in how many parameter sets of a twin its laws stand in the machine's order."""
-    right = functools.partial(Column, justify="right", no_wrap=True)
-    table = titled(
-        "Laws in the machine's order",
-        Column("machine", no_wrap=True),
-        "condition",
-        "twin",
-        right("sets in the\nmachine's order"),
-        right("tau"),
-        pad_edge=False,
-    )
-    for one in by_laws:
-        counts = f"{one.ordered} of {one.sets}", f"{one.tau:z.2f}"
-        table.add_row(one.rig, one.condition, one.variant or "whole", *counts)
-    return table
-
-
-def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:
-    """Return a machine's figures beside those of its twin: below each record, and each variant of
-    the twin, its own.
-    """
-    right = functools.partial(Column, justify="right", no_wrap=True)
-    heads = [right("machine"), right("twin"), right("range"), right("fit, %"), right("public")]
-    table = titled(label, "record", *heads, pad_edge=False)
-    before = ("", "")
-    for row in rows:
-        if (row.record, row.variant) != before:
-            before = row.record, row.variant
-            law = "" if row.law == "none" else f", {row.law}"
-            about = row.variant or row.use
-            table.add_row(
-                Text.assemble(f"{row.record}{law}: ", (about, "" if row.variant else "bold"))
-            )
-        if row.low == row.high:
-            ends = ""
-        else:
-            ends = f"{_told(row.low)}…{_told(row.high)}"
-        if math.isnan(row.fit) or math.isinf(row.fit):
-            fit = ""
-        else:
-            fit = f"{row.fit:z.1f}"
-        cells = _told(row.machine), _told(row.twin), ends, fit, _told(row.published)
-        table.add_row(f"  {row.figure}, {row.unit}".removesuffix(", "), *cells)
-    return table
-
-
-def _told(value: float) -> str:
-    if math.isnan(value):
-        return ""
-    if math.isinf(value):
-        return "falls"
-    return f"{value:.4g}"
 
 
 def _to_error(value: float, error: float) -> str:

@@ -1,4 +1,4 @@
-"""The audit of one paper as one HTML file, with its evidence and figure beside it.
+"""The audit of one paper as one HTML file, with its evidence beside it.
 
 report("levant_1993", "levant")      # levant/report.html, which needs no other file, no network
 """
@@ -27,9 +27,7 @@ def report(
     threads: int | None = None,
     progress: bool = False,
 ) -> Path:
-    """Audit a paper and write its report, out/report.html, with evidence.json and checks.svg
-    beside it.
-    """
+    """Audit a paper and write its report, out/report.html, with evidence.json beside it."""
     if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
     from smc_mujoco.evidence.report import page
@@ -39,12 +37,10 @@ def report(
         done = audit(paper, quick=quick, threads=threads, report=shown.reached)
     document = evidence.document(done)
     write_json(folder / "evidence.json", document)
-    done.figure(folder / "checks.svg")
     about = done.paper
     read = [
         page.text(words) for words in (f"Read: {about.read}.", about.access, about.note) if words
     ]
-    drawn = page.picture(done.figure, "Each check as a multiple of its threshold.")
     seal = f"{len(document['runs'])} runs. evidence.json, beside this file, leads from each claim"
     seal += f" to its runs, numbers and verdict. Its seal is {document['seal'][:16]}…;"
     seal += " smc-mujoco claims --check evidence.json checks it."
@@ -56,7 +52,6 @@ def report(
         made_by=f"smc-mujoco report --paper {about.name}{' --quick' if quick else ''}",
         sections=[
             page.Section("claims", "The claims", [*read, page.claims(done.claims)]),
-            page.Section("checks", "How far from the thresholds", [drawn]),
             page.Section("gains", "Gains", page.tables(gains(done))),
             page.Section("method", "How it was computed", [page.text(VERDICTS), page.text(seal)]),
         ],

@@ -99,8 +99,7 @@ class Rig:
       dynamics: function of the quantities, by name, that returns a plant with the joints of the
         record, for records whose torques are predicted from the measured motion. None: records are
         replayed.
-      identified_from: names of the records that its quantities were identified from, see
-        `twin_figures`.
+      identified_from: names of the records that its quantities were identified from.
       free: names of the quantities that its records determine, which `smc.identify` finds by
         default.
       window: s, of the pieces in which identification first repeats a record; each starts from its

@@ -199,13 +199,10 @@ def test_a_change_breaks_the_seal(done, tmp_path):
         evidence.check(tmp_path / "none.json")
 
 
-# figure and table
+# table
 
 
-def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
-    (head,) = done.figure(tmp_path / "checks.svg", size=(9.0, 6.0)).legends
-    assert head.get_title().get_text() == "Claims of A. Nobody: Small"
-    assert (tmp_path / "checks.svg").is_file()
+def test_an_audit_shows_its_claims(done):
     assert done._repr_html_() == done.claims._repr_html_()
 
 
@@ -219,10 +216,6 @@ def test_the_command_writes_evidence_and_checks_the_seal(folder, tmp_path):
     assert written.exit_code == 0, written.output
     assert "the law is calm" in written.stdout
     assert file.is_file()
-    asked = CliRunner().invoke(main.app, ["claims", "1", "--paper", str(folder), "--mutants"])
-    assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), (
-        asked.output
-    )
     without = CliRunner().invoke(main.app, ["claims", "2", "--paper", str(folder), "--mutants"])
     assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
     checked = CliRunner().invoke(main.app, ["claims", "--check", str(file)])

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from helpers.mutants import BLIND, KEPT, MUTANTS, survivors
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import law_function
-from smc_mujoco.evidence.audit.mutants import BLIND, KEPT, MUTANTS, survivors
 from smc_mujoco.evidence.audit.paper import new
 from smc_mujoco.evidence.audit.variants import variant
 

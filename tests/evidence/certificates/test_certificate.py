@@ -18,7 +18,6 @@ GLOBAL = part(
         "local": 1.0,
     },
 )
-TERMINAL = part("reaching", {"reaching": 0.3, "actuator": 1.0}, X=0.81, S=0.0)
 SAID = {
     "fails and falls": certificate(),
     "without d": certificate("inverted_pendulum", parts=[GLOBAL], disturbance=0.0),
@@ -35,10 +34,6 @@ SAID = {
                 },
             ),
             part("reaching", {"reaching": -6.0, "actuator": 0.0}, X=0.0, S=0.0),
-            part(
-                "super-twisting",
-                {"integral": -7.0, "slope": -8.0, "actuator": 9.0},
-            ),
         ],
     ),
     "a switching law": certificate(
@@ -52,31 +47,6 @@ SAID = {
         ],
     ),
     "nothing under a disturbance": certificate(parts=[part("saturated PD", {"damping": 0.5})]),
-    "a terminal surface": certificate(
-        "duffing",
-        "terminal",
-        {
-            "k": 3.0,
-            "b": 2.0,
-            "p": 0.75,
-            "bound": 1.0,
-        },
-        [TERMINAL],
-    ),
-    "super-twisting": certificate(
-        "van_der_pol",
-        "super_twisting",
-        {"k1": 3.0, "k2": 2.0, "c": 1.5},
-        disturbance=0.5,
-        slope=1.75,
-        parts=[
-            part(
-                "super-twisting",
-                {"integral": 0.25, "slope": 0.1, "actuator": 0.2},
-                X=0.3,
-            )
-        ],
-    ),
 }
 
 
@@ -84,7 +54,7 @@ SAID = {
 FACTS = {
     "fails and falls": ("level sets", True, False, 0.3, 3.0, [False, True], [0.666, 0.3]),
     "without d": ("saturated PD", True, True, 0.0, 3.0, [True], []),
-    "every condition fails": ("saturated PD", False, False, None, 3.0, [False] * 3, []),
+    "every condition fails": ("saturated PD", False, False, None, 3.0, [False] * 2, []),
     "a switching law": (
         "saturated PD",
         False,
@@ -95,8 +65,6 @@ FACTS = {
         [1.25, 0.5, 0.999, 0.0],
     ),
     "nothing under a disturbance": ("saturated PD", False, True, None, 3.0, [True], []),
-    "a terminal surface": ("reaching", False, False, None, 1.0, [True], [0.81, 1.8974]),
-    "super-twisting": ("super-twisting", False, False, None, 1.5, [True], [0.3]),
 }
 
 
@@ -120,7 +88,6 @@ def test_units_of_margins_follow_from_those_of_the_plant():
         units[one.name] = one.unit
     assert units["damping"] == "N m s/rad"
     assert units["coupling"] == "N m/rad"
-    assert units["slope"] == "N m/s"
 
 
 def test_w_is_bilinear_odd_states_alike_and_1_outside():
@@ -143,17 +110,8 @@ def test_the_set_of_a_switching_law_is_a_strip_and_of_a_stable_loop_everything()
         box.contains(x, s - 2.0 * x), (np.abs(x) <= 1.25) & (np.abs(s) <= 0.5)
     )
     assert SAID["without d"].contains(x, s).all()
-    assert not SAID["a terminal surface"].contains(x, s).any()
-    with pytest.raises(
-        smc.ScenarioError, match="the certificate of terminal on duffing has no level sets"
-    ):
-        SAID["a terminal surface"].level(x, s)
-
-
-def test_what_has_no_level_sets_has_no_plane():
-    for name in ("every condition fails", "super-twisting", "without d"):
-        with pytest.raises(smc.ScenarioError, match="has no level sets to draw"):
-            SAID[name].figure()
+    with pytest.raises(smc.ScenarioError, match="classical on inverted_pendulum has no level sets"):
+        box.level(x, s)
 
 
 def test_a_file_that_is_no_certificate_is_refused(tmp_path):

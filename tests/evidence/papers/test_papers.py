@@ -4,8 +4,8 @@ Mutants of all claims take minutes: `smc-mujoco claims --paper NAME --quick --mu
 """
 
 import pytest
+from helpers.mutants import survivors
 
-from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
 
 

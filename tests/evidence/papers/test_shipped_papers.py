@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from helpers.mutants import survivors
 
 import smc_mujoco as smc
 from smc_mujoco.control.component import Template
 from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.papers.acary_2012.claims import observed_twisting_60
 from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import (

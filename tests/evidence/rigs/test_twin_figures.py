@@ -1,4 +1,4 @@
-"""What simulation said of real machines, and what these did: the package's rows."""
+"""What simulation said of real machines, and what these did: the rows of benchmarks."""
 
 import dataclasses
 import math
@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from helpers.pages import ROOT
 from matplotlib.figure import Figure
-from typer.testing import CliRunner
 
 import smc_mujoco as smc
-from benchmarks import programs
-from smc_mujoco.cli.main import app
-from smc_mujoco.evidence.rigs import figure, rig, twin_figures
-from smc_mujoco.evidence.rigs.twin_figures import TwinFigure
+from benchmarks import programs, twin_figures
+from benchmarks.twin_figures import TwinFigure
+from smc_mujoco.evidence.rigs import rig
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 
@@ -100,7 +98,7 @@ def test_a_summary_is_over_the_known_figures_of_whole_twins():
     assert twin_figures.summaries(rows) == [found]
 
 
-def test_the_page_has_the_package_s_rows():
+def test_the_page_has_the_rows_of_benchmarks():
     page = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
     for one in twin_figures.summaries(twin_figures.rows()):
         (cells,) = re.findall(rf"^\| `{one.rig}` \| {one.use} \| (.*) \|$", page, re.MULTILINE)
@@ -145,22 +143,7 @@ def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
 def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, mark):
     ax = Figure().subplots()
     one = dataclasses.replace(row("emps", "program of 24.8 s", "rms error"), machine=1.0, twin=twin)
-    figure._row(ax, 0.0, one, "#000000")
+    twin_figures._row(ax, 0.0, one, "#000000")
     (drawn,) = [line for line in ax.lines if line.get_marker() != "None"]
     assert drawn.get_marker() == mark
     assert 0.25 <= np.asarray(drawn.get_xdata())[0] <= 4.0
-
-
-def test_the_command_tells_all_machines_or_one(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    every = CliRunner().invoke(app, ["rig"]).output
-    for name in {one.rig for one in twin_figures.rows()}:
-        assert name in every
-    assert "held out" in every
-    assert "7 of 8" in every  # in the machine's order
-    one = CliRunner().invoke(app, ["rig", "qube_servo"]).output
-    assert "falls" in one
-    assert "order" not in one  # it ran one law
-    stepper = CliRunner().invoke(app, ["rig", "stepper_furuta"]).output
-    assert stepper.count("without") == len(twin_figures.orders()) - 2
-    assert CliRunner().invoke(app, ["rig", "srv02"]).exit_code != 0

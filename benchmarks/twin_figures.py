@@ -9,8 +9,8 @@ a record was used is not written down with the figure but follows from the rig: 
 identified from no record here is "unfitted"; of others the records of `Rig.identified_from` are
 "fitted on", and all the rest are "held out".
 
-The records do not come with the package. `python benchmarks/machines.py FOLDER` computes the rows
-from them.
+The records are not in the repository. `python benchmarks/machines.py FOLDER` computes the rows from
+them, and draws docs/rigs.svg.
 """
 
 import dataclasses
@@ -21,20 +21,24 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import read_json
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
 from smc_mujoco.evidence.rigs.rig import catalogue
 
 FILE = Path(__file__).with_suffix(".json")
-ABOUT = (
-    "A figure of a signal is its rms about its mean. Range: over the twin's parameter sets, or 5 "
-    "to 95 % of its runs. Public: by published numbers. Held out: the twin was identified from "
-    "other records. Unfitted: from none here."
-)
 UNFITTED = "unfitted"
 FITTED = "fitted on"
 HELD_OUT = "held out"
+MARKS = {UNFITTED: "D", HELD_OUT: "o", FITTED: "o"}  # filled, but for records that were fitted on
+PHONE_WIDTH = 4.0  # inches of the page of twins, whose letters are read on a phone
+ROW, BESIDE = 0.2, 0.35  # inches a row; rows from one record of a figure to the next
+LEAST, MOST = 0.25, 4.0  # ends of the axis: a triangle there stands for what is beyond
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -117,22 +121,6 @@ class Summary(NamedTuple):
     inside: int  # number of the machine's figures within the twin's range
     published: float  # median of how far published numbers are, a share; NaN without any
 
-    @property
-    def cells(self) -> list[str]:
-        """The cells of a table."""
-        shares = map(percent, (self.median, self.largest, self.published))
-        median, largest, published = shares
-        return [self.rig, self.use, str(self.count), median, largest, str(self.inside), published]
-
-
-def percent(share: float) -> str:
-    """Return a share as percent; "" for none, and "falls" for a twin that falls."""
-    if math.isnan(share):
-        return ""
-    if math.isinf(share):
-        return "falls"
-    return f"{100.0 * share:.1f}"
-
 
 def known(rows: Sequence[TwinFigure]) -> list[TwinFigure]:
     """Return the figures of whole twins, without those that are kept aside."""
@@ -188,3 +176,80 @@ def orders(rig: str = "") -> list[Order]:
     """Return the orders of laws on the machines that ran several, as `rows`."""
     name = rig and find("rig", rig, catalogue()).name
     return [row for row in _stored()[1] if name in ("", row.rig)]
+
+
+def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
+    """Draw the twin's figures over the machine's, a row for each with a mark for each record.
+
+    Write PATH.svg, PATH.png.
+
+    A line is a mark's range, a cross is by published numbers. Figures that are kept aside, and
+    variants of a twin, are left out.
+    """
+    paths = pages.files(Path(path).with_suffix(""))
+    rigs: dict[str, dict[tuple[str, str], list[TwinFigure]]] = {}
+    for row in known(rows):
+        rigs.setdefault(row.rig, {}).setdefault((row.use, row.figure), []).append(row)
+    colours = dict(zip(rigs, style.spread(len(rigs)), strict=True))
+    place = 0.0
+    ticks = []
+    places = []
+    names = []
+    for rig, figures in rigs.items():
+        names.append((place + 0.6, rig))
+        place += 1.2
+        for (_, figure), group in figures.items():
+            for k, row in enumerate(group):
+                places.append((place + 0.5 + BESIDE * k, row))
+            deep = 1.0 + BESIDE * (len(group) - 1)
+            count = f", {len(group)} records" if len(group) > 1 else ""
+            ticks.append((place + 0.5 * deep, f"{figure}{count}"))
+            place += deep
+    with style.page(PHONE_WIDTH):
+        handles = []
+        for use in dict.fromkeys(row.use for _, row in places):
+            filling = style.PAPER if use == FITTED else style.INK
+            mark: Any = {"color": style.INK, "marker": MARKS[use], "mfc": filling, "ls": ""}
+            handles.append(Line2D([], [], label=use, **mark))
+        cross = Line2D([], [], color=style.MUTED, marker="x", ls="", label="published numbers")
+        handles.append(cross)
+        height = pages.head_height(PHONE_WIDTH, handles) + ROW * place + 0.6
+        page = pages.blank(PHONE_WIDTH, height)
+        ax = page.subplots()
+        for at, rig in names:
+            ax.text(LEAST * 1.05, at, rig, color=colours[rig], fontweight="bold", va="center")
+        for at, row in places:
+            _row(ax, at, row, colours[row.rig])
+        ax.axvline(1.0, color=style.RULE, lw=0.8, zorder=0)
+        ax.set(
+            xscale="log", xlim=(LEAST, MOST), ylim=(place + 0.2, 0.0), xlabel="twin over machine"
+        )
+        ax.set_yticks([at for at, _ in ticks], [words for _, words in ticks])
+        ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
+        ax.xaxis.set_minor_locator(NullLocator())
+        pages.set_head(page, PHONE_WIDTH, "What simulation said, and what the machine did", handles)
+        pages.write(page, paths)
+    return paths
+
+
+def _row(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
+    """Draw a figure's ratio and its range; beyond the axis, or for a twin that falls, a triangle at
+    its end.
+    """
+    ends = np.clip([row.low / row.machine, row.high / row.machine], LEAST, MOST)
+    ax.plot(ends, [place, place], color=colour, lw=1.0)
+    marks = ((row.published, "x", style.MUTED), (row.twin, MARKS[row.use], colour))
+    for value, shape, ink in marks:
+        ratio = value / row.machine
+        if ratio > MOST:
+            mark = ">"
+        elif ratio < LEAST:
+            mark = "<"
+        else:
+            mark = shape
+        filling = ink
+        if row.use == FITTED and mark == shape:
+            filling = style.PAPER
+        if not math.isnan(ratio):
+            at = min(max(ratio, LEAST), MOST)
+            ax.plot(at, place, mark, color=ink, mfc=filling, ms=3.5, clip_on=False)
