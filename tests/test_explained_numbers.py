@@ -109,7 +109,6 @@ SAID = {
     apart: [f"are more than {percent(apart.MAX_CHANGE)} apart"],
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
-    scaling.Scaling.as_promised: [f"within {scaling.ORDER_BAND:g} of theory's"],
     ranking: [
         f"there are {ranking.MIN_LEVEL_UNITS} units or more",
         f"lies within {percent(ranking.LEVEL_SHARE)}",

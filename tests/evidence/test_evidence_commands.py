@@ -294,7 +294,6 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "['mass', 'offset'], start={mass: 5.0}, starts=2, seed=3",
             *AXIS,
             "c.csv falls at 8.4 s (falls at 8.4 s)",
-            "median 90.0 (90.0) 60.0 (60.0)",
             "the fit is poor",
             "41 parameter sets, seed 3",
         ],

@@ -17,7 +17,6 @@ exact friction, keeps the scenario's step.
 """
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -177,23 +176,32 @@ def accuracy(
                         starts,
                     )
                 )
-    scenarios = [scenario for setup in setups for scenario in setup.scenarios]
+    scenarios = []
+    for setup in setups:
+        scenarios += setup.scenarios
     counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
-    runs = {k: _measured(trace) for k, trace in stream(scenarios, threads, counted)}
-    in_order = iter([runs[k] for k in range(len(scenarios))])
-    rows = AccuracyTable(
-        _row(setup, list(itertools.islice(in_order, len(setup.scenarios)))) for setup in setups
-    )
-    return AccuracyTable(
-        row for group in rows.groups.values() for row in sorted(group, key=lambda row: row.place)
-    )
+    runs = {}
+    for k, trace in stream(scenarios, threads, counted):
+        runs[k] = _measured(trace)
+    rows = AccuracyTable()
+    first = 0
+    for setup in setups:
+        last = first + len(setup.scenarios)
+        rows.append(_row(setup, [runs[k] for k in range(first, last)]))
+        first = last
+    ordered = AccuracyTable()
+    for group in rows.groups.values():
+        ordered += sorted(group, key=lambda row: row.place)
+    return ordered
 
 
 def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
     """Return the control periods in descending order; refuse fewer than two, equal ones, and what
     is no period.
     """
-    numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in items_of("periods", periods)]
+    numbers = []
+    for h in items_of("periods", periods):
+        numbers.append(number("a period", h, above=0.0, low=MIN_TIME))
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise ScenarioError(
             f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}"
@@ -279,14 +287,20 @@ def _setup(
             step = h / steps
         return dataclasses.replace(made, physics_step=step).named(made.condition)
 
-    runs = [scenario(seed, h) for seed in seeds for h in periods]
+    runs = []
+    for seed in seeds:
+        for h in periods:
+            runs.append(scenario(seed, h))
     return Setup(runs, periods, len(seeds))
 
 
 def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
     base = setup.scenarios[0]
-    failures = [run.failure for run in runs if run.failure]
+    failures = []
+    for run in runs:
+        if run.failure:
+            failures.append(run.failure)
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     no_promise = _why_no_promise(base)

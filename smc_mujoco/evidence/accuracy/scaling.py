@@ -48,11 +48,6 @@ class Scaling:
         """The largest error over the starts, for each period."""
         return tuple(np.max(self.errors, axis=0).tolist())
 
-    @property
-    def as_promised(self) -> bool:
-        """Whether the order is within 0.2 of theory's."""
-        return self.theory is not None and abs(self.order - self.theory) <= ORDER_BAND
-
     def __str__(self) -> str:
         if math.isnan(self.order):
             return "none"
@@ -100,7 +95,9 @@ class Accuracy:
         """The orders of e and s that theory promises, as text: one number if they are the same, ""
         for none.
         """
-        promised = ["" if one.theory is None else f"{one.theory:.2g}" for one in (self.e, self.s)]
+        promised = []
+        for one in (self.e, self.s):
+            promised.append("" if one.theory is None else f"{one.theory:.2g}")
         return ", ".join(dict.fromkeys(promised))
 
     def error(self, k: int) -> str:

@@ -95,7 +95,10 @@ def audit(
     """
     from smc_mujoco.evidence.audit.runs import Runs, of_table
 
-    audited = paper if isinstance(paper, Paper) else find_paper(paper)
+    if isinstance(paper, Paper):
+        audited = paper
+    else:
+        audited = find_paper(paper)
     rows = {} if table is None else of_table(table)
     shared: dict[str, Result] = {}
     entries = wanted(audited, only)
@@ -153,7 +156,10 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
     """Return the sets of gains that `audit` takes for these arguments; refuse an unknown one."""
     if gains is None:
         return list(paper.quick_sets if quick else paper.sets)
-    names = [gains] if isinstance(gains, str) else items_of("gains", gains)
+    if isinstance(gains, str):
+        names = [gains]
+    else:
+        names = items_of("gains", gains)
     for name in names:
         find("set of gains", name, paper.sets)
     if not names:
@@ -194,7 +200,10 @@ def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
 def _evidence(entry: Entry, returned: Any) -> Iterator[Check | Beside]:
     """Yield checks and numbers from what a claim's function returned."""
     if not isinstance(returned, Mapping):
-        each = returned if isinstance(returned, Sequence) else [None]
+        if isinstance(returned, Sequence):
+            each = returned
+        else:
+            each = [None]
         if not all(isinstance(one, Check | Beside) for one in each):
             raise ScenarioError(f"it returns {shown(returned)}: {CURE}")
         yield from returned
@@ -223,5 +232,8 @@ def _cases(measure: object, values: Any) -> Iterator[tuple[str, float]]:
         try:
             yield str(case), float(value)
         except (TypeError, ValueError):
-            where = f"{measure!r}, {case!r}" if case else repr(measure)
+            if case:
+                where = f"{measure!r}, {case!r}"
+            else:
+                where = repr(measure)
             raise ScenarioError(f"it returns {shown(value)} for {where}: {CURE}") from None

@@ -47,7 +47,10 @@ def document(audit: Any) -> dict[str, Any]:
                     about["scores"] = run.scores
                 if run.trace:
                     about["trace"] = run.trace
-    sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
+    sealed = []
+    for claim in audit.claims:
+        if not audit.paper.claims[claim.id].varies:
+            sealed.append(claim)
     data = {
         "format": FORMAT,
         "paper": {
@@ -74,7 +77,10 @@ def document(audit: Any) -> dict[str, Any]:
 
 def seal(data: Mapping[str, Any]) -> str:
     """Return the hash of all but the seal, 64 hex digits."""
-    rest = {name: value for name, value in data.items() if name != "seal"}
+    rest = {}
+    for name, value in data.items():
+        if name != "seal":
+            rest[name] = value
     return hashlib.sha256(to_json(rest, sort_keys=True).encode()).hexdigest()
 
 
@@ -112,9 +118,9 @@ def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
         sealed["immune"] = entry.immune
     if entry.varies:
         return sealed | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
-    runs = {
-        name: sorted({names[key] for key in used}) for name, used in audit.used[claim.id].items()
-    }
+    runs = {}
+    for name, used in audit.used[claim.id].items():
+        runs[name] = sorted({names[key] for key in used})
     judged = {}
     for name in ("numbers", "beside", "verdicts", "verdict", "flips", "note"):
         judged[name] = getattr(claim, name)
@@ -125,7 +131,10 @@ def _run(scenario: Scenario) -> dict[str, Any]:
     """Return a short description of a run. Its name is a hash of the whole scenario."""
     plant = scenario.plant
     suite = plants().get(scenario.plant.name)
-    known = dict(suite.parameters) | {"n": suite.n} if suite else {}
+    if suite:
+        known = dict(suite.parameters) | {"n": suite.n}
+    else:
+        known = {}
     changed = {}  # other than the suite's
     for name, value in (dict(plant.parameters) | {"n": plant.n}).items():
         if name not in known or known[name] != value:

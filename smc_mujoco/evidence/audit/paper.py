@@ -145,7 +145,9 @@ class Paper:
     @property
     def contents(self) -> str:
         """How many claims of each kind it has, and what of the paper was read, in a few words."""
-        kinds = [claim.whose for claim in self.claims.values()]
+        kinds = []
+        for claim in self.claims.values():
+            kinds.append(claim.whose)
         counts = []
         for kind, word in KINDS_OF_CLAIM.items():
             if kind in kinds:
@@ -219,7 +221,9 @@ Home = tuple[Path, str]  # a paper's folder, and the name under which it is impo
 @functools.cache
 def catalogue() -> Catalogue[Home]:
     """Return name -> home of every paper that ships or comes with another package."""
-    of_suite = {name: (folder, f"{SHIPPED_PACKAGE}.{name}") for name, folder in shipped().items()}
+    of_suite = {}
+    for name, folder in shipped().items():
+        of_suite[name] = (folder, f"{SHIPPED_PACKAGE}.{name}")
     return Catalogue(of_suite, added("smc_mujoco.papers", _of_package))
 
 
@@ -407,7 +411,10 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
         allowed={},
         claims={},
     )
-    functions = {key: value for key, value in vars(code).items() if inspect.isfunction(value)}
+    functions = {}
+    for key, value in vars(code).items():
+        if inspect.isfunction(value):
+            functions[key] = value
     allowed = {
         law: _allowed(law, one, functions, paper) for law, one in values.get("allowed", {}).items()
     }

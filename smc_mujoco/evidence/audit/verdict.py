@@ -329,7 +329,10 @@ class Claims(list[Claim]):
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:
     """Return verdict -> how many of the paper's own sentences have it, without zeros."""
-    of_paper = [claim.verdict for claim in claims if claim.whose == PAPER]
+    of_paper = []
+    for claim in claims:
+        if claim.whose == PAPER:
+            of_paper.append(claim.verdict)
     return {kind: of_paper.count(kind) for kind in VERDICTS if kind in of_paper}
 
 
@@ -424,7 +427,9 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
                 beside[name][what] = float(one.value)
             else:
                 numbers[name][what] = fields
-    shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
+    shared = {}
+    for field in dataclasses.fields(Statement):
+        shared[field.name] = getattr(statement, field.name)
     shared["note"] = " ".join(filter(None, (statement.note, sentence)))
     return Claim(
         **shared, verdict=overall, numbers=numbers, beside=beside, verdicts=verdicts, flips=flips

@@ -13,11 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import reading, with_ending, write_json
-from smc_mujoco.common.text import number
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
 
@@ -76,16 +74,6 @@ class Certificate:
 
     def __repr__(self) -> str:
         return printable(f"<Certificate of {self.law} on {self.plant}: {self.sentences[0]}>")
-
-    def _repr_html_(self) -> str:
-        rows = []
-        for row in self.conditions:
-            margin = f"{number(row.margin)} {row.unit}"
-            rows.append((row.theorem, row.name, "yes" if row.holds else "no", margin, row.asks))
-        for theorem, what, value, unit in self.ranges:
-            rows.append((theorem, what, "", f"{number(value)} {unit}", ""))
-        heads = ("theorem", "condition", "holds", "margin", "asks")
-        return html.table(heads, rows, note=". ".join(self.sentences))
 
     @property
     def plant(self) -> str:
@@ -175,7 +163,10 @@ class Certificate:
         told = []
         for part in self.data["parts"]:
             theorem = part["theorem"]
-            rows = [row for row in self.conditions if row.theorem == theorem and not row.holds]
+            rows = []
+            for row in self.conditions:
+                if row.theorem == theorem and not row.holds:
+                    rows.append(row)
             fails = ", ".join(row.name for row in rows)
             if theorem == "level sets":  # the region is proven also where the start lies outside
                 fails = ""

@@ -122,7 +122,9 @@ def margins(part, derived):
     A margin is derived as (its value, the size of the terms that it sums). Its sign is that of the
     value derived, or of the one told where it was checked elsewhere.
     """
-    told = {condition["name"]: condition["margin"] for condition in part["conditions"]}
+    told = {}
+    for condition in part["conditions"]:
+        told[condition["name"]] = condition["margin"]
     same = len(told) == len(part["conditions"]) and list(told) == list(derived)
     need(same, f"the conditions of {part['theorem']}")
     kept = []
@@ -419,7 +421,9 @@ def reaching(doc, part, e, f):
         return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
 
     edges = [X * i / 64 for i in range(65)]
-    strips = [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
+    strips = []
+    for j in range(-8, 8):
+        strips.append(hull(S * j / 8, S * (j + 1) / 8))
     least = min((f.K - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
     need(bool(X > 0) is bool(least > 0), "reaching")
     return {"reaching": (least, f.force), "actuator": f.room}
@@ -456,7 +460,10 @@ def check(doc):
         e = equation(doc["plant"])
         f = feedback(doc["law"], doc["u_max"])
         strong = (f.K is None or f.K > 0) and (f.a is None or f.a > 0)
-        unit = "rad" if "pendulum" in doc["plant"]["name"] else "m"
+        if "pendulum" in doc["plant"]["name"]:
+            unit = "rad"
+        else:
+            unit = "m"
         sound = e.M > 0 and f.c > 0 and strong and doc["disturbance"] >= 0
         need(sound and doc["unit"] == unit, "plant, law, bounds and unit")
         theorems = [part["theorem"] for part in doc["parts"]]

@@ -107,7 +107,10 @@ def _check(scenario: Scenario) -> None:
             f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} "
             f"on one of {', '.join(PLANTS)}"
         )
-    zero = [name for name in POSITIVE_GAINS if law.uniform and law.gains.get(name, 1.0) <= 0.0]
+    zero = []
+    for name in POSITIVE_GAINS:
+        if law.uniform and law.gains.get(name, 1.0) <= 0.0:
+            zero.append(name)
     refused = {
         f"{law.name} with {' and '.join(zero)} not above 0": zero,
         "model='nominal'": scenario.resolved.model != "none",
@@ -197,7 +200,9 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
 
 def _part(theorem: str, margins: dict[str, Any], **data: Any) -> dict:
     """Return a theorem as data, with the margins of its conditions by name."""
-    conditions = [{"name": name, "margin": float(value)} for name, value in margins.items()]
+    conditions = []
+    for name, value in margins.items():
+        conditions.append({"name": name, "margin": float(value)})
     proven = all(holds(one["name"], one["margin"]) for one in conditions)
     return {"theorem": theorem, "holds": proven, "conditions": conditions} | data
 
@@ -262,7 +267,9 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
     if smallest < 1.0:
         margin -= MARGIN_SHARE * max(abs(smallest), 0.1)
     for count in BOX_COUNTS:
-        edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
+        edges = []
+        for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2:
+            edges.append(float(f"{edge:.9g}"))
         boxes = [*map(list, itertools.pairwise(edges)), [edges[-1], None]]
         yield {"name": "restoring", "margin": margin, "boxes": boxes}
 

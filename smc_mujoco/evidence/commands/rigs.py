@@ -131,7 +131,9 @@ def _list(terminal: Terminal) -> None:
         from smc_mujoco.cli import tables
         from smc_mujoco.evidence.rigs.rig import catalogue
 
-    rows = [(name, known.label) for name, known in catalogue().items()]
+    rows = []
+    for name, known in catalogue().items():
+        rows.append((name, known.label))
     terminal.print(tables.catalogue("Rigs", rows))
 
 
@@ -211,7 +213,9 @@ def _repeat(
     if figure:
         from smc_mujoco.evidence.rigs.figure import residual_figure
 
-        predictions = {name: shown.predictions([record])[0] for name, shown in twins.items()}
+        predictions = {}
+        for name, shown in twins.items():
+            predictions[name] = shown.predictions([record])[0]
         predicted = {name: columns for name, (columns, _, _) in predictions.items()}
         _, measured, t = predictions["twin"]
         terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
@@ -219,5 +223,6 @@ def _repeat(
         repeated = run([shown.replay(record, start, duration) for shown in twins.values()])
         traces = [twin.measured(record, start, duration), *repeated]
         since = float(record[twin.columns.time][0]) + (twin.start if start is None else start)
-        title += f", from {since:.6g} s of the record" * bool(since)
+        if since:
+            title += f", from {since:.6g} s of the record"
         terminal.wrote(*filmed(traces, film, ["measured", *twins], title, terminal))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from statistics import median_low
 
 from rich.console import Console
 from rich.padding import Padding
@@ -31,7 +30,10 @@ def certificate(made: Certificate) -> Table:
     columns = ["theorem", "condition", "holds", Column("margin", justify="right"), "asks"]
     table = titled(f"{made.law} on {made.plant}", *columns, pad_edge=False)
     for row in made.conditions:
-        mark = Text("yes", style="blue") if row.holds else Text("no", style="red")
+        if row.holds:
+            mark = Text("yes", style="blue")
+        else:
+            mark = Text("no", style="red")
         margin = f"{number(row.margin)} {row.unit}".strip()
         table.add_row(row.theorem, row.name, mark, margin, row.asks)
     for theorem, what, value, unit in made.ranges:
@@ -133,8 +135,6 @@ def _to_error(value: float, error: float) -> str:
 def identified(result: Identified, names: Sequence[str]) -> list[Table]:
     """Return a table of the quantities found, with standard errors and values before, and one of
     each record's fit.
-
-    Of three records or more, median and worst fit are added; a fall is the worst.
     """
     values = titled(
         result.rig.label,
@@ -153,10 +153,4 @@ def identified(result: Identified, names: Sequence[str]) -> list[Table]:
     fits = titled("fit, % (before)", "record", *heads)
     for name, fit, before in zip(names, result.fits, result.fits_before, strict=True):
         fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
-    parts = result.fits, result.fits_before
-    for word, chosen in (("median", median_low), ("worst", min)) if len(names) > 2 else ():
-        columns = (
-            tuple(chosen(fit[key] for fit in part) for part in parts) for key in result.fits[0]
-        )
-        fits.add_row(word, *(f"{after:.1f} ({before:.1f})" for after, before in columns))
     return [values, fits]

@@ -38,9 +38,10 @@ def report(
     document = evidence.document(done)
     write_json(folder / "evidence.json", document)
     about = done.paper
-    read = [
-        page.text(words) for words in (f"Read: {about.read}.", about.access, about.note) if words
-    ]
+    read = []
+    for words in (f"Read: {about.read}.", about.access, about.note):
+        if words:
+            read.append(page.text(words))
     seal = f"{len(document['runs'])} runs. evidence.json, beside this file, leads from each claim"
     seal += f" to its runs, numbers and verdict. Its seal is {document['seal'][:16]}…;"
     seal += " smc-mujoco claims --check evidence.json checks it."

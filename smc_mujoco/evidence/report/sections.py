@@ -132,11 +132,16 @@ def _outcomes(boards: Iterable[Board]) -> dict[tuple[str, str], dict[str, Outcom
 
 def _leading(outcomes: Sequence[Outcome]) -> Cell:
     """Return the laws that are unbeaten in the most of several conditions."""
-    unbeaten = Counter(law for _, laws in outcomes for law in laws)
+    unbeaten: Counter[str] = Counter()
+    for _, laws in outcomes:
+        unbeaten.update(laws)
     if not unbeaten:
         return Cell("none")
     most = max(unbeaten.values())
-    laws = [law for law, count in unbeaten.items() if count == most]
+    laws = []
+    for law, count in unbeaten.items():
+        if count == most:
+            laws.append(law)
     wins = sum(winner in laws for winner, _ in outcomes)
     return Cell(
         _few(laws),
@@ -237,7 +242,10 @@ def margin_table(plant: str, found: Sequence[Margin]) -> Tabular:
     for margin in found:
         value = f"{'≥ ' if margin.open else ''}{number(margin.value)}"
         theory = margin.theory
-        below = "" if theory is None else f"theory {number(theory)}"
+        if theory is None:
+            below = ""
+        else:
+            below = f"theory {number(theory)}"
         rows.setdefault(margin.law, [margin.law]).append(Cell(value, below))
     return Tabular(headings=["law", *heads], rows=list(rows.values()), title=plant)
 
@@ -309,6 +317,8 @@ def method(work: Work, compared: Compared) -> Section:
         ),
         Tabular(headings=["metric", "unit", "is"], rows=meanings, title="Metrics", left=3),
     ]
-    limits = [text(capital(limit)) for limit in LIMITS]
+    limits = []
+    for limit in LIMITS:
+        limits.append(text(capital(limit)))
     parts = [heading("What it does not tell"), *limits, *tables(shown)]
     return Section("method", "How it was computed", parts)

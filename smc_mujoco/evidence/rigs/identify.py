@@ -206,7 +206,11 @@ def identify(
       ScenarioError: an unknown quantity, not a record, columns in another unit or in the wrong
         order, or records that cannot tell the quantities apart.
     """
-    many: Any = records if isinstance(records, (list, tuple)) else [records]
+    many: Any
+    if isinstance(records, (list, tuple)):
+        many = records
+    else:
+        many = [records]
     if not many:
         raise ScenarioError("there are no records: give at least one")
     twin, data = _twin(rig, many)
@@ -291,8 +295,12 @@ def _starting_states(
         return [replays.state(point, k) for k in range(len(data))]
     repeats = Replays(fitted, [], data, False, whole=True)
     repeats.steps = replays.short_steps
-    of_records = [piece.record for piece in replays.pieces]
-    firsts = [of_records.index(i) for i in range(len(data))]
+    of_records = []
+    for piece in replays.pieces:
+        of_records.append(piece.record)
+    firsts = []
+    for i in range(len(data)):
+        firsts.append(of_records.index(i))
     none = np.zeros(0)
     candidates = [repeats.start, Point(none, point.states[firsts])]
     for candidate in tuple(candidates):
@@ -307,7 +315,10 @@ def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[M
     """Return the rig to identify, and its records as columns."""
     if isinstance(given, str):
         given = find_rig(given)
-    traces = [record for record in many if isinstance(record, Trace)]
+    traces = []
+    for record in many:
+        if isinstance(record, Trace):
+            traces.append(record)
     if isinstance(given, Plant):
         given = _of_plant(given, traces[0].scenario if traces else None)
     if not isinstance(given, Rig):

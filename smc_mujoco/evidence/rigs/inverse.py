@@ -97,9 +97,10 @@ def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     state = mujoco.MjData(model)
     joints = joint_ids(model)
     dofs = dof_ids(model)
-    x, v, a = (
-        np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3)
-    )
+    motion = []
+    for order in range(3):
+        motion.append(np.column_stack([filtered.cubic(name, order) for name in columns.x]))
+    x, v, a = motion
     forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):

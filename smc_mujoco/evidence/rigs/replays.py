@@ -166,7 +166,9 @@ class Replays:
         # integrator and step of replays; none for the scenario's own
         self.steps: dict[str, Any] = {}
         self.corrections: list[Record] | None = None  # of each piece; None for none
-        self.pieces = [piece for i in range(len(data)) for piece in self._pieces(i)]
+        self.pieces: list[Piece] = []
+        for i in range(len(data)):
+            self.pieces += self._pieces(i)
 
     @property
     def start(self) -> Point:
@@ -355,7 +357,9 @@ class Replays:
             count = max(1, int((last - first) * period / shortest + 0.01))
         ends = np.linspace(first, last, count + 1).round().astype(int)
         x = [data[name] for name in twin.columns.x]
-        rates = [records.rate(column, period) for column in x]
+        rates = []
+        for column in x:
+            rates.append(records.rate(column, period))
         varied = np.array([column.std() or 1.0 for column in (*x, *rates)])
         names = [*twin.columns.x]
         skipped = 0
@@ -369,7 +373,9 @@ class Replays:
             if count > 1:
                 duration = float(period * (last - first))
             part = twin.part(self.data[i], float(period * first), duration, self.closed)
-            measured = {name: data[name][first + skipped : last + 1] for name in names}
+            measured = {}
+            for name in names:
+                measured[name] = data[name][first + skipped : last + 1]
             scales = STATE_SCALE * varied[self.free]
             pieces.append(Piece(i, part, skipped, measured, spread, scales))
         return pieces

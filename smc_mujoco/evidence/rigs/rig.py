@@ -355,7 +355,10 @@ class Rig:
 
         It repeats a trace by its law, from its start.
         """
-        traces = [record for record in many if isinstance(record, Trace)]
+        traces = []
+        for record in many:
+            if isinstance(record, Trace):
+                traces.append(record)
         if not traces:
             return self, [record for record in many if not isinstance(record, Trace)]
         law = traces[0].scenario.law
@@ -417,7 +420,9 @@ class Rig:
             if self.columns.u in fit:
                 fit["u"] = fit.pop(self.columns.u)
             if self.controller is not None:
-                joints = {name: predicted[name] for name in self.columns.x}
+                joints = {}
+                for name in self.columns.x:
+                    joints[name] = predicted[name]
                 if fall := fallen(joints, measured, t):
                     fit = dict.fromkeys(fit, fall)
             fits.append(fit)
@@ -479,7 +484,10 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
         y = measured[name]
         with np.errstate(all="ignore"):
             share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
-        percent[name] = 100.0 * (1.0 - share) if np.isfinite(share) else FAILED_FIT
+        if np.isfinite(share):
+            percent[name] = 100.0 * (1.0 - share)
+        else:
+            percent[name] = FAILED_FIT
     return percent
 
 

@@ -164,11 +164,15 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
 
     Each piece chooses the best move of its own states.
     """
-    groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
+    groups = []
+    for damping in DAMPINGS:
+        groups.append(_variants(replays, slopes, _moved(replays, slopes, damping)))
     costs = replays.costs(list(itertools.chain(*groups)))
     reached = []
     for group, of_group in zip(groups, np.split(costs, len(groups)), strict=True):
-        states = [group[best].states[k] for k, best in enumerate(of_group.argmin(axis=0))]
+        states = []
+        for k, best in enumerate(of_group.argmin(axis=0)):
+            states.append(group[best].states[k])
         total = float(of_group.min(axis=0).sum())
         reached.append((Point(group[0].values, np.array(states)), total))
     return min(reached, key=lambda pair: pair[1])

@@ -178,7 +178,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         ("emps", ["weight"], "unknown quantity of emps 'weight': "),
         ("emps", ["mass", "mass"], "quantities have mass 2 times"),
         ("emps", [], "emps has no quantities to find"),
-        ("ip02", None, "ip02 has no quantities to find"),
+        ("srv02", None, "srv02 has no quantities to find"),
         (3, None, "cannot identify 3: give a rig"),
     ],
 )

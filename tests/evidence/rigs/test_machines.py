@@ -18,7 +18,6 @@ pytestmark = pytest.mark.quick
 MACHINES = (
     *(
         "emps",
-        "ip02",
         "qube_servo",
         "qube_servo_2",
         "qube_servo_3",

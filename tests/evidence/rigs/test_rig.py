@@ -86,7 +86,6 @@ def test_a_record_too_short_to_read_the_brushes_is_repeated_with_an_even_torque(
         ("qube_servo_2", 5e-3, 0.042),
         ("qube_servo_3", 5.63e-3, 0.0422),
         ("srv02", 0.128, 0.538),
-        ("ip02", 1.72, 4.48),
     ],
 )
 def test_a_quanser_motor_pushes_and_brakes_as_published(name, stall, brake):

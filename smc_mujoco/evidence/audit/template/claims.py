@@ -34,6 +34,8 @@ def second_order(runs):
     traces = runs.traces(
         runs.scenario(plant, law, condition, control_period=period) for period in periods
     )
-    largest = [float(np.abs(trace.s[-int(END_SHARE * len(trace.s)) :]).max()) for trace in traces]
+    largest = []
+    for trace in traces:
+        largest.append(float(np.abs(trace.s[-int(END_SHARE * len(trace.s)) :]).max()))
     exponent = np.polyfit(np.log(periods), np.log(largest), 1)[0]
     return {"exponent": exponent, "largest |s|": dict(zip(map(str, periods), largest, strict=True))}

@@ -200,7 +200,9 @@ def with_a_model(runs):
     """Exponents of the largest |s_x| and |x| of the last half in the period, 3 ms to 0.1 s."""
     traces = at_periods(runs, runs.conditions[0])
     s = [largest(trace.s) for trace in traces.values()]
-    x = [largest(trace.x) for trace in traces.values()]
+    x = []
+    for trace in traces.values():
+        x.append(largest(trace.x))
     return {
         "exponent of the largest |s_x| in h": exponent([*traces], s),
         "exponent of the largest |x| in h": exponent([*traces], x),
@@ -231,7 +233,9 @@ def observed(runs):
     period.
     """
     traces = at_periods(runs, runs.conditions[0], -1 if runs.quick else None)
-    errors = {h: largest(trace.s) for h, trace in traces.items()}
+    errors = {}
+    for h, trace in traces.items():
+        errors[h] = largest(trace.s)
     return {
         "exponent of the largest |e1| in h": exponent([*errors], errors.values()),
         "largest |e1|, m": {f"{h:g} s": error for h, error in errors.items()},

@@ -106,7 +106,9 @@ def predefined(runs):
     law = runs.law(runs.plant, *runs.laws)
     cells = {}
     for tc in runs.few(runs.values["times"]):
-        gains = {gain: least_bound(law) / tc * law.gains[gain] for gain in ("k1", "k2")}
+        gains = {}
+        for gain in ("k1", "k2"):
+            gains[gain] = least_bound(law) / tc * law.gains[gain]
         cells[tc] = runs.plant, runs.law(runs.plant, *runs.laws, **gains), runs.values["start"]
     shares = {f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()}
     return {"time from far / time asked for": shares}
@@ -117,7 +119,9 @@ def disturbed(runs):
     bound.
     """
     law = runs.law(runs.plant, *runs.laws, k=runs.values["k"])
-    cells = {f"from {start:g} m/s": (runs.plant, law, start) for start in runs.values["starts"]}
+    cells = {}
+    for start in runs.values["starts"]:
+        cells[f"from {start:g} m/s"] = (runs.plant, law, start)
     measured = times(runs, cells, SWITCHING_BAND)
     return {
         "time / least bound": {name: time / least_bound(law) for name, time in measured.items()}

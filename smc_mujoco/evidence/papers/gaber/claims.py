@@ -149,7 +149,10 @@ def largest_delays(runs, plants, laws, within=TOLERATED_ERROR):
     `margins`, down to one control period. Its runs are the audit's own, so that mutants of laws are
     searched as well.
     """
-    apart, integrator = (QUICK_RESOLUTION, "implicitfast") if runs.quick else (1, "RK4")
+    if runs.quick:
+        apart, integrator = (QUICK_RESOLUTION, "implicitfast")
+    else:
+        apart, integrator = (1, "RK4")
     levels = [0]
     for delay in DELAYS:
         periods = round(delay / CONTROL_PERIOD)
@@ -212,10 +215,12 @@ def smallest_stable(runs):
                 (i for i, stable in enumerate([False, *inner[plant]]) if not stable), default=0
             )
             low[plant], high[plant] = lams[last], lams[last + 1]
-    return {
-        plant: MIN_LAMBDA if smallest else high[plant] if largest else math.inf
-        for plant, (smallest, largest) in ends.items()
-    }
+    found = {}
+    for plant, (smallest, largest) in ends.items():
+        found[plant] = MIN_LAMBDA if smallest else high[plant]
+        if not smallest and not largest:
+            found[plant] = math.inf
+    return found
 
 
 def dying(runs, lams):
@@ -225,7 +230,10 @@ def dying(runs, lams):
         for lam in some:
             grid.append(long_run(runs, plant, lam, SMALL_START_SHARE))
     traces = iter(runs.traces(grid))
-    return {plant: [dies_out(next(traces)) for _ in some] for plant, some in lams.items()}
+    dying = {}
+    for plant, some in lams.items():
+        dying[plant] = [dies_out(next(traces)) for _ in some]
+    return dying
 
 
 def dies_out(trace):
@@ -264,13 +272,13 @@ def observer_free(runs):
         [score["settling_time"] for score in runs.scores(grid)], (len(runs.plants), -1)
     ).tolist()
     what = "|settling time / with true xdot - 1|"
-    return [  # NaN if neither settles: noise may keep both out of the band
-        runs.check(
-            "settling time", f"{plant}, {name}: {what}", abs(ratio(time, true) - 1.0), sentence=name
-        )
-        for plant, (true, *filtered) in zip(runs.plants, times, strict=True)
-        for name, time in zip(FILTERS, filtered, strict=True)
-    ]
+    checks = []  # NaN if neither settles: noise may keep both out of the band
+    for plant, (true, *filtered) in zip(runs.plants, times, strict=True):
+        for name, time in zip(FILTERS, filtered, strict=True):
+            apart = abs(ratio(time, true) - 1.0)
+            words = f"{plant}, {name}: {what}"
+            checks.append(runs.check("settling time", words, apart, sentence=name))
+    return checks
 
 
 def reduces_chattering(runs):
@@ -366,7 +374,9 @@ def never_chatters(runs):
             runs.scenario(plant, OURS, control_period=period * 1e-3, input_delay=delay * 1e-3)
             for period, delay in cells
         )
-        rates = [ratio(score["tv_rate"], command_bound(runs, plant)) for score in scores]
+        rates = []
+        for score in scores:
+            rates.append(ratio(score["tv_rate"], command_bound(runs, plant)))
         rate[plant], at[plant] = max(zip(rates, cells, strict=True))
         lam, k1 = (runs.law(plant, OURS).gains[gain] for gain in ("lam", "k1"))
         limit[plant] = 1e3 * linear_theory.critical_delay(
@@ -417,14 +427,19 @@ def nanoseconds(laws: Mapping[str, Component]) -> dict[str, float]:
     times = {}
     for name, law in laws.items():
         timed = law_time(Scenario(plant="inverted_pendulum", law=law))
-        times[name] = 1e9 * timed.median if timed else math.nan
+        if timed:
+            times[name] = 1e9 * timed.median
+        else:
+            times[name] = math.nan
     return times
 
 
 def simple(runs):
     """Claim 14: low complexity."""
     spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL_LAWS)})
-    others = {f"{OURS} over {name}": ratio(spent[OURS], spent[name]) for name in GENERAL_LAWS}
+    others = {}
+    for name in GENERAL_LAWS:
+        others[f"{OURS} over {name}"] = ratio(spent[OURS], spent[name])
     return {
         "time per sample / that of the fastest other law": max(others.values()),
         "time per sample, a ratio": others,
@@ -449,7 +464,9 @@ def higher_degree(runs):
         tried = []
         for one in velocities:
             tried.append(runs.scenario(name, OURS, law=third, actuator=Lag(LAG), velocity=one))
-        bounds = [scores["ultimate_bound"] for scores in runs.scores(tried)]
+        bounds = []
+        for scores in runs.scores(tried):
+            bounds.append(scores["ultimate_bound"])
         grid[name] = tried[bounds.index(min(bounds))]
     settled = {}
     for (name, run), score in zip(grid.items(), runs.scores(grid.values()), strict=True):
@@ -823,7 +840,10 @@ def cheap_tanh(runs):
             [nominal, *(replace(nominal, law=law) for law in cheap(runs, nominal.law))]
         )
         for name, trace in zip(CHEAP_TANH_GAINS, traces, strict=True):
-            time = math.inf if trace.failure else settling_time(trace)
+            if trace.failure:
+                time = math.inf
+            else:
+                time = settling_time(trace)
             apart = deviation(trace, reference)
             both = [
                 runs.check(
@@ -978,9 +998,9 @@ def table_one(runs):
     steps = {law: worst_ratio(runs, law, "max_step", law, "max_u") for law in LAWS}
     rates = {law: worst_ratio(runs, law, "tv_rate", CLASSICAL, "tv_rate") for law in LAWS}
     longest = largest_delays(runs, runs.plants, LAWS)
-    longer = {
-        law: min(longest[p, law] - longest[p, CLASSICAL] for p in runs.plants) for law in LAWS
-    }
+    longer = {}
+    for law in LAWS:
+        longer[law] = min(longest[p, law] - longest[p, CLASSICAL] for p in runs.plants)
     properties = {  # property -> its unit, and its number for each law
         "no chattering": ("TV rate over classical's", rates),
         "observer-free": ("estimated signals", {law: estimated(runs, law) for law in LAWS}),
@@ -1062,6 +1082,8 @@ def commanded(law, x, v=None, **signals):
         "dt": CONTROL_PERIOD,
     }
     for k in range(len(x)):
-        now = {name: float(values[k]) for name, values in seen.items()}
+        now = {}
+        for name, values in seen.items():
+            now[name] = float(values[k])
         u[k] = function(Measurement(t=k * CONTROL_PERIOD, **rest | now), gains, memory)[0]
     return u

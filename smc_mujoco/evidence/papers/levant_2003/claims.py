@@ -19,7 +19,9 @@ def precision(runs):
         fields = {"control_period": h, "physics_step": h, "duration": duration}
         for x0 in runs.few(values["starts"]):
             scenarios.append(runs.only(x0=x0, **fields))
-    errors = [late(trace.x) for trace in runs.traces(scenarios)]
+    errors = []
+    for trace in runs.traces(scenarios):
+        errors.append(late(trace.x))
     return {"exponent of the largest |e| in the period": exponent(values["periods"], errors)}
 
 
@@ -95,7 +97,9 @@ def chattering(runs):
     """Largest |x| of the last tenth under the nested law over that under the classical law, behind
     the same lag.
     """
-    ends = {cell[:2]: end(trace) for cell, trace in runs.traced(runs.grid()).items()}
+    ends = {}
+    for cell, trace in runs.traced(runs.grid()).items():
+        ends[cell[:2]] = end(trace)
     nested, classical = runs.laws
     shares = runs.by_plant(lambda plant: ends[plant, nested] / ends[plant, classical])
     return {"largest |x|, nested / classical": shares}

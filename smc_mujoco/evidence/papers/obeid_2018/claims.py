@@ -64,7 +64,9 @@ def predefined(runs):
     laws = {}
     for eps in runs.values["widths"]:
         laws[f"eps = {eps:g}"] = runs.law(runs.plant, *runs.laws, eps=eps)
-    grid = {name: runs.only(law=law, **sampled(runs)) for name, law in laws.items()}
+    grid = {}
+    for name, law in laws.items():
+        grid[name] = runs.only(law=law, **sampled(runs))
     shares = runs.measured(grid, lambda trace: largest(trace.s) / trace.scenario.law.gains["eps"])
     return {"largest |s| of the last half / eps": shares}
 

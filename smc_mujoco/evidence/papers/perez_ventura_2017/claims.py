@@ -104,7 +104,9 @@ def ratios(runs, which, cases):
     for laws, lag, changes in cases.values():
         for law in laws:
             grid.append(behind(runs, law, lag, **changes))
-    measured = [size_and_power(trace) for trace in runs.traces(grid)]
+    measured = []
+    for trace in runs.traces(grid):
+        measured.append(size_and_power(trace))
     sizes, powers = np.divide(measured[::2], measured[1::2]).T
     by_measure = {"amplitude": sizes, "power": powers}
     return {
@@ -161,7 +163,9 @@ def crossover(runs):
     for lag in lags:
         for law in (twisting, sign):
             scenarios.append(behind(runs, law, lag, duration=2.0 + 150.0 * lag))
-    amplitudes = [cycle(trace)[0] for trace in runs.traces(scenarios)]
+    amplitudes = []
+    for trace in runs.traces(scenarios):
+        amplitudes.append(cycle(trace)[0])
     names = ("at the crossover", "at half of it", "at twice of it")
     ratios = np.divide(amplitudes[::2], amplitudes[1::2])
     found = {"ATC at the crossover, s": equal}
@@ -179,7 +183,9 @@ def redesigned(runs):
     laws = []
     for factor in (1.0, 0.5, 2.0):
         laws.append(runs.law(runs.plant, "super_twisting", k1=factor * best, k2=k2))
-    scenarios = [behind(runs, law, runs.values["lag"]) for law in laws]
+    scenarios = []
+    for law in laws:
+        scenarios.append(behind(runs, law, runs.values["lag"]))
     as_designed, half, twice = (cycle(trace)[0] for trace in runs.traces(scenarios))
     return {
         "amplitude with half of k1 / least": half / as_designed,

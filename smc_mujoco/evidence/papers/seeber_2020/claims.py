@@ -27,7 +27,9 @@ def winds_up(runs):
     where s does not reach 0 at all.
     """
     starts = runs.few(runs.values["starts"], slice(1, 2))
-    grid = {f"from {start:g} m/s": runs.only(v0=start) for start in starts}
+    grid = {}
+    for start in starts:
+        grid[f"from {start:g} m/s"] = runs.only(v0=start)
     gains = runs.law(runs.plant, *runs.laws).gains
     bound = runs.only().u_max
     most = min(bound**2 / (2.0 * gains["k2"]), (bound / gains["k1"]) ** 2)
@@ -42,7 +44,9 @@ def reaches(runs):
     starts.
     """
     cells = runs.few(list(itertools.product(runs.plants, runs.values["starts"])))
-    grid = {f"{plant}, from {start:g} m/s": runs.on(plant).only(v0=start) for plant, start in cells}
+    grid = {}
+    for plant, start in cells:
+        grid[f"{plant}, from {start:g} m/s"] = runs.on(plant).only(v0=start)
     ends = runs.measured(grid, lambda trace: float(np.abs(trace.v[-(len(trace.t) // 4) :]).max()))
     return {"largest |s| of the last quarter, m/s": ends}
 

@@ -83,7 +83,9 @@ def last(trace):
 def attained(runs):
     """|x| over L T^2 a period after a triangle of mean 0 over a period goes on with its slope."""
     cells = itertools.product(runs.laws, runs.conditions)
-    grid = {f"{law}, {condition}": flipped(runs, law, condition, 1.0) for law, condition in cells}
+    grid = {}
+    for law, condition in cells:
+        grid[f"{law}, {condition}"] = flipped(runs, law, condition, 1.0)
     return {"largest |x| after the slope flips / (L T^2)": runs.measured(grid, last)}
 
 
@@ -128,7 +130,9 @@ def no_windup(runs):
         )
         for law in runs.laws
     )
-    beyond = [max(-float(trace.v[:-1].min()), 0.0) for trace in (ours, plain)]
+    beyond = []
+    for trace in (ours, plain):
+        beyond.append(max(-float(trace.v[:-1].min()), 0.0))
     return {
         "overshoot / that of the law without conditioning": beyond[0] / beyond[1]
         if beyond[1]

@@ -39,7 +39,9 @@ def layer(runs):
 
 def established(runs):
     """Time from which |s| stays within 5 mu in 30 s, from s0 = 0.1 to 100 m/s, d = 5 sin t."""
-    grid = {f"from {start:g} m/s": runs.only(v0=start) for start in runs.values["starts"]}
+    grid = {}
+    for start in runs.values["starts"]:
+        grid[f"from {start:g} m/s"] = runs.only(v0=start)
     band = BAND_IN_LAYERS * runs.law(runs.plant, *runs.laws).gains["mu"]
     return {
         "time from which |s| <= 5 mu, s": runs.measured(
@@ -65,7 +67,9 @@ def not_overestimated(runs):
     """Mean gain K of the last third of 30 s without d, and under D sin t with D = 0.5 and 20 N."""
 
     def mean(trace):
-        return float(np.mean(third(trace.s))) if np.isfinite(trace.v).all() else np.nan
+        if np.isfinite(trace.v).all():
+            return float(np.mean(third(trace.s)))
+        return np.nan
 
     traces = runs.traces(runs.grid().values())
     nothing, small, large = map(mean, traces)

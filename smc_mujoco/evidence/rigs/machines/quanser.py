@@ -1,6 +1,6 @@
 """Quanser's rigs:
 
-QUBE-Servo 2, IP02 cart and SRV02 rotary pendulum by their published parameters; QUBE-Servo 3.
+QUBE-Servo 2 and SRV02 rotary pendulum by their published parameters; QUBE-Servo 3.
 
 The QUBE-Servo 3 is a twin: `python benchmarks/qube_servo_3.py` finds its numbers in two public
 records of one machine. The dead bands of the amplifiers are left out.
@@ -22,8 +22,6 @@ THESIS = (
     "QUBE-Servo 3, 2026 (MIT)"
 )
 STEP = f"identified here from a step of 1 V and ten free falls of {THESIS}"
-IP02 = "Quanser, IP02 linear servo, user manual (no licence stated)"
-LONG_SOURCE = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN (no licence stated)"
 SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals (no licence stated)"
 
 
@@ -45,7 +43,10 @@ def motor(q):
 
 def rotary(q):
     """Return the fields of a scenario of a rotary pendulum."""
-    cabled = {name: getattr(q, key) for name, key in CABLED.items() if hasattr(q, key)}
+    cabled = {}
+    for name, key in CABLED.items():
+        if hasattr(q, key):
+            cabled[name] = getattr(q, key)
     furuta = plant(
         "furuta",
         J=q.arm_inertia,
@@ -69,25 +70,6 @@ def rotary(q):
             level, level, 1.0, q.cable_stiffness, BRISTLE_DAMPING, driven=True
         )
     return fields
-
-
-def linear(q):
-    """Return the fields of a scenario of a cart with a pole."""
-    cart = plant(
-        "cart_pole",
-        M=q.cart_mass,
-        m=q.pole_mass,
-        l=q.pole_half_length,
-        b=q.cart_damping,
-        bq=q.pole_damping,
-    )
-    return {
-        "plant": cart,
-        "actuator": motor(q),
-        "sensor": Encoder(counts=round(q.counts)),
-        "control_period": 1e-3,
-        "x0": (0.0, 0.1),
-    }
 
 
 BRISTLE_DAMPING = (
@@ -251,34 +233,4 @@ SRV02_PENDULUM = Rig(
         counts=4096.0,
     ),
     machine=rotary,
-)
-IP02_CART = Rig(
-    name="ip02",
-    label="IP02 cart with a pendulum, by its published parameters",
-    quantities=quantities(
-        IP02,
-        resistance=2.6,
-        inductance=0.18e-3,
-        torque_constant=7.67e-3,
-        rotor_inertia=3.9e-7,
-        gear=3.71 / 6.35e-3,
-        efficiency=1.0,
-        voltage=10.0,
-    )
-    | {
-        "cart_mass": Quantity(0.57, "kg", f"{IP02}; 0.94 with its weight", 0.01),
-        "cart_damping": Quantity(5.4, "N s/m", f"{IP02}; 4.3 without its weight", 0.0),
-        "pole_mass": Quantity(0.23, "kg", LONG_SOURCE, 1e-3),
-        "pole_half_length": Quantity(
-            0.3302, "m", f"{LONG_SOURCE}, pivot to centre of gravity", 1e-3
-        ),
-        "pole_damping": Quantity(2.4e-3, "N m s/rad", LONG_SOURCE, 0.0),
-        "counts": Quantity(4096.0, "1/turn", f"{IP02}, of the pendulum", 2.0),
-    },
-    machine=linear,
-    about=(
-        "The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is "
-        "0.6413 m from the hinge. The cart's position has the pendulum's 4096 counts, for a metre "
-        "in place of a turn. The counts of the machine are 22.75 um."
-    ),
 )
