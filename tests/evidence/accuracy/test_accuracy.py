@@ -13,6 +13,11 @@ PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
 SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}
 
 
+def promised(found):
+    """Whether an order is within 0.2 of theory's."""
+    return abs(found.order - found.theory) <= 0.2
+
+
 def double_integrator():
     return smc.plant(
         "duffing",
@@ -61,8 +66,8 @@ def test_dry_friction_orders_the_laws_as_textbooks_do():
         "observer_free",
     ]
     by_law = {row.law: row.e for row in table}
-    assert by_law["classical"].as_promised
-    assert by_law["observer_free"].as_promised
+    assert promised(by_law["classical"])
+    assert promised(by_law["observer_free"])
     assert by_law["super_twisting"].largest[-1] < 1e-3 * by_law["twisting"].largest[-1]
 
 
@@ -74,8 +79,8 @@ def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_t
             names.append(name)
     table = defaults(names)
     for row in table:
-        assert row.s.as_promised or "which is rounding" in row.s.why, str(table)
-    assert sum(row.s.as_promised for row in table) > len(names) / 2
+        assert promised(row.s) or "which is rounding" in row.s.why, str(table)
+    assert sum(promised(row.s) for row in table) > len(names) / 2
 
 
 @pytest.mark.slow
@@ -97,7 +102,7 @@ def test_gains_that_cannot_hold_the_disturbance_are_said_to_limit_the_error():
         [smc.law("super_twisting", k1=3.0, k2=0.5), smc.law("twisting")], conditions=load
     )
     weak = next(row.s for row in table if row.law == "super_twisting")
-    assert not weak.as_promised
+    assert not promised(weak)
     assert "these gains, not sampling, limit it" in weak.why
     assert table[0].law == "twisting"
 

@@ -29,7 +29,6 @@ def test_a_power_law_has_its_exponent_whatever_the_factors_of_its_starts():
     assert (found.order, found.low, found.high) == pytest.approx((2.0, 2.0, 2.0))
     assert found.used == PERIODS
     assert found.why == ""
-    assert found.as_promised
     assert found.largest == pytest.approx(tuple(3.0 * H**2))
 
 
