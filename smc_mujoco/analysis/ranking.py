@@ -51,9 +51,7 @@ lead would have been seen.
 A law with a run that failed, has no value, or has not arrived (`metrics.catalogue.arrived`) wins
 nothing. In every order the laws with fewer runs without a value come first.
 
-A law is among the best if no other is better. One exception: where another law's median is
-relevantly lower, and two laws have too few units for any verdict, the law is undecided, and not
-among the best.
+A law is among the best if no other is better, all its runs have arrived and have a value.
 """
 
 import copy
@@ -171,7 +169,10 @@ class Comparison:
         self.away = np.isinf(self.cells)  # runs that failed, have no value or have not arrived
         if arrived:
             self.away |= self._cube(arrived, float) == 0.0
-        self.below = np.zeros((count, blocks), bool)  # whether a law is below the floor
+        q = np.log(np.maximum(self.floors, np.finfo(float).tiny))
+        # whether a law is below the floor: that it is at most, as the median of an even number is
+        # above it if only half of the values are at it
+        self.below = (middle(high) <= q) & (self.floors > 0.0) & (not shares)
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
         # d of the first law over the second by unit, then NaN; and without halves and trends
         self.leads = np.full((blocks, count, count, seeds), math.nan)
@@ -179,11 +180,6 @@ class Comparison:
         for k in range(blocks):
             for a in range(count):
                 self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
-                if self.floors[k] > 0.0 and not shares:
-                    own = linked(gains[a, k, ran[k]])
-                    of_units = _by_unit(high[a, k, ran[k]], own, seeds)
-                    under = of_units[~np.isnan(of_units)] <= math.log(self.floors[k])
-                    self.below[a, k] = 2 * under.sum() > under.size
                 for b in range(a):
                     first = first_of_kind(results[[a, b], k][:, None], ran[[k]])[0]
                     units = linked(gains[a, k, first], gains[b, k, first])
@@ -292,22 +288,10 @@ class Comparison:
         return level | np.eye(len(self.laws), dtype=bool)
 
     @property
-    def undecided(self) -> np.ndarray:
-        """Whether only a lack of samples keeps a law from being beaten, (laws, blocks)."""
-        centre = self.centres.T
-        first, second = centre[:, :, None], centre[:, None, :]
-        if self.shares:
-            lower = second - first > self.relevant
-        else:
-            lower = exceeds(second, first, self.floors[:, None, None], self.relevant)
-        few = 2.0**-self.samples > self.limits.pair
-        return np.any(lower & self._eligible & few, axis=1).T & ~self.beaten
-
-    @property
     def best(self) -> list[tuple[str, ...]]:
-        """The laws of each block that are not beaten, with enough samples to tell."""
+        """The laws of each block that are not beaten."""
         names = np.array(self.laws)
-        return [tuple(names[block].tolist()) for block in ~(self.beaten | self.undecided).T]
+        return [tuple(names[block].tolist()) for block in ~self.beaten.T]
 
     def effect(self, block: int, law: str, rival: str) -> Effect:
         """Return how a law compares with a rival in a block, at a winner's level."""
@@ -533,7 +517,7 @@ def ranks(comparison: Comparison) -> list[Rank]:
     behind |= (lacking[:, None] == lacking) & larger
     by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
     means = by_block.mean(axis=1).tolist()
-    doubted = np.any(comparison.beaten | comparison.undecided, axis=1).tolist()
+    doubted = np.any(comparison.beaten, axis=1).tolist()
     order = []
     for n, mean in zip(lacking.sum(axis=1), means, strict=True):
         order.append((int(n), round(mean, 9)))

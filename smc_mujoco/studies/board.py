@@ -81,10 +81,7 @@ class Block:
     # medians over the seeds; for "settles" the share of runs that do not settle
     medians: Mapping[str, float]
     lacking: Mapping[str, int]  # number of runs that failed or have no value
-    # laws that no other is better than, with a value in every run and enough samples to tell
-    best: tuple[str, ...]
-    # laws that no other is better than, but only because there are too few samples
-    undecided: tuple[str, ...]
+    best: tuple[str, ...]  # laws that no other is better than, of which every run has arrived
     worse: tuple[str, ...]  # laws that another is better than
     below: tuple[str, ...]  # laws below the floor, which are not ranked among themselves
     floor: str  # in words, such as "the sensor's 0.01 rad"; "" where it is not known

@@ -32,7 +32,7 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
-from smc_mujoco.studies.study import FULL, QUICK, Traces
+from smc_mujoco.studies.study import FULL, QUICK
 from smc_mujoco.studies.table import Table
 
 if TYPE_CHECKING:
@@ -221,7 +221,6 @@ def compare(
     quick: Truth = False,
     defaults: Truth = False,
     relevant: Relevant = RELEVANT,
-    traces: Traces = "none",
     threads: int | None = None,
     progress: bool = True,
     seed: DrawSeed = 0,
@@ -246,7 +245,6 @@ def compare(
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
       worst: whether to search the worst case of each law on each plant too; or the class in which
         to search it.
-      traces: as in `study`. Default: none.
       out: folder for gains and runs.
       metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
@@ -288,7 +286,7 @@ def compare(
         tune and gains == "tuned",
         gains,
     )
-    table = trial.run(candidates, seeds, traces=traces)
+    table = trial.run(candidates, seeds)
     found = {}
     if worst:
         found = _worst_cases(trial, candidates, within, duration)

@@ -13,7 +13,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -305,12 +305,8 @@ class Trial(NamedTuple):
             return _default(law, f"{NOT_TUNED}{error}")
         return candidate_of(default, tuned)
 
-    def run(
-        self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any
-    ) -> Table:
-        """Run the laws of each plant in each condition from that many seeds, with the options of
-        `study`.
-        """
+    def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int) -> Table:
+        """Run the laws of each plant in each condition from that many seeds."""
         runs = all_combinations(
             self.plants,
             lambda plant: candidates[plant.name],
@@ -319,8 +315,7 @@ class Trial(NamedTuple):
             self.duration,
             self.starts,
         )
-        options |= {"half_steps": True, "threads": self.threads, "progress": self.progress}
-        return study(runs, self.folder, **options)
+        return study(runs, self.folder, True, self.threads, self.progress, half_steps=True)
 
     def unseen(
         self, candidates: Mapping[str, Sequence[Candidate]], count: int

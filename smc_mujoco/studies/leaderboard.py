@@ -228,8 +228,7 @@ def _block(
     several = sets[sets > 1].tolist()
     changes = {law: comparison.step_change(at, law) for law in comparison.laws}
     best = [comparison.laws.index(law) for law in comparison.best[at]]
-    undecided = comparison.undecided[:, at]
-    level = comparison.level[at][np.ix_(best, best)].all() and not undecided.any()
+    level = comparison.level[at][np.ix_(best, best)].all()
     runs = int(comparison.seeds[at])
     order = sorted(
         range(len(laws)),
@@ -241,7 +240,6 @@ def _block(
         medians=dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True)),
         lacking=dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True)),
         best=comparison.best[at],
-        undecided=tuple(laws[undecided].tolist()),
         below=tuple(laws[comparison.below[:, at]].tolist()),
         floor=floor,
         away=tuple(laws[comparison.away[:, at].any(axis=1)].tolist()),

@@ -16,7 +16,6 @@ import hashlib
 import os
 import re
 import sys
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,15 +24,15 @@ import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved, repeats_all
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.constraints import FilePath, OneOf, constrained
+from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, printable, shown
-from smc_mujoco.common.files import reading, slug, to_json
+from smc_mujoco.common.files import reading, to_json
 from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import COMPARED
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, PLANTS
-from smc_mujoco.simulation.run import cores, stream
+from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import batches, run_key
@@ -47,12 +46,10 @@ if TYPE_CHECKING:
 # One condition of each kind. IDEAL: the paper's. REAL: friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
-Traces = Annotated[str, OneOf(names=("none", "worst", "all"))]  # choices of traces to save
 # one seed in so many is repeated at half the step, where no constraint acts under RK4; chosen
 REPEATED_SEEDS = 4
 ROWS_PER_GROUP = 4096  # rows in memory at once while the table is written; chosen
 MAX_OPEN_PARTS = 64  # parts in memory at once while the table is written; chosen
-MAX_TEMPORARY_AGE = 3600.0  # s: older temporary files belong to a killed study; chosen
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 
 
@@ -71,7 +68,6 @@ class Store:
         """Make the folder and list the runs in it. Without `resume`, remove them and the table."""
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
-            self._tidy()
             parts = [path for path in sorted(self.parts.iterdir()) if PART.fullmatch(path.name)]
             for path in () if resume else (*parts, self.results):
                 path.unlink(missing_ok=True)
@@ -84,13 +80,6 @@ class Store:
             if (part := self._read(path)) is not None:
                 for i, name in enumerate(part["hash"].to_pylist()):
                     self.where.setdefault(name, (path, i))
-
-    def _tidy(self) -> None:
-        """Remove the temporary files of studies that were killed long ago."""
-        for path in [*self.parts.glob(".*.parquet"), *self.parts.parent.glob(".results.*.parquet")]:
-            with contextlib.suppress(FileNotFoundError):  # another study has just finished it
-                if time.time() - path.stat().st_mtime > MAX_TEMPORARY_AGE:
-                    path.unlink()
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write finished runs as a part."""
@@ -189,7 +178,6 @@ def study(
     resume: bool = True,
     threads: int | None = None,
     progress: bool = False,
-    traces: Traces = "none",
     half_steps: bool = False,
 ) -> Table:
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return
@@ -205,9 +193,6 @@ def study(
       resume: whether to keep the finished runs in the folder; False removes them first.
       threads: number of simulations at a time; None for one per available core.
       progress: whether to show a progress bar.
-      traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and
-        condition: of a failed run, else of one that never settles, else of the one with the largest
-        ultimate bound.
       half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no
         winner that the step decides: all of them where constraints may act or the integrator is not
         RK4, elsewhere one seed in four.
@@ -218,7 +203,6 @@ def study(
     """
     threads = cores(threads)
     store = Store(Path(out))
-    folder = Path(out) / "traces"
     plants: run_key.Hashes = {}
     by_key = _by_key(_checked(scenarios), store, resume, plants)
     if half_steps:
@@ -229,14 +213,12 @@ def study(
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
         print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
-    _compute(missing, store, plants, threads, progress, folder if traces == "all" else None)
+    _compute(missing, store, plants, threads, progress)
     changes = {name: run_key.source(s) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():
         changes[name] = changes[name] | {"half_step": scores}
     store.collect(list(by_key), changes)
-    table = dataclasses.replace(Table.read(store.results), known=by_key)
-    _save_traces(table, traces, folder, threads, progress)
-    return table
+    return dataclasses.replace(Table.read(store.results), known=by_key)
 
 
 def _by_key(
@@ -256,9 +238,8 @@ def _compute(
     plants: run_key.Hashes,
     threads: int,
     progress: bool,
-    traces: Path | None,
 ) -> None:
-    """Compute runs, given by key, store their rows as they finish, and save traces in a folder."""
+    """Compute runs, given by key, and store their rows as they finish."""
     # made before any run: a law may change its globals
     first = {id(scenario): {"hash": key} for key, scenario in missing.items()}
 
@@ -266,8 +247,6 @@ def _compute(
         rows = []
         for prepared, trace in zip(batch, finished, strict=True):
             row = run_key.row(prepared.scenario, plants) | first[id(prepared.scenario)]
-            if traces:
-                trace.save(trace_file(traces, row))
             rows.append(row | batches.result_columns(trace))
         store.add(rows)
 
@@ -313,42 +292,3 @@ def _checked(scenarios: Any) -> Iterator[Scenario]:
         empty = False
     if empty:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
-
-
-# saved traces
-
-
-def trace_file(folder: Path, row: Mapping[str, Any]) -> Path:
-    """Return the file of a row's trace."""
-    names = "-".join(slug(row[column]) for column in ("plant", "condition", "law"))
-    return folder / f"{names}-{row['seed']}-{row['hash'][:8]}.npz"
-
-
-def worst_rows(table: Table) -> list[int]:
-    """Return row indices of the worst runs by plant and condition: failed, unsettled, then by bound
-    or overshoot.
-    """
-    failed = table.column("failure") != np.array(None)
-    bounds = table.column("ultimate_bound")
-    ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
-    unsettled = table.column("settling_time") == np.inf
-    badness = list(zip(failed, unsettled & ~failed, np.where(failed, 0.0, ends), strict=True))
-    rows: dict[tuple, int] = {}
-    for i, cell in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
-        if badness[i] > badness[rows.setdefault(cell, i)]:
-            rows[cell] = i
-    return list(rows.values())
-
-
-def _save_traces(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
-    """Repeat the chosen runs that have no file yet, and save their traces."""
-    chosen = {"none": [], "worst": worst_rows(table), "all": range(len(table))}[choice]
-    files = {}
-    for i in chosen:
-        (row,) = table.data.slice(i, 1).to_pylist()
-        if not (file := trace_file(folder, row)).exists():
-            files[table.scenario(i)] = file
-    with counter(len(files), sum(s.work for s in files), progress) as stepped:
-        for batch in batches.batches(files):
-            for i, trace in stream(batch, threads, stepped):
-                trace.save(files[batch[i].scenario])

@@ -67,11 +67,18 @@ class Advice(Tables):
         first = self.law
         gains = ", ".join(f"{name}={gain_text(value)}" for name, value in first.gains.items())
         return [
-            f"Use: {first.name}",
+            f"Use: {self._name}",
             f"Gains: {gains or 'none'} ({first.source})",
             f"Second: {self.second or 'none'}",
             f"How sure: {self._sure}",
         ]
+
+    @property
+    def _name(self) -> str:
+        """The first law's name, and that it settles nowhere if it does not."""
+        if self.settles[self.law.name]:
+            return self.law.name
+        return f"none settles in every condition, nearest: {self.law.name}"
 
     @property
     def _sure(self) -> str:

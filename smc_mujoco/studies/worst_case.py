@@ -132,16 +132,6 @@ class WorstCases(Tables, list[WorstCase]):
         super().__init__(sorted(cases, key=lambda case: (case.value, case.median)))
 
     @property
-    def tau(self) -> float:
-        """Kendall's tau between the order by median and the order by worst found; NaN for fewer
-        than two laws.
-        """
-        from scipy.stats import kendalltau
-
-        found: Any = kendalltau([case.median for case in self], [case.value for case in self])
-        return float(found.statistic)
-
-    @property
     def title(self) -> str:
         """Plant, metric, number of runs and class."""
         first = self[0]
@@ -166,19 +156,14 @@ class WorstCases(Tables, list[WorstCase]):
 
     @property
     def notes(self) -> list[str]:
-        """The meaning of the numbers, Kendall's tau, laws whose theorem does not cover the class,
-        and untuned laws.
-        """
-        key = [
+        """The meaning of the numbers, and laws whose theorem does not cover the class."""
+        notes = [
             "The median is that of random members of the class. The true worst case may be worse."
         ]
-        if len(self) > 2:
-            tau = [f"Kendall's tau between the two orders: {self.tau:.2f}"]
-        else:
-            tau = []
-        laws = {case.nominal.law.name: case for case in self}
-        beyond = [f"{law}: {case.outside}" for law, case in laws.items() if case.outside]
-        return [*key, *tau, *beyond]
+        for case in self:
+            if case.outside:
+                notes.append(f"{case.nominal.law.name}: {case.outside}")
+        return notes
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst runs of all laws, or of one law beside the given run; arguments as in

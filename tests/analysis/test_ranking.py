@@ -375,36 +375,6 @@ def test_units_cancel_and_equal_laws_are_never_separated():
 # units: runs that share gains, and runs that repeat others
 
 
-def test_a_law_that_is_unbeaten_only_as_its_sets_are_few_is_not_among_the_best():
-    """Ten times worse than two others, with three sets of gains: no test could tell."""
-    rng = np.random.default_rng(5)
-    scores = {}
-    for law, size in (
-        ("a", 1.0),
-        ("b", 1.2),
-        ("c", 10.0),
-    ):
-        scores[law] = size * np.exp(rng.normal(0.0, 0.01, 24))
-    own = np.arange(24)
-    few = np.arange(24) % 3
-    found = Comparison(
-        scores,
-        sets={"a": own, "b": own, "c": few},
-    )
-    assert found.beaten[:, 0].tolist() == [False, True, False]
-    assert found.undecided[:, 0].tolist() == [False, False, True]
-    assert found.best == [("a",)]
-    assert not Comparison(
-        scores,
-        sets={"a": own, "b": own, "c": own},
-    ).undecided.any()
-    close = scores | {"c": 1.01 * scores["a"]}
-    assert Comparison(
-        close,
-        sets={"a": own, "b": own, "c": few},
-    ).best == [("a", "c")]
-
-
 def test_runs_linked_by_sets_of_gains_of_either_law_are_one_sample():
     # 0001 1122 and so on: the second set of a is linked to both of b
     a = np.arange(12) // 4
@@ -446,8 +416,7 @@ def test_seeds_that_change_nothing_but_rounding_are_one_sample_of_two_laws_besid
     (block,) = board.blocks
     assert block.runs == 20
     assert block.samples == 20
-    assert block.best == ("b",)
-    assert block.undecided == ("c",)
+    assert block.best == ("b", "c")  # one sample of two laws tells nothing
     assert block.worse == ("a",)
     other = table_of({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
     assert leaderboard(other, ["itae"])[0].blocks[0].runs == 20

@@ -36,7 +36,7 @@ CALLS = {
     "--worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
     "--figure f "
-    "--latex t.tex --traces all --seed 5 --json c.json --threads 2": ["studies.compare.compare"],
+    "--latex t.tex --seed 5 --json c.json --threads 2": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [

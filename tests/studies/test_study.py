@@ -1,10 +1,7 @@
 """A study loses nothing: whatever befalls it, it ends with the same table, bit for bit."""
 
-import dataclasses
 import functools
-import os
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,10 +13,10 @@ from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.studies import batches, run_key
+from smc_mujoco.studies import batches
 from smc_mujoco.studies import study as store
 from smc_mujoco.studies.run_key import condition
-from smc_mujoco.studies.study import study, trace_file, worst_rows
+from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
 scenario = functools.partial(runs.scenario, duration=0.05)
@@ -268,19 +265,6 @@ def test_runs_of_other_versions_are_run_again(tmp_path, monkeypatch):
     assert set(table.column("versions")) == {'{"mujoco": "99"}'}
 
 
-def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
-    parts = tmp_path / "parts"
-    parts.mkdir()
-    old = parts / ".a.parquet"
-    new = parts / ".b.parquet"
-    for path in (old, new):
-        path.write_text("half")
-    os.utime(old, (0.0, 0.0))
-    study(small(1), tmp_path)
-    assert not old.exists()
-    assert new.exists()  # of a study that may still run
-
-
 @pytest.mark.slow
 def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
     scenarios = small(seeds=4)
@@ -297,44 +281,22 @@ def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkey
     assert study(scenarios, tmp_path / "two").rows() == Table.read(tmp_path / "one").rows()
 
 
-# traces
-
-
-def test_the_worst_trace_of_each_plant_and_condition_is_saved(tmp_path):
-    scenarios = [*small(), scenario(fails_late())]
-    table = study(scenarios, tmp_path, traces="worst")
-    traces = []
-    for path in sorted((tmp_path / "traces").iterdir()):
-        traces.append(smc.load(path))
-    assert [trace.failure is not None for trace in traces] == [False, True]  # noise, nominal
-    noisy = table.select(condition="noise")
-    assert smc.score(traces[0])["ultimate_bound"] == noisy.column("ultimate_bound").max()
-
-
-def test_the_worst_run_failed_or_never_settled_or_has_the_largest_bound():
-    columns = {
-        "plant": np.array(["pole"] * 3 + ["arm"] * 3 + ["cart"] * 2),
-        "condition": np.array(["nominal"] * 8),
-        "failure": np.array([None] * 7 + ["it fell"]),
-        "settling_time": np.array([4.0, np.inf, 1.0, np.inf, np.inf, 2.0, np.inf, np.nan]),
-        "ultimate_bound": np.array([0.0045, 0.0007, 0.1, *[np.nan] * 3, 9.0, np.nan]),
-        "overshoot": np.array([1.0, 1.0, 1.0, 5.0, 20.0, 90.0, 1.0, np.nan]),
-    }
-    assert worst_rows(SimpleNamespace(column=columns.get)) == [1, 4, 7]
-
-
-def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
-    study(small(), tmp_path / "a", traces="all")
-    assert len(list((tmp_path / "a" / "traces").iterdir())) == len(small())
-    none_runs()
-    before = {}
-    for path in (tmp_path / "a" / "traces").iterdir():
-        before[path] = path.stat().st_mtime_ns
-    study(small(), tmp_path / "a", traces="all")
-    assert {
-        path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()
-    } == before
-    row = run_key.row(small()[0])
-    file = trace_file(tmp_path / "a" / "traces", row)
-    assert file.name == f"duffing-nominal-observer_free-0-{row['hash'][:8]}.npz"
-    assert dataclasses.replace(smc.load(file).scenario) == small()[0]
+@pytest.mark.parametrize(
+    ("plant", "law"),
+    [
+        ("inverted_pendulum", "classical"),
+        ("duffing", "super_twisting"),
+        ("van_der_pol", "observer_free"),
+        ("pendulum_network", "classical"),
+    ],
+)
+def test_a_law_that_does_nothing_wins_in_no_metric(plant, law, tmp_path):
+    """However calm, gentle and steady a plant is that was let fall or hang."""
+    runs = smc.grid(plant, ["none", law], "nominal", 7, "study", 4.0)
+    table = study(runs, tmp_path)
+    boards = smc.leaderboard(table, list(smc.score(smc.run(runs[0]))), defaults=True)
+    assert len(boards) > 15
+    assert {board.winner for board in boards} <= {law, None}
+    assert any(board.winner == law for board in boards)
+    for board in boards:
+        assert all("none" not in block.best for block in board.blocks), board.metric

@@ -124,9 +124,6 @@ def compare(
     rig: Annotated[
         str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")
     ] = None,
-    traces: Annotated[
-        str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")
-    ] = "none",
     seed: Seed = 0,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -154,11 +151,11 @@ def compare(
     terminal = Terminal(json)
     start = options.starts(x0)
     if rig is not None:
-        own = (plants, condition, gains != "tuned", worst, figure, latex, traces != "none", seed)
+        own = (plants, condition, gains != "tuned", worst, figure, latex, seed)
         if any(own):
             raise ScenarioError(
                 "--rig brings its own plant, parameter sets and gains: leave out the plants, "
-                "--condition, --gains, --worst, --figure, --latex, --traces and --seed"
+                "--condition, --gains, --worst, --figure, --latex and --seed"
             )
         _compare_on_rig(
             rig,
@@ -192,7 +189,6 @@ def compare(
         defaults=defaults,
         searches=searches,
         relevant=relevant,
-        traces=traces,
         threads=threads,
         seed=seed,
     )
