@@ -19,7 +19,7 @@ from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.envs.episode import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import action_space, observation_space
-from smc_mujoco.envs.tasks import Pair, reward
+from smc_mujoco.envs.tasks import reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
 from smc_mujoco.simulation.model import state_with, without_scenery
@@ -104,14 +104,15 @@ class BatchEnv(VectorEnv):
             raise ScenarioError(
                 f"seed has {len(seeds)} values: give {self.num_envs}, or one number"
             )
-        randoms = []
-        for number, random in zip(seeds, self.randoms or seeds, strict=True):
-            if number is not None or not self.randoms:
-                random = seeding.np_random(number)[0]  # noqa: PLW2901
-            randoms.append(random)
-        self.randoms = randoms
+        if not self.randoms:
+            self.randoms = [seeding.np_random()[0] for _ in seeds]
+        for i, number in enumerate(seeds):
+            if number is not None:
+                self.randoms[i] = seeding.np_random(number)[0]
         self.begin(np.ones(self.num_envs, bool), options)
-        return self.observe(self.setting.diverged(*self.state())), self.infos(self.errors()[0])
+        x, v = self.state()
+        e, _ = self.setting.errors(x, v, self.samples)
+        return self.setting.observe(x, v, self.samples), self.infos(e)
 
     def step(
         self, actions: Any
@@ -123,10 +124,7 @@ class BatchEnv(VectorEnv):
             raise ScenarioError("no episode has begun: call reset first")
         restarts = self.ended.copy()
         commands = self.setting.command(actions, (self.num_envs,))
-        moving = None
-        if restarts.any():
-            moving = np.flatnonzero(~restarts).astype(np.int32)
-        terminated = self.advance(moving, commands)
+        terminated = self.advance(np.flatnonzero(~restarts).astype(np.int32), commands)
         self.samples += 1
         if restarts.any():
             self.begin(restarts)
@@ -134,12 +132,14 @@ class BatchEnv(VectorEnv):
         x, v = self.state()
         terminated |= self.setting.diverged(x, v)
         truncated = self.samples >= self.max_samples
-        e, w = self.errors()
         with np.errstate(over="ignore", invalid="ignore"):
+            e, w = self.setting.errors(x, v, self.samples)
             rewards = np.where(terminated | restarts, 0.0, reward(e, w))
         e[terminated] = np.nan
+        observations = self.setting.observe(x, v, self.samples)
+        observations[terminated] = bounded(observations[terminated])
         self.ended = terminated | truncated
-        return self.observe(terminated), rewards, terminated, truncated, self.infos(e)
+        return observations, rewards, terminated, truncated, self.infos(e)
 
     def begin(self, mask: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
         """Begin new episodes of the copies where `mask`, (num_envs,) of bool, is true."""
@@ -153,8 +153,8 @@ class BatchEnv(VectorEnv):
         self.ended[mask] = False
         self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
 
-    def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
-        """Take one control period in the copies `ids`, None for all.
+    def advance(self, ids: np.ndarray, commands: np.ndarray) -> np.ndarray:
+        """Take one control period in the copies `ids`.
 
         Return those that failed, (num_envs,) of bool.
         """
@@ -166,23 +166,8 @@ class BatchEnv(VectorEnv):
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
-                moving = np.arange(self.num_envs) if ids is None else ids
-                ids = np.setdiff1d(moving, error.ids).astype(np.int32)
+                ids = np.setdiff1d(ids, error.ids).astype(np.int32)
         return failed
-
-    def observe(self, diverged: np.ndarray) -> np.ndarray:
-        """Return the observations of all copies, (num_envs, observation_size); those of `diverged`
-        ones are bounded.
-        """
-        observations = self.setting.observe(*self.state(), self.samples)
-        if diverged.any():
-            observations[diverged] = bounded(observations[diverged])
-        return observations
-
-    def errors(self) -> Pair:
-        """Return the errors e and w of the task in all copies, (num_envs, n) each."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self.setting.errors(*self.state(), self.samples)
 
     def infos(self, e: np.ndarray) -> dict[str, Any]:
         """Return the infos of `Episode.reward_and_info` as gymnasium joins them; e is (num_envs,
