@@ -35,7 +35,9 @@ def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
     rest = np.zeros(plant.n)
     rows = []
     for i, moved in enumerate(DIFFERENCE_STEP * np.eye(plant.n)):
-        f = [plant.nominal(x, rest, i, p)[0] for x in (moved, -moved)]
+        f = []
+        for x in (moved, -moved):
+            f.append(plant.nominal(x, rest, i, p)[0])
         f += [plant.nominal(rest, v, i, p)[0] for v in (moved, -moved)]
         slopes = (f[0] - f[1]) / (2.0 * DIFFERENCE_STEP), (f[2] - f[3]) / (2.0 * DIFFERENCE_STEP)
         rows.append((*slopes, plant.nominal(rest, rest, i, p)[1]))

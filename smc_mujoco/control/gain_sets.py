@@ -126,7 +126,9 @@ def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
     """List the general laws that have gains in a set on each of these plants, those of COMPARED
     first.
     """
-    named = [as_plant(plant) for plant in plants]
+    named = []
+    for plant in plants:
+        named.append(as_plant(plant))
     if names := [name for name in general() if all(in_set(plant, name, gains) for plant in named)]:
         return names
     together = ", ".join(plant.name for plant in named)

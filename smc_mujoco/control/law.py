@@ -211,7 +211,10 @@ def checked_name(law: Law) -> Law:
     if len(names) == 1:
         return law
     package = known_laws().package(law.name)
-    owner = f"package {package!r}" if package else "the library"
+    if package:
+        owner = f"package {package!r}"
+    else:
+        owner = "the library"
     raise ScenarioError(
         f"your law {law.name!r} has the name of a law of {owner}: "
         f"rename its function, or give law.named('my_{law.name}')"
@@ -240,7 +243,10 @@ def suits(law: Law | Template, plant: Plant) -> bool:
         return law.name == "none"
     if not law.plants or plant.name in law.plants or (plant.pose and FREE_BODY in law.plants):
         return True
-    plants = [plants_known()[name] for name in law.plants if name in plants_known()]
+    plants = []
+    for name in law.plants:
+        if name in plants_known():
+            plants.append(plants_known()[name])
     return plant.own and plant.underactuated and any(known.underactuated for known in plants)
 
 

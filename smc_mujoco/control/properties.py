@@ -67,8 +67,12 @@ PROPERTIES: Mapping[str, Property] = {
 
 def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> list[Template]:
     """Return the laws of the library, or those for a plant, that have all these PROPERTIES."""
-    properties = [find("property of a law", need, PROPERTIES) for need in needs]
-    templates = [known_laws()[name] for name in laws(plant)]
+    properties = []
+    for need in needs:
+        properties.append(find("property of a law", need, PROPERTIES))
+    templates = []
+    for name in laws(plant):
+        templates.append(known_laws()[name])
     return [law for law in templates if all(needed.holds(law) for needed in properties)]
 
 

@@ -72,7 +72,9 @@ class Evaluator:
         self.cases = list(cases)
         self.names = tuple(names)
         self.threads = cores(threads)
-        prepared = [prepare(case) for case in self.cases]
+        prepared = []
+        for case in self.cases:
+            prepared.append(prepare(case))
         with memory_for(prepared):
             if any(item.why_not for item in prepared):
                 self.engine = PYTHON
@@ -111,7 +113,9 @@ class Evaluator:
         return self.goal.excess(dataclasses.replace(self.cases[0], law=self.law(gains)))
 
     def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[Costs]:
-        laws = [self.law(gains) for gains in candidates]
+        laws = []
+        for gains in candidates:
+            laws.append(self.law(gains))
         with warnings.catch_warnings():
             # the runs of the law's own gains have warned
             warnings.simplefilter("ignore", PlainLoopWarning)
@@ -158,7 +162,9 @@ def _putter(
     values = state.view(
         packed.numbers, at, (len(law.gains), prepared.scenario.plant.n if law.joint else 1)
     )
-    rows = [list(law.gains).index(name) for name in names]
+    rows = []
+    for name in names:
+        rows.append(list(law.gains).index(name))
 
     def put(gains: Gains) -> None:
         values[rows] = np.reshape(gains, (-1, 1))

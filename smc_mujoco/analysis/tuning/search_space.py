@@ -76,7 +76,9 @@ def unit(law: Component, name: str) -> Unit | None:
 
 def without_unit(law: Component) -> dict[str, float]:
     """Return gain -> default of the searched gains whose unit is not known."""
-    gains = {name: _gain(law, name) for name in law.gains}
+    gains = {}
+    for name in law.gains:
+        gains[name] = _gain(law, name)
     return {
         name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held
     }

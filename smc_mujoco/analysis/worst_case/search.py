@@ -327,7 +327,9 @@ class Search:
                 Case(self.members.moved(start.member, z, FORCE_KNOTS), origin=start.origin)
                 for z in points
             ]
-            keys = [one.key for one in self.tried[before:]]
+            keys = []
+            for one in self.tried[before:]:
+                keys.append(one.key)
             order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
             ranks = {}
             for rank, i in enumerate(order):
