@@ -97,7 +97,7 @@ def zero(plant: str) -> Law:
     return (hover() if plant == "quadrotor" else law("none")).named("zero")
 
 
-def told(scenario: Scenario) -> Scenario:
+def reported(scenario: Scenario) -> Scenario:
     """Return a scenario that hands the truth to an oracle; the same one under any other law."""
     if not any(part.function in ORACLES for part in scenario.law.parts):
         return scenario
@@ -115,9 +115,9 @@ def scenarios(
     base = one._base(law)
     made = []
     for index in instances:
-        scenario = told(one._place(base, one.instance(index, seed)))
+        scenario = reported(one._place(base, one.instance(index, seed)))
         if one._attacked:
-            scenario = told(one._worst(scenario))
+            scenario = reported(one._worst(scenario))
         made.append(scenario)
     return made
 

@@ -28,7 +28,7 @@ from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.mechanisms.hardware.rotors import ROTOR, speed_for, spun
 from smc_mujoco.mechanisms.plants import quadrotor
-from smc_mujoco.mechanisms.rotation import quaternion, turned, turned_back
+from smc_mujoco.mechanisms.rotation import quaternion, rotate_inverse, turned
 from smc_mujoco.simulation.scenario import Scenario
 
 STEP = np.array([126.0, -420.0, 540.0, -315.0, 70.0])  # of s^5 .. s^9: from 0 to 1
@@ -129,7 +129,7 @@ def _thrust(gains, j, W):
 
 
 @njit(error_model="numpy")
-def _turn(gains, speeds, told, dt, first):
+def _turn(gains, speeds, reported, dt, first):
     """Advance the speeds of the rotors to when this sample's command comes.
 
     Return their thrusts and rates, (2, 4).
@@ -144,7 +144,7 @@ def _turn(gains, speeds, told, dt, first):
             if first:
                 goal = speed_for(gains, 0.0) * (1.0 - gains.sag * lifted)
             else:
-                goal = told[j]
+                goal = reported[j]
             speeds[j] = spun(gains, speeds[j], goal, dt)[0]
     thrusts = np.zeros((2, ROTORS))
     for j in range(ROTORS):
@@ -152,12 +152,12 @@ def _turn(gains, speeds, told, dt, first):
         if first:
             thrusts[1, j] = 0.0
         else:
-            thrusts[1, j] = slope * spun(gains, speeds[j], told[j], 0.0)[1]
+            thrusts[1, j] = slope * spun(gains, speeds[j], reported[j], 0.0)[1]
     return thrusts
 
 
 @njit(error_model="numpy")
-def _shares(y, gains, T, torque, speeds, told, supply):
+def _shares(y, gains, T, torque, speeds, reported, supply):
     """Return the wrench, (6,), of the rotors' commands for a thrust and a torque at the end of the
     period.
 
@@ -176,7 +176,7 @@ def _shares(y, gains, T, torque, speeds, told, supply):
         rate = gains.rise if goal > speeds[j] else gains.fall
         speed = max(0.0, speeds[j] + (goal - speeds[j]) / -math.expm1(-rate * AHEAD)) / supply
         share = min(max((gains.linear + gains.square * speed) * speed, 0.0), gains.fmax)
-        told[j], total = speed_for(gains, share) * supply, total + share
+        reported[j], total = speed_for(gains, share) * supply, total + share
         for i in range(3):
             u[3 + i] += signs[i] * levers[i] * share
     u[0], u[1], u[2] = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, total)
@@ -200,9 +200,9 @@ def oracle_flight(y, gains, memory):
     m = y.M[0, 0]
     first = memory[0, 7] == 0.0
     speeds = memory[:, 5]
-    told = memory[:, 6]
+    reported = memory[:, 6]
     plan, now = _plan(y, gains, memory)
-    thrusts = _turn(gains, speeds, told, y.dt, first)
+    thrusts = _turn(gains, speeds, reported, y.dt, first)
     off = plan[:3] - now
     attitude = quaternion(y.x[3], y.x[4], y.x[5])
     T = thrusts[0].sum()
@@ -225,7 +225,7 @@ def oracle_flight(y, gains, memory):
         jerk[i] = plan[3, i] + along * (
             3.0 * off[2, i] + along * (3.0 * off[1, i] + along * off[0, i])
         )
-    across = turned_back(attitude, snap[0], snap[1], snap[2])
+    across = rotate_inverse(attitude, snap[0], snap[1], snap[2])
     least = LEAST * math.sqrt(inner(y.h, y.h))
     now[2, 3] = r * q - (m * across[1] + 2.0 * dT * p) / max(T, least)
     now[2, 4] = (m * across[0] - 2.0 * dT * q) / max(T, least) - r * p
@@ -238,8 +238,10 @@ def oracle_flight(y, gains, memory):
     lead = gains.inertia / (gains.c * (gains.linear + 2.0 * gains.square * speeds[0])) / AHEAD
     torque[0], torque[1] = torque[0] + q * momentum, torque[1] - p * momentum
     torque[2] = (torque[2] + lead * drag) / (1.0 + lead)  # rotors that speed up turn the body back
-    T += m * turned_back(attitude, jerk[0], jerk[1], jerk[2])[2] * AHEAD
-    u = _shares(y, gains, max(T, least), torque, speeds, told, 1.0 - gains.sag * thrusts[0].sum())
+    T += m * rotate_inverse(attitude, jerk[0], jerk[1], jerk[2])[2] * AHEAD
+    u = _shares(
+        y, gains, max(T, least), torque, speeds, reported, 1.0 - gains.sag * thrusts[0].sum()
+    )
     return u, -off[0]
 
 

@@ -323,8 +323,10 @@ def predicted(rig, condition, seeds, changes=None):
             for seed in range(seeds):
                 fields = {"x0": start(seed), "seed": seed} | CONDITIONS[condition]
                 scenarios.append(twin.scenario(law, **fields))
-        told = [figures(logged(trace)) for trace in smc.run(scenarios)]
-        found[name] = {law.name: told[i * seeds : (i + 1) * seeds] for i, law in enumerate(laws)}
+        reported = [figures(logged(trace)) for trace in smc.run(scenarios)]
+        found[name] = {
+            law.name: reported[i * seeds : (i + 1) * seeds] for i, law in enumerate(laws)
+        }
     return found
 
 

@@ -5,7 +5,7 @@ scores the marks find.
 
 Three plants x the four laws of the paper's study, or eight `--other` laws, x five scores, of runs
 of 4 s. A score is off if it is apart from that at an eighth of the step, by the rule of
-`smc_mujoco/analysis/apart.py`; it is marked if it is apart from those of the runs' repetitions, as
+`smc_mujoco/analysis/differ.py`; it is marked if it is apart from those of the runs' repetitions, as
 in scenes; it wanders if a nudged start alone does that. The script prints the tables that
 docs/design.md sums up. They take two minutes of processor time.
 """
@@ -14,7 +14,7 @@ import dataclasses
 import sys
 from collections.abc import Sequence
 
-from smc_mujoco.analysis.apart import apart, relative_range
+from smc_mujoco.analysis.differ import differ, relative_range
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import first_order, halved, repetitions
 from smc_mujoco.common.text import number
@@ -80,12 +80,12 @@ def row(part: str, laws: Sequence[str], gains: str) -> str:
         for name in SCORES:
             least = floor(scenario, name)
             values = [of_run[name] for of_run in scores]
-            wrong = apart((values[0], right[name]), least)
-            mark = apart(values, least, order)
+            wrong = differ((values[0], right[name]), least)
+            mark = differ(values, least, order)
             off += wrong
             marked += mark
             found += wrong and mark
-            wandering += apart((values[0], values[2]), least)
+            wandering += differ((values[0], values[2]), least)
             errors.append(relative_range((values[0], right[name]), least))
             if wrong:
                 wrong_laws.add(scenario.law.name)

@@ -407,11 +407,11 @@ def slice_of(part: str, seed: int, start: int, cases: int) -> Iterator[tuple[int
                 process.kill()
             if start < end:
                 errors.seek(0)
-                told = []
+                reported = []
                 for text in errors.read().decode(errors="replace").splitlines():
                     if text.strip():
-                        told.append(text.strip())
-                why = f"the process ended with code {process.returncode}: {' | '.join(told[-12:])}"
+                        reported.append(text.strip())
+                why = f"the process ended with code {process.returncode}: {' | '.join(reported[-12:])}"
                 yield start, "found", f"takes longer than {LIMIT:g} s" if hung else why
                 start += 1
 
@@ -450,10 +450,10 @@ def attacked(part: str, seed: int, start: int, cases: int, jobs: int) -> int:
                     if kinds[kind] <= 3:
                         again = f"python tests/attack.py {part} --seed {seed} --start {i} --cases 1"
                         print(f"  {why}\n    {again}", flush=True)
-    told = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
+    reported = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
     seconds = time.monotonic() - begun
     print(
-        f"{part}: seed {seed}, {sum(ends.values())} cases from {start}, {seconds:.0f} s: {told}",
+        f"{part}: seed {seed}, {sum(ends.values())} cases from {start}, {seconds:.0f} s: {reported}",
         flush=True,
     )
     return ends["found"]

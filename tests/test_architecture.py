@@ -232,14 +232,14 @@ def test_no_room_hides_a_public_name():
 
 
 def test_types_and_run_time_agree_on_the_public_names():
-    told = {n.targets[0].id for n in STUB.body if isinstance(n, ast.Assign)} | {
+    reported = {n.targets[0].id for n in STUB.body if isinstance(n, ast.Assign)} | {
         alias.asname
         for n in STUB.body
         if isinstance(n, ast.ImportFrom)
         for alias in n.names
         if alias.asname
     }
-    assert told == PUBLIC
+    assert reported == PUBLIC
 
 
 # one file adds one thing

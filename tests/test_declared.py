@@ -118,13 +118,13 @@ GOOD = {  # a plain value, and the ends themselves
     FilePath: lambda one: [Path("a"), Path("b/c")],
 }
 TOLD = {
-    OrNone: lambda one: f"{told(one.one)}, or None",
+    OrNone: lambda one: f"{reported(one.one)}, or None",
     Number: told_number,
     Whole: lambda one: f"whole {one.low} to {one.high}" + " or inf" * one.infinite,
     OneOf: lambda one: f"one of {', '.join(one.names)}",
     Flag: lambda one: "flag",
-    Each: lambda one: f"{told(one.one)}, or one for each channel",
-    Range: lambda one: f"range of {told(Number(above=one.above, low=one.low))}",
+    Each: lambda one: f"{reported(one.one)}, or one for each channel",
+    Range: lambda one: f"range of {reported(Number(above=one.above, low=one.low))}",
     FilePath: lambda one: "path",
 }
 
@@ -137,7 +137,7 @@ def good(one):
     return GOOD[type(one)](one)
 
 
-def told(one):
+def reported(one):
     return TOLD[type(one)](one)
 
 
@@ -289,7 +289,7 @@ def test_the_declarations_are_those_recorded(snapshot):
     alike: dict[tuple[str, str], list[str]] = {}
     for name, (thing, one, _) in THINGS.items():
         owner = re.split(rf"(?:\.|\(|'s ){thing}", name)[0]
-        alike.setdefault((owner, told(one)), []).append(thing)
+        alike.setdefault((owner, reported(one)), []).append(thing)
     known = recorded(__file__, dict.fromkeys(owner for owner, _ in alike))
     lines = [
         f"{owner}({', '.join(names)}): {what}"

@@ -78,12 +78,12 @@ def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, 
         (tmp_path / "block.py").write_text(block)
         with contextlib.redirect_stdout(io.StringIO()) as said:
             runpy.run_path("block.py")
-        told = re.findall(rf"print\(.*\)  # ({NUMBER})", block)
+        reported = re.findall(rf"print\(.*\)  # ({NUMBER})", block)
         printed = []
         for line in said.getvalue().splitlines():
             printed.append(re.findall(NUMBER, line)[0])
-        assert printed == told
-        seen += len(told)
+        assert printed == reported
+        seen += len(reported)
     assert seen >= 5
 
 
@@ -96,9 +96,9 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
     # Each comparison draws new noise, so the page's numbers do not come again; who wins in which
     # metric does.
     wins = r"^(?:J|TV rate) on .*?: \S+ wins"
-    told = [re.findall(wins, text, re.MULTILINE) for text in (said.getvalue(), shown)]
-    assert told[0] == told[1]
-    assert len(told[0]) == 2
+    reported = [re.findall(wins, text, re.MULTILINE) for text in (said.getvalue(), shown)]
+    assert reported[0] == reported[1]
+    assert len(reported[0]) == 2
     sources = []
     for text in (said.getvalue(), shown):
         sources.append(set(re.findall(r"^(\w+) .*\n(shipped|tuned here) ", text, re.MULTILINE)))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import apart, ranking
+from smc_mujoco.analysis import differ, ranking
 from smc_mujoco.analysis import region_of_attraction as region
 from smc_mujoco.analysis.tuning import objective, search, search_space
 from smc_mujoco.analysis.worst_case import search as attack
@@ -106,7 +106,7 @@ SAID = {
         f"w = h times 1 s^2 = {short(objective.Objective().weight)} s^3",
         f"costs {objective.Objective().weight * 2.0 / conditions.CONTROL_PERIOD:g} s^2",
     ],
-    apart: [f"are more than {percent(apart.MAX_CHANGE)} apart"],
+    differ: [f"are more than {percent(differ.MAX_CHANGE)} apart"],
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
     ranking: [

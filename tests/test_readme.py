@@ -191,11 +191,11 @@ def test_files_that_command_lines_name_exist():
                 named.add(word)
     assert named >= {"scenes/inverted_pendulum.py", "requirements.lock"}
     # to be written by the reader
-    told = set()
+    reported = set()
     for page in PAGES:
         for name in titled(page):
-            told.add(name)
-    assert [name for name in named - told if not (ROOT / name).is_file()] == []
+            reported.add(name)
+    assert [name for name in named - reported if not (ROOT / name).is_file()] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)

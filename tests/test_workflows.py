@@ -157,8 +157,8 @@ SPEC.loader.exec_module(ENTERED)
     ],
 )
 def test_a_change_brings_one_entry_and_nothing_else(paths, found, monkeypatch):
-    told = subprocess.CompletedProcess([], 0, "".join(f"{path}\0" for path in paths))
-    monkeypatch.setattr(subprocess, "run", lambda *arguments, **options: told)
+    reported = subprocess.CompletedProcess([], 0, "".join(f"{path}\0" for path in paths))
+    monkeypatch.setattr(subprocess, "run", lambda *arguments, **options: reported)
     if found:
         assert ENTERED.changed("0" * 40) == found
     else:

@@ -64,8 +64,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smc_mujoco.analysis.apart import apart
 from smc_mujoco.analysis.bootstrap import LEVEL, middle
+from smc_mujoco.analysis.differ import differ
 from smc_mujoco.common.constraints import Number, constrained
 
 MAX_EXACT = 60  # samples; with more the normal approximation of the rank sum is used
@@ -344,8 +344,8 @@ class Comparison:
         if self.shares or not again.any():
             return None
         pair = float(middle(self.cells[a, block, again])), float(middle(half))
-        differ = apart(pair, float(self.floors[block]), bool(self.first_order[block]))
-        return pair if differ else None
+        changed = differ(pair, float(self.floors[block]), bool(self.first_order[block]))
+        return pair if changed else None
 
 
 def bounds(

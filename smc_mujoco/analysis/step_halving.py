@@ -1,7 +1,7 @@
 """Whether a number depends on the physics step: the same run at half the step, and from a start
 nudged by 1e-9; if its command chatters, at a quarter of the step too; with contacts, under RK4 too.
 
-A number is marked where its values in these runs are apart by the rule of `analysis.apart`: under
+A number is marked where its values in these runs are apart by the rule of `analysis.differ`: under
 an integrator of first order half the step has half of the error, so there 2.5 % are enough. The
 rule holds for every number of scenes, boards and tables of chattering. Boards, whose runs start in
 many places, repeat them at half the step only, and compare medians.
@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.analysis.apart import MAX_CHANGE, relative_range
+from smc_mujoco.analysis.differ import MAX_CHANGE, relative_range
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.limit_cycle import channel_cycle, largest_cycle
@@ -30,7 +30,7 @@ RANGE = "the range need not hold the truth"
 MARK = "*"  # behind a number that depends on the step
 CHATTERS = 10.0  # 1/s: variation of a command a second over its bound, from which it chatters
 NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
-# at half the step, see `analysis.apart`
+# at half the step, see `analysis.differ`
 APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"
 NUDGED = (
     f"changes by more than {APART} at half the physics step, or by more than "
@@ -61,7 +61,7 @@ class StepChange:
     @property
     def marked(self) -> bool:
         """Whether the amplitude or the frequency depends on the step, by the rule of
-        `analysis.apart`.
+        `analysis.differ`.
         """
         return max(self.amplitude, self.frequency) > MAX_CHANGE
 

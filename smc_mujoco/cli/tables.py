@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Column, Table
 from rich.text import Text
 
-from smc_mujoco.analysis.apart import apart
+from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
 from smc_mujoco.common.catalogue import Catalogue
@@ -148,7 +148,7 @@ def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0
     low = texts[min(values, key=size)]
     high = texts[max(values, key=size)]
     numbers = [math.inf if value is None else value for value in values]
-    if low != high and apart(numbers, least, first_order(scenario)):
+    if low != high and differ(numbers, least, first_order(scenario)):
         return Text(f"{low}{MARK} to {high}")
     return FAILED if values[0] is None else Text(texts[values[0]])
 

@@ -18,7 +18,7 @@ from numba import njit
 
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.units import ACCELERATION, RATE, RATE2, TIME, Gain, Unit
-from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
+from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, rotate_inverse, turned
 
 compiled = njit(error_model="numpy")  # a division by 0 gives inf or NaN, as in C
 # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
@@ -177,7 +177,7 @@ def steer(y, v, stiffness, damping, memory):
     wanted = of_thrust(F, y.r[3:])
     w = rate_of(wanted, F, dF, y.r[3:], y.dr[3:])
     error = relative(wanted, quaternion(y.x[3], y.x[4], y.x[5]))
-    moving = turned_back(error, w[0], w[1], w[2])
+    moving = rotate_inverse(error, w[0], w[1], w[2])
     return F, error, (y.v[3] - moving[0], y.v[4] - moving[1], y.v[5] - moving[2]), moving
 
 

@@ -247,7 +247,9 @@ def suits(law: Law | Template, plant: Plant) -> bool:
     for name in law.plants:
         if name in plants_known():
             plants.append(plants_known()[name])
-    return plant.own and plant.underactuated and any(known.underactuated for known in plants)
+    return (
+        plant.is_user_model and plant.underactuated and any(known.underactuated for known in plants)
+    )
 
 
 KINDS = {  # of laws and of their parts -> the catalogue

@@ -378,7 +378,7 @@ def _spark_rows(errors: Sequence[Panel], traces: Sequence[Trace]) -> list[list[P
     plant = traces[0].scenario.plant
     if not plant.pose:
         return [[error, *[error._replace(quantity="u")] * error.group.driven] for error in errors]
-    places = (plant.judged.index(error.channel or 0) for error in errors)
+    places = (plant.scored_channels.index(error.channel or 0) for error in errors)
     if errors:
         of_actuators = drawing.actuators(traces)
     else:
@@ -400,7 +400,7 @@ def _draw_sparks(
         for k, panel in enumerate(row):
             ax, (factor, unit) = page.add_subplot(rows[i, k]), panel.scale
             beside = {"fontsize": size, "va": "center", "parse_math": False}
-            drawing.over_time(ax, panel, runs.colours, told=False)
+            drawing.over_time(ax, panel, runs.colours, reported=False)
             ax.set(xlim=(0.0, runs.span[0]), yticks=[], frame_on=False)
             ax.set_xticks(
                 [0.0, runs.span[0]],

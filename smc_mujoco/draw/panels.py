@@ -222,8 +222,8 @@ def by_channel(panel: Panel) -> list[Panel]:
     if panel.quantity in SINGLE:
         return [panel]
     panels = []
-    judged = panel.traces[0].scenario.plant.judged
-    for k, i in enumerate(i for i in panel.group.channels if i in judged):
+    scored = panel.traces[0].scenario.plant.scored_channels
+    for k, i in enumerate(i for i in panel.group.channels if i in scored):
         place, channel = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
         panels.append(
             Panel(panel.quantity, channel, [group_trace(trace, place) for trace in panel.traces], i)
@@ -405,7 +405,7 @@ def over_time(
     among: Sequence[Trace] = (),
     bands: bool = True,
     names: Sequence[str] = (),
-    told: bool = True,
+    reported: bool = True,
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of
     the traces.
@@ -413,7 +413,7 @@ def over_time(
     The reference of x is drawn in front, its settling band behind. Traces that agree from the start
     are drawn once, in ink, with words; their colours begin where they part. The traces `among` set
     the range, by default the panel's own; `bands`: whether to draw ranges behind the lines;
-    `names`: of the traces, for the words; `told`: whether to write them.
+    `names`: of the traces, for the words; `reported`: whether to write them.
     """
     artists: list[Artist] = []
     name = panel.quantity
@@ -460,7 +460,7 @@ def over_time(
         look["gid"] = AGREED
         path = between(lines[first], start, stop)
         artists += ax.plot(*path, lw=style.points(LINE), **look)
-    tell_agreements(ax, shared if told else [], lines, names)
+    tell_agreements(ax, shared if reported else [], lines, names)
     return artists
 
 

@@ -62,8 +62,8 @@ def draw(
         bars, runs = page.subplots(1, 2, width_ratios=[1.0, 1.1])
         _bars(bars, found, colour, pale)
         _runs(runs, found, colour)
-        told = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
-        pages.set_head(page, width, title or told, handles)
+        reported = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
+        pages.set_head(page, width, title or reported, handles)
         pages.write(page, paths)
     return page
 

@@ -325,15 +325,15 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
             )
         return [label if isinstance(label, str) else shown(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
-    told = []
+    reported = []
     for trace, name in zip(traces, names, strict=True):
         alike = [run for run, other in zip(traces, names, strict=True) if other == name]
         words = differences(trace, alike, traces)
-        told.append(f"{name}: {words}" if words else name)
+        reported.append(f"{name}: {words}" if words else name)
     numbered = []
-    for i, name in enumerate(told):
-        several = told.count(name) > 1
-        numbered.append(f"{name} {told[:i].count(name) + 1}" if several else name)
+    for i, name in enumerate(reported):
+        several = reported.count(name) > 1
+        numbered.append(f"{name} {reported[:i].count(name) + 1}" if several else name)
     return numbered
 
 
@@ -620,7 +620,7 @@ def plant_name(plant: Plant | str, short: bool = False) -> str:
     return (
         (short and plant.short)
         or plant.label
-        or (plant.name if plant.own else in_words(plant.name))
+        or (plant.name if plant.is_user_model else in_words(plant.name))
     )
 
 

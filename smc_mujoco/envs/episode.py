@@ -123,7 +123,7 @@ class Setting:
         self.selected = self.task.selected(plant)
         self.rest_x = rest(plant)  # from where positions count in errors, (n,)
         # the channels that the reward counts: not the tilt of a body that leans to move
-        self.counted: Any = list(plant.judged) if flies else slice(None)
+        self.counted: Any = list(plant.scored_channels) if flies else slice(None)
         samples = self.scenario.samples + 1 if self.task.moving else 1
         self.references = _references(self.scenario, samples)
         width = self.references.shape[1]

@@ -101,7 +101,7 @@ class Track(Task):
         low, high = _ranges(plant)
         room = AMPLITUDE_SHARE * np.minimum(high - plant.rest, plant.rest - low)
         amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)
-        amplitudes[~np.isin(np.arange(plant.n), plant.judged)] = 0.0
+        amplitudes[~np.isin(np.arange(plant.n), plant.scored_channels)] = 0.0
         references = []
         for middle, amplitude in zip(plant.rest, amplitudes[: plant.driven].tolist(), strict=False):
             references.append(OffsetSine(middle, amplitude, TRACK_REFERENCE.omega))

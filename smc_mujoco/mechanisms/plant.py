@@ -226,7 +226,7 @@ class Plant:
         return self.n - self.driven
 
     @property
-    def judged(self) -> tuple[int, ...]:
+    def scored_channels(self) -> tuple[int, ...]:
         """The channels whose errors count: all, but not the tilt of a free body that follows from
         the force.
         """
@@ -252,7 +252,7 @@ class Plant:
         return self.driven > 1 and len(set(self.units[: self.driven])) == 1
 
     @property
-    def own(self) -> bool:
+    def is_user_model(self) -> bool:
         """Whether it is a user's model, not one of the library."""
         return hasattr(self.build, "argument")
 
@@ -261,7 +261,7 @@ class Plant:
         """Whether its MJCF is built on models/common/theme.xml: films put such machines on one
         floor, in one light.
         """
-        return not self.own and _on_stage(self.build, self.n)
+        return not self.is_user_model and _on_stage(self.build, self.n)
 
     @property
     def argument(self) -> str:

@@ -56,7 +56,7 @@ def turned(q, x, y, z):
 
 
 @njit(error_model="numpy")
-def turned_back(q, x, y, z):
+def rotate_inverse(q, x, y, z):
     """Return the vector R(q)' (x, y, z)."""
     return turned((q[0], -q[1], -q[2], -q[3]), x, y, z)
 
@@ -100,7 +100,7 @@ def put_attitude_error(x, v, r, dr, e, de):
     error = relative(quaternion(r[3], r[4], r[5]), quaternion(x[3], x[4], x[5]))
     e[3], e[4], e[5] = rotation_vector(error[0], error[1], error[2], error[3])
     own = rate(r[3], r[4], r[5], dr[3], dr[4], dr[5])
-    wx, wy, wz = turned_back(error, own[0], own[1], own[2])
+    wx, wy, wz = rotate_inverse(error, own[0], own[1], own[2])
     de[3] = v[3] - wx
     de[4] = v[4] - wy
     de[5] = v[5] - wz
@@ -116,7 +116,7 @@ def mix(x, u, rows, actuators, keeps_torques, controls):
     one way and alike, as rotors do, the excess of the largest over its bound is taken from all:
     that keeps the torques, and gives up thrust, as the Crazyflie's firmware does.
     """
-    fx, fy, fz = turned_back(quaternion(x[3], x[4], x[5]), u[0], u[1], u[2])
+    fx, fy, fz = rotate_inverse(quaternion(x[3], x[4], x[5]), u[0], u[1], u[2])
     excess = 0.0
     for j in range(actuators):
         i = 8 * j

@@ -119,7 +119,7 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     whole = trace.arrays()
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
-    columns = [i for i in group.channels if i in plant.judged]
+    columns = [i for i in group.channels if i in plant.scored_channels]
     arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
     if (
         plant.pose and group.unit == "m" and trace.x.shape[1] == plant.n

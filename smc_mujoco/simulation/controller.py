@@ -293,8 +293,8 @@ def _measure(address, sim, data, k, t):
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
-        if sim.told != 0:
-            pointer(sim.told)[i] = (
+        if sim.reported != 0:
+            pointer(sim.reported)[i] = (
                 _generalised_disturbance(data, channel) + state.reaction / sim.steps
             )
     return record.FINE
@@ -325,8 +325,8 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
     y = sim.joint.head if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
-    for i in range(n if sim.told != 0 else 0):
-        last_u[i] += pointer(sim.told)[i]  # what the model takes for the force on each joint
+    for i in range(n if sim.reported != 0 else 0):
+        last_u[i] += pointer(sim.reported)[i]  # what the model takes for the force on each joint
     if sim.feedforward.address != 0:
         if _call(sim.feedforward, 0, address + record.AT.instant, address + record.AT.motion) != 0:
             return record.RAISED
@@ -359,14 +359,14 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
                 sim.seen.i = i
                 return record.NOT_FINITE
             buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
-            if sim.told != 0:
-                last_u[i] += pointer(sim.told)[i]
+            if sim.reported != 0:
+                last_u[i] += pointer(sim.reported)[i]
     if sim.mixer != 0:
         _mix(sim, last_u, buffer)
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
         buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
-    for i in range(n if sim.told != 0 else 0):
+    for i in range(n if sim.reported != 0 else 0):
         last_u[i] = log_at(sim.log, k * n + i).u
     return record.FINE
 
@@ -446,8 +446,8 @@ def _measure_channel(address, sim, k, t, i):
         return record.RAISED
     y.f = model.f - sim.drive_drag * v[i] * model.g
     y.g = sim.drive_gain * model.g
-    if sim.told != 0:
-        y.f += pointer(sim.told)[i] * model.g
+    if sim.reported != 0:
+        y.f += pointer(sim.reported)[i] * model.g
     if sim.motors != 0:  # u is the acceleration x''
         y.gq /= y.g
         y.fq -= y.gq * y.f
@@ -755,7 +755,7 @@ def _drag(sim, data, x, y, z):
     place = channel_at(sim.channels, 0)
     first = channel_at(sim.channels, 3).qpos
     q = data.qpos[first], data.qpos[first + 1], data.qpos[first + 2], data.qpos[first + 3]
-    along = rotation.turned_back(q, x, y, z)
+    along = rotation.rotate_inverse(q, x, y, z)
     drag = pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6))
     return rotation.turned(q, drag[0] * along[0], drag[1] * along[1], drag[2] * along[2])
 

@@ -403,7 +403,7 @@ class ScenarioBatch:
         slice_steps = max(1, SLICE_STEPS // channels)
         if self.packed[0].python:
             slice_steps = min(slice_steps, PYTHON_STEPS)
-        if first.plant.own:
+        if first.plant.is_user_model:
             slice_steps = USER_MODEL_STEPS
         while steps:
             count = min(steps, slice_steps)
@@ -492,7 +492,7 @@ class ScenarioBatch:
 
     def lost_contacts(self, i: int) -> bool:
         """Return whether MuJoCo had no room for all contacts of simulation i."""
-        if not (self.model.npair or self.scenarios[i].plant.own):
+        if not (self.model.npair or self.scenarios[i].plant.is_user_model):
             return False
         warnings = self.batch.get_data(i, self.scratch).warning
         return any(warnings[kind].number for kind in FULL_WARNINGS)
@@ -522,7 +522,7 @@ class ScenarioBatch:
         """
         for function in self.packed[i].python:
             if function.error is not None:
-                return function.told(int(self.records["seen"]["i"][i]))
+                return function.reported(int(self.records["seen"]["i"][i]))
         return ""
 
     def law_failure(self, i: int) -> str:
@@ -554,7 +554,7 @@ class ScenarioBatch:
             places = (y, 0, memory.ctypes.data, outputs.ctypes.data)
             function.call(*map(python_functions.pointer, places))
             if function.error is not None:
-                return function.told(channel)
+                return function.reported(channel)
         if record["failure"] == state.LAW_RAISED:
             return ""
         u, sliding = commands[:, channel % width].tolist()

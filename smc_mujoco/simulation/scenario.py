@@ -628,7 +628,9 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """
     given = plant.suggested.get("u_max", (None,))
     limits = [default_u_max(plant)] * len(given)
-    if plant.own and math.inf in plant.limits:  # the bound of one joint's motor is no other's
+    if (
+        plant.is_user_model and math.inf in plant.limits
+    ):  # the bound of one joint's motor is no other's
         given = plant.suggested.get("u_max", (None,) * plant.driven)
         limits = [U_MAX if limit == math.inf else limit for limit in plant.limits]
     bounds = []
@@ -754,7 +756,9 @@ def check_law(s: Resolved) -> None:
     for law in s.law.parts:
         if not suits(law, s.plant):
             cure = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
-            if s.plant.own and suits(law, dataclasses.replace(s.plant, underactuated=True)):
+            if s.plant.is_user_model and suits(
+                law, dataclasses.replace(s.plant, underactuated=True)
+            ):
                 cure = "give each channel a partner"
             raise ScenarioError(
                 f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: "
@@ -975,7 +979,12 @@ def _made_up_bound(s: Scenario) -> str:
     """Return a sentence about the joints of your own model whose force only a default bounds; "" if
     there are none.
     """
-    if s.u_max is not None or not s.plant.own or not s.force_command or s.law.name == "none":
+    if (
+        s.u_max is not None
+        or not s.plant.is_user_model
+        or not s.force_command
+        or s.law.name == "none"
+    ):
         return ""
     driven = range(s.plant.driven)
     taken = s.resolved.u_max

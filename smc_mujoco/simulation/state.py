@@ -217,7 +217,7 @@ SIMULATION = np.dtype(
         ("uses_model", "f8"),
         # address of the other forces on the joints, (n,), which a law with the true model is told;
         # 0: it is not
-        ("told", "i8"),
+        ("reported", "i8"),
         # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`,
         # or `reference`
         ("laws", "i8"),

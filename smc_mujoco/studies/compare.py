@@ -294,9 +294,9 @@ def compare(
     if len(machines) * len(tested) > MAX_BLOCKS:
         by = ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant)
-    unseen = trial.unseen(candidates, seeds)
-    sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
-    boards[:0] = objective_boards(unseen, sources, defaults, relevant)
+    holdout = trial.holdout(candidates, seeds)
+    sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in holdout}
+    boards[:0] = objective_boards(holdout, sources, defaults, relevant)
     return Compared(
         table=table,
         candidates=candidates,

@@ -39,7 +39,7 @@ from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, c
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.leaderboard import Unseen
+from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 
@@ -63,7 +63,7 @@ class Candidate(NamedTuple):
         """Return the law with the gains of the run with this seed."""
         return self.sets[seed % MAX_ITEMS % len(self.sets)]
 
-    def unseen(
+    def holdout(
         self, plant: Plant, goal: Objective, instances: Sequence[int], threads: int | None
     ) -> tuple[np.ndarray, ...]:
         """Return J on instances, whether their runs have arrived, J of one in four at half the
@@ -317,9 +317,9 @@ class Trial(NamedTuple):
         )
         return study(runs, self.folder, True, self.threads, self.progress, half_steps=True)
 
-    def unseen(
+    def holdout(
         self, candidates: Mapping[str, Sequence[Candidate]], count: int
-    ) -> dict[str, Unseen]:
+    ) -> dict[str, Holdout]:
         """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is
         left out.
         """
@@ -330,10 +330,10 @@ class Trial(NamedTuple):
             for plant in self.plants:
                 goal = self._goal(plant, self.starts)
                 least = len(goal.conditions) * goal.duration**2 / 2.0
-                runs = Unseen({}, {}, {}, {}, least)
+                runs = Holdout({}, {}, {}, {}, least)
                 with contextlib.suppress(ScenarioError):
                     for candidate in candidates[plant.name]:
-                        parts = candidate.unseen(plant, goal, self.seeds(count), self.threads)
+                        parts = candidate.holdout(plant, goal, self.seeds(count), self.threads)
                         for of_law, values in zip(runs[:4], parts, strict=True):
                             of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
                         shown.advance(1.0)

@@ -27,7 +27,7 @@ METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 Sources = Mapping[str, tuple[Source, ...]]  # law -> those of its gains
 
 
-class Unseen(NamedTuple):
+class Holdout(NamedTuple):
     """J of the laws on one plant, on instances that no search has seen: law -> (instances,)."""
 
     values: Mapping[str, np.ndarray]  # s^2
@@ -100,14 +100,14 @@ def leaderboard(
 
 
 def objective_boards(
-    unseen: Mapping[str, Unseen], sources: Mapping[str, Sources], defaults: bool, relevant: float
+    holdout: Mapping[str, Holdout], sources: Mapping[str, Sources], defaults: bool, relevant: float
 ) -> list[Board]:
     """Return a board of J on unseen instances for each plant.
 
     `sources` is by plant. Others as in `leaderboard`.
     """
     compared = {}
-    for plant, runs in unseen.items():
+    for plant, runs in holdout.items():
         compared[plant] = Comparison(
             runs.values,
             EPS * runs.least,
@@ -121,7 +121,7 @@ def objective_boards(
     for plant, alone in compared.items():
         comparison = alone.limited(limits)
         untuned = _untuned(sources[plant], defaults)
-        sets = {law: np.atleast_2d(numbers) for law, numbers in unseen[plant].sets.items()}
+        sets = {law: np.atleast_2d(numbers) for law, numbers in holdout[plant].sets.items()}
         seeds = int(comparison.seeds[0])
         boards.append(
             Board(

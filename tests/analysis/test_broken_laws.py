@@ -29,9 +29,9 @@ QUESTIONS = {
 def test_a_law_that_raises_is_told_once(ask):
     with pytest.warns(
         smc.errors.ScenarioWarning, match=r"^late failed by itself in a run: .*too late"
-    ) as told:
+    ) as reported:
         ask(late)
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_a_plant_that_diverges_is_no_broken_law():

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.apart import relative_range
 from smc_mujoco.analysis.chattering import (
     Chattering,
     _assumptions,
@@ -20,6 +19,7 @@ from smc_mujoco.analysis.chattering import (
     rows,
     switches,
 )
+from smc_mujoco.analysis.differ import relative_range
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange

@@ -189,18 +189,18 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
         (smc.grid("duffing", "observer_free", one)[0], False)
         for one in ("constant", "heavy", "encoder")
     ]
-    for case, told in [
+    for case, reported in [
         *cases,
         *((dataclasses.replace(base, **fields), False) for fields in others),
     ]:
         for kind in ("delay", "disturbance", "friction"):
-            assert (margins.MARGIN_KINDS[kind].expected(case) is not None) == told
+            assert (margins.MARGIN_KINDS[kind].expected(case) is not None) == reported
     estimated = dataclasses.replace(base, velocity="filtered_difference")  # changes nothing at rest
-    told = [
+    reported = [
         margins.MARGIN_KINDS[kind].expected(estimated) is not None
         for kind in ("delay", "disturbance")
     ]
-    assert told == [False, True]
+    assert reported == [False, True]
 
 
 POLES = """

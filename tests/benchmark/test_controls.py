@@ -12,7 +12,7 @@ from smc_mujoco.control.law import law_function
 
 
 @law_function(requires_model=True)
-def told(y, gains, memory):
+def reported(y, gains, memory):
     """Log f, and the command of one newton."""
     return 1.0, y.f
 
@@ -36,7 +36,7 @@ def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
     trace = smc.run(
         smc.Scenario(
             plant=plant,
-            law=told(),
+            law=reported(),
             model="true",
             mismatch={"mass": 1.4},
             duration=0.3,
@@ -63,25 +63,25 @@ def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
 
 
 def test_no_law_of_an_entry_is_told_anything():
-    (scenario,) = smc.problem("duffing/noise@1").scenarios(told(), [0])
+    (scenario,) = smc.problem("duffing/noise@1").scenarios(reported(), [0])
     assert scenario.model is None
     assert scenario.noise.position == 0.01
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "reported"),
     [
         ("geometric", False),
         ("oracle", True),
     ],
 )
-def test_the_oracle_of_flight_alone_knows_a_payload(name, told):
+def test_the_oracle_of_flight_alone_knows_a_payload(name, reported):
     one = smc.problem("quadrotor/payload@2")
     law = controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else smc.law(name)
     (scenario,) = controls.scenarios(one, law, [0])
     payload = 0.006 * one.instance(0).disturbance
     assert (scenario.plant.parameters["payload"], scenario.mismatch.get("payload")) == (
-        (payload, None) if told else (0.0, payload)
+        (payload, None) if reported else (0.0, payload)
     )
 
 

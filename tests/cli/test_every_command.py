@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.arguments import told
+from helpers.arguments import reported
 from helpers.words import words
 from typer.models import OptionInfo
 
@@ -174,7 +174,7 @@ def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> dict[
     given = {}
     for name, one in bound.items():
         if type(one) is not type(plain[name]) or one != plain[name]:
-            given[name] = told(one)
+            given[name] = reported(one)
     return {f"{function.__name__}({name})": one for name, one in given.items()}
 
 
@@ -387,18 +387,18 @@ def test_what_a_command_prints_fits_and_what_it_writes_is_parsed_as_ever(
     for path in folder.rglob("*"):
         if path.is_file() and path.parent.name != "parts":
             files.add(path.relative_to(folder))
-    told = [Path(name) for name in re.findall(r"^wrote (\S+)", out, re.MULTILINE)]
+    reported = [Path(name) for name in re.findall(r"^wrote (\S+)", out, re.MULTILINE)]
     beside = {"one.npz", "classical.fmu"}
     untold = {
         file
-        for file in files - set(told)
+        for file in files - set(reported)
         if file.name not in beside and "searches" not in str(file)
     }
-    assert {Path(file).name for file in map(str, untold)} <= {name.name for name in told}
-    for name in told:
+    assert {Path(file).name for file in map(str, untold)} <= {name.name for name in reported}
+    for name in reported:
         assert (folder / name).stat().st_size > 100
-    assert not told or all(
-        name.suffix in (".json", ".pdf", ".tex", ".csv", ".mat", ".parquet") for name in told
+    assert not reported or all(
+        name.suffix in (".json", ".pdf", ".tex", ".csv", ".mat", ".parquet") for name in reported
     )
     parsed = []
     for file in sorted(files):

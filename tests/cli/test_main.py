@@ -563,12 +563,12 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder
 
 def test_a_call_is_told_to_end_in_the_main_thread_alone(call, monkeypatch):
     """Python lets no other thread set what a signal does."""
-    told = []
-    monkeypatch.setattr(main.signal, "signal", lambda *given: told.append(given))
+    reported = []
+    monkeypatch.setattr(main.signal, "signal", lambda *given: reported.append(given))
     ThreadPoolExecutor(1).submit(call, "--version").result()
-    assert told == []
+    assert reported == []
     assert call("--version")[0] == 0
-    assert told == [(signal.SIGTERM, main._end)]
+    assert reported == [(signal.SIGTERM, main._end)]
 
 
 def stop(*_):

@@ -9,7 +9,7 @@ import arms
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.apart import apart
+from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.step_halving import MARK, halved, nudged
 from smc_mujoco.cli import scene as show
 from smc_mujoco.cli import tables
@@ -36,7 +36,7 @@ pytestmark = pytest.mark.quick
     ],
 )
 def test_scores_are_apart_by_more_than_five_percent_of_what_matters(values, least, marked):
-    assert apart(values, least) is marked
+    assert differ(values, least) is marked
 
 
 def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():

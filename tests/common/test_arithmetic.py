@@ -15,7 +15,7 @@ FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log")
 INPUTS = [1e-3 * 1.01**k for k in range(1000)]
 
 
-def told(functions) -> str:
+def reported(functions) -> str:
     values = []
     for f in functions:
         for x in INPUTS:
@@ -24,7 +24,7 @@ def told(functions) -> str:
 
 
 def test_it_is_of_seven_functions_and_of_a_power_with_a_broken_exponent():
-    assert fingerprint.arithmetic() == told(
+    assert fingerprint.arithmetic() == reported(
         [*(getattr(math, name) for name in FUNCTIONS), lambda x: math.pow(x, 0.7)]
     )
 

@@ -112,8 +112,8 @@ def test_claims():
         verdicts={},
         flips=False,
     )
-    (told,) = strict(to_json(document([claim])))["claims"]
-    assert told["beside"] == {"tuned": {"x": "Infinity"}}
+    (reported,) = strict(to_json(document([claim])))["claims"]
+    assert reported["beside"] == {"tuned": {"x": "Infinity"}}
 
 
 def test_rows_of_a_study(tmp_path):

@@ -63,7 +63,7 @@ def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
     text = tabular.plain(TABLE, width)
     rows = text.splitlines()
     assert max(map(len, rows)) <= width
-    told = re.sub(r"[\s─]", "", text)
+    reported = re.sub(r"[\s─]", "", text)
     for word in (
         "Laws&gains",
         "law",
@@ -76,7 +76,7 @@ def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
         "Anote.",
         "Another.",
     ):
-        assert word in told
+        assert word in reported
     ruled = min(k for k, line in enumerate(rows) if "─" in line)
     assert any("law" in line for line in rows[:ruled])
     assert any("pid" in line for line in rows[ruled:])

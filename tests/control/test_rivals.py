@@ -96,10 +96,10 @@ def test_a_law_that_does_not_see_its_bound_swings_up_and_one_that_does_comes_to_
             bounded(name),
             x=(5.0, 0.0),
             limit=1.0,
-            told=told,
+            reported=reported,
             duration=30.0,
         )
-        for told in (None, 1e9)
+        for reported in (None, 1e9)
     )
     assert (np.abs(own.u) == 1.0).sum() > 2000
     assert own.residual() < 0.05

@@ -120,8 +120,8 @@ def test_tables_latex_and_figures_mark_gains_outside_the_theorem(tmp_path):
         metrics=("itae",),
         progress=False,
     )
-    for told in (str(table), table.to_latex(), words(table.plot()), words(smc.figure([trace]))):
-        assert "outside its theorem" in told.replace("\n", " ")
+    for reported in (str(table), table.to_latex(), words(table.plot()), words(smc.figure([trace]))):
+        assert "outside its theorem" in reported.replace("\n", " ")
 
 
 def words(figure):

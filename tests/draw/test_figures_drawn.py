@@ -427,14 +427,14 @@ def test_the_worst_joint_of_an_arm_is_large_and_others_are_sparklines_beside_the
     assert [ax.get_ylabel() for ax in page.axes[:2]] == ["lift e (rad)", "lift u (N·m)"]
     sparks = [ax for ax in page.axes if any(SPARK.fullmatch(text.get_text()) for text in ax.texts)]
     assert [ax.get_ylabel() for ax in sparks] == ["reach e", "u", "turn e", "u"]
-    told = []
+    reported = []
     for ax in sparks:
         for text in ax.texts:
             if SPARK.fullmatch(text.get_text()):
-                told.append(text.get_text())
+                reported.append(text.get_text())
     u = np.max([np.abs(trace.u).max(axis=0) for trace in traces], axis=0)
     sizes = [(error[:, 0], "m"), (u[0], "N"), (error[:, 1], "rad"), (u[1], "N·m")]
-    assert told == [f"{np.max(size):.3g} {unit}" for size, unit in sizes]
+    assert reported == [f"{np.max(size):.3g} {unit}" for size, unit in sizes]
 
 
 @pytest.mark.parametrize(

@@ -56,8 +56,8 @@ def test_a_notebook_shows_a_figure_that_pyplot_does_not_know_of(trace):
     assert Image.open(io.BytesIO(picture)).width == pytest.approx(3.5 * 200, abs=1)
     assert metadata == {"width": pytest.approx(3.5 * 96)}
     formatters = pytest.importorskip("IPython.core.formatters")
-    told, about = formatters.DisplayFormatter().format(figure)
-    assert told["image/png"] == picture
+    reported, about = formatters.DisplayFormatter().format(figure)
+    assert reported["image/png"] == picture
     assert about["image/png"] == metadata
 
 
@@ -102,13 +102,13 @@ def test_show_films_traces_and_frames(cell, trace):
 def probe(film: bytes) -> tuple[int, int, float, int]:
     """Width, height, frames a second and number of frames of an .mp4."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", "pipe:", "-f", "null", "-"]
-    told = subprocess.run(command, input=film, capture_output=True, check=False).stderr.decode()
-    width, height = re.findall(r"Video:.* (\d+)x(\d+)", told)[0]
+    reported = subprocess.run(command, input=film, capture_output=True, check=False).stderr.decode()
+    width, height = re.findall(r"Video:.* (\d+)x(\d+)", reported)[0]
     return (
         int(width),
         int(height),
-        float(re.findall(r"([\d.]+) fps", told)[0]),
-        int(re.findall(r"frame= *(\d+)", told)[-1]),
+        float(re.findall(r"([\d.]+) fps", reported)[0]),
+        int(re.findall(r"frame= *(\d+)", reported)[-1]),
     )
 
 

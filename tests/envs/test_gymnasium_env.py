@@ -179,11 +179,11 @@ def test_a_model_of_one_s_own_keeps_its_floor_in_a_batch(tmp_path):
 def same(theirs, ours):
     """Whether two answers of a step or a reset agree, infos and all."""
     *values, infos = theirs
-    *found, told = ours
+    *found, reported = ours
     for a, b in zip(values, found, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-12)
         assert a.dtype == b.dtype
-    np.testing.assert_equal(told, infos)
+    np.testing.assert_equal(reported, infos)
 
 
 def test_a_batch_resets_as_gymnasium_s_own_vector_does():

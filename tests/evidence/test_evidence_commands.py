@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.arguments import told
+from helpers.arguments import reported
 from helpers.certificates import certificate
 
 import smc_mujoco as smc
@@ -125,7 +125,10 @@ class Notes(list):
 
     def stub(self, monkeypatch, name, gives=None):
         def noted(*given, **options):
-            words = [*map(told, given), *(f"{key}={told(one)}" for key, one in options.items())]
+            words = [
+                *map(reported, given),
+                *(f"{key}={reported(one)}" for key, one in options.items()),
+            ]
             self.append(f"{name.rpartition('.')[2]}({', '.join(words)})")
             if callable(gives):
                 return gives(*given, **options)

@@ -133,13 +133,15 @@ def test_a_lead_is_told_where_the_gains_admit_the_load_and_where_not():
     }
     weaker = runs | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 2.0))
     beyond = cell | {"runs": weaker, "admitted": {"implicit_first_order": [False] * RUNS}}
-    told = [*families.borders([cell, beyond, cell | {"kind": "smoothed"}, cell | {"admitted": {}}])]
-    assert [line.split(": ")[1] for line in told[:2]] == [
+    reported = [
+        *families.borders([cell, beyond, cell | {"kind": "smoothed"}, cell | {"admitted": {}}])
+    ]
+    assert [line.split(": ")[1] for line in reported[:2]] == [
         "9 (9 to 9), 12 runs",
         "2 (2 to 2), 12 runs",
     ]
-    assert told[2].endswith("9 (9 to 9), 12 runs")
-    assert told[3].endswith(" 0 runs")
+    assert reported[2].endswith("9 (9 to 9), 12 runs")
+    assert reported[3].endswith(" 0 runs")
 
 
 def test_gains_admit_a_load_below_k_and_a_rate_below_k2(tmp_path):

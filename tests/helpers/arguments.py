@@ -15,7 +15,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.scene import Scene
 
 
-def told(value: Any) -> str:
+def reported(value: Any) -> str:
     """Return an argument as text: of what the package makes, its name and what differs from the
     default.
     """
@@ -28,7 +28,7 @@ def told(value: Any) -> str:
 def told_items(values: list | tuple) -> str:
     """Return the first items of a list: twelve, or three scenarios."""
     shown = values[: 3 if all(isinstance(one, Scenario) for one in values) else 12]
-    return f"[{', '.join([*map(told, shown), *['...'] * (len(values) > len(shown))])}]"
+    return f"[{', '.join([*map(reported, shown), *['...'] * (len(values) > len(shown))])}]"
 
 
 def told_scenario(scenario: Scenario) -> str:
@@ -38,8 +38,8 @@ def told_scenario(scenario: Scenario) -> str:
     changed = []
     for name, one in given.items():
         if one != getattr(plain, name):
-            changed.append(f"{name}={told(one)}")
-    return f"Scenario({', '.join([told(scenario.plant), told(scenario.law), *changed])})"
+            changed.append(f"{name}={reported(one)}")
+    return f"Scenario({', '.join([reported(scenario.plant), reported(scenario.law), *changed])})"
 
 
 TEXTS: dict[Any, Callable[[Any], str]] = {
@@ -54,7 +54,7 @@ TEXTS: dict[Any, Callable[[Any], str]] = {
     ),
     Path: lambda path: f"Path({path.as_posix()})",
     Mapping: lambda values: (
-        "{" + ", ".join(f"{key}: {told(one)}" for key, one in values.items()) + "}"
+        "{" + ", ".join(f"{key}: {reported(one)}" for key, one in values.items()) + "}"
     ),
     (list, tuple): told_items,
     (bool, int, float, str, range, NoneType, Condition, Starts, Uncertainty): repr,

@@ -144,7 +144,7 @@ def chain(
     g=1.0,
     model=0.0,
     limit=math.inf,
-    told=None,
+    reported=None,
     rates=None,
     memory=(),
 ):
@@ -169,7 +169,7 @@ def chain(
             dt=h,
             f=f,
             g=g,
-            limit=limit if told is None else told,
+            limit=limit if reported is None else reported,
             model=model,
         )
     )

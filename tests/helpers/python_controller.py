@@ -54,7 +54,7 @@ class Controller:
         if scenario.plant.by_mujoco:  # compiles now, not at the first call
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.values)
         self.last_u = np.zeros(n)  # commands of the last sample
-        self.told = np.zeros(n)  # other forces on the joints, for a law with the true model
+        self.reported = np.zeros(n)  # other forces on the joints, for a law with the true model
         self.s = np.zeros(n)
         self.r = np.zeros(n)
         self.a = np.zeros(n)  # estimated accelerations, or NaN
@@ -232,10 +232,10 @@ class Controller:
             v,
             i,
             self.values,
-            self.last_u + self.told,
+            self.last_u + self.reported,
         )
         gain, drag = self.scenario.nominal_drive
-        return f - drag * v[driven] * g + self.told[i] * g, gain * g
+        return f - drag * v[driven] * g + self.reported[i] * g, gain * g
 
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:

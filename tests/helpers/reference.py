@@ -202,7 +202,7 @@ class Loop:
             t = k * self.scenario.control_period + within * self.scenario.physics_step
             at = self.channels
             if self.scenario.model == "true":
-                self.controller.told = self.d + self.forces[1] / self.scenario.steps
+                self.controller.reported = self.d + self.forces[1] / self.scenario.steps
             x = data.sensordata[at["x_sensor"]]
             v = data.sensordata[at["v_sensor"]]
             self.commands[k], self.log["s"][k] = self.controller(k, t, x, v)

@@ -63,16 +63,16 @@ def newton_euler(duration, period, p, wind):
         signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])
         asked = F / 4 + signs @ np.array([M[0] / p["a"], M[1] / p["a"], M[2] / p["c"]]) / 4
         asked = np.clip(asked - max(0.0, asked.max() - p["fmax"]), 0.0, p["fmax"])
-        told = np.array([speed(p, f) for f in asked])
+        reported = np.array([speed(p, f) for f in asked])
 
-        def rates(t, y, told=told):
+        def rates(t, y, reported=reported):
             q = y[3:7] / np.linalg.norm(y[3:7])
             v = y[7:10]
             w = y[10:13]
             W = y[13:]
             turn = Rotation.from_quat(q, scalar_first=True)
             f = np.clip(p["k1"] * W + p["k2"] * W * W, 0.0, p["fmax"])
-            dW = np.array([rotor_rate(a, b, p) for a, b in zip(W, told, strict=True)])
+            dW = np.array([rotor_rate(a, b, p) for a, b in zip(W, reported, strict=True)])
             torque = np.array([f @ places[:, 1], -f @ places[:, 0], -p["c"] * f @ spins])
             h = p["Jr"] * spins @ W
             dh = p["Jr"] * spins @ dW
@@ -204,28 +204,28 @@ def speed(p, thrust):
     ids=str,
 )
 @pytest.mark.parametrize(
-    ("first", "told"),
+    ("first", "reported"),
     [
         (500.0, 2000.0),
         (2000.0, 300.0),
         (900.0, 900.0),
     ],
 )
-def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
+def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, reported):
     rise, rise2, fall, fall2 = numbers
     rotor = np.zeros((), ROTOR).view(np.recarray)
     rotor.rise, rotor.rise2, rotor.fall, rotor.fall2 = numbers
 
     def rate(t, W):
-        if told >= W[0]:
+        if reported >= W[0]:
             a = rise
             b = rise2
         else:
             a = fall
             b = fall2
-        return [a * (told - W[0]) + b * (told**2 - W[0] ** 2)]
+        return [a * (reported - W[0]) + b * (reported**2 - W[0] ** 2)]
 
-    found, slope = spun.py_func(rotor, first, told, 0.3)
+    found, slope = spun.py_func(rotor, first, reported, 0.3)
     expected = solve_ivp(
         rate,
         (0.0, 0.3),
@@ -240,8 +240,8 @@ def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
         rel=1e-6,
         abs=1e-9,
     )
-    half = spun.py_func(rotor, first, told, 0.1)[0]
-    assert spun.py_func(rotor, half, told, 0.2)[0] == pytest.approx(found, rel=1e-12)
+    half = spun.py_func(rotor, first, reported, 0.1)[0]
+    assert spun.py_func(rotor, half, reported, 0.2)[0] == pytest.approx(found, rel=1e-12)
 
 
 def falling(**fields):

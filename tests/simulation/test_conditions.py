@@ -15,7 +15,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.conditions import NAMED, applicable, find_condition, from_file, parse
 from smc_mujoco.simulation.grid import GRID_SEEDS
-from smc_mujoco.studies.run_key import condition as told
+from smc_mujoco.studies.run_key import condition as reported
 from smc_mujoco.studies.run_key import key
 
 pytestmark = pytest.mark.quick
@@ -168,7 +168,9 @@ def test_a_grid_has_conditions_of_ones_own_under_their_names():
         gains="default",
         duration=1.0,
     )
-    assert [told(s) for s in made] == ["nominal"] * 2 + ["worn gear"] * 2 + ["noise + coulomb"] * 2
+    assert [reported(s) for s in made] == ["nominal"] * 2 + ["worn gear"] * 2 + [
+        "noise + coulomb"
+    ] * 2
     assert made[2].friction == (smc.Coulomb(0.05),)
     # the name goes with the fields
     assert dataclasses.replace(made[2], friction=None).condition is None

@@ -478,9 +478,9 @@ def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
     assert said == [reference.run(alone).failure for alone in many]
     for words in said:
         s = words.partition("s = ")[2].partition(" in ")[0]
-        told = f"{SAYS[function].format(s=s)} in channel 0, at t = 0.005 s"
+        reported = f"{SAYS[function].format(s=s)} in channel 0, at t = 0.005 s"
         of_3_14 = re.sub(r"expected a nonnegative input, got [-.\d]+", "math domain error", words)
-        assert of_3_14 == f"law '{function.__name__}' {told}"
+        assert of_3_14 == f"law '{function.__name__}' {reported}"
     assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
 
 

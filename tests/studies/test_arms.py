@@ -132,20 +132,20 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
     them.
     """
     page = (ROOT / "docs" / "arms.md").read_text(encoding="utf-8")
-    told = {
+    reported = {
         name + outer.replace(" on ", "_").replace(" ", "_"): cells.split(" | ")
         for name, outer, cells in re.findall(
             r"^\| `(\w+)`( on .*?)? \| (.* \| .* \| .*) \|$", page, re.MULTILINE
         )
     }
-    assert [*told] == [*arms.GAINS]
+    assert [*reported] == [*arms.GAINS]
     for name in arms.GAINS:
         runs = []
         for seed in range(1, 13):
             runs.append(arms.scenario(task, arms.gained(name), seed, payload))
         traces = smc.run(runs)
         if arm_study.unstable(runs, traces):
-            assert told[name][column : column + 2] == ["unstable"] * 2, name
+            assert reported[name][column : column + 2] == ["unstable"] * 2, name
             continue
         rms = np.median([1e3 * smc.metrics.tip_scores(trace)["rms_error"] for trace in traces])
         rate = np.median(
@@ -154,5 +154,5 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
                 for trace in traces
             ]
         )
-        assert f"{rms:.3g}" == told[name][column].split()[0], name
-        assert float(told[name][column + 1]) == pytest.approx(rate, rel=0.005), name
+        assert f"{rms:.3g}" == reported[name][column].split()[0], name
+        assert float(reported[name][column + 1]) == pytest.approx(rate, rel=0.005), name

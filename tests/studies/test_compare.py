@@ -162,8 +162,8 @@ def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
         given = {"out": tmp_path, "seed": seed, **SHORT}
         made = smc.compare(["classical", "pid"], "duffing", "noise", 3, **given)
         tables.append(made.table)
-        (unseen, *_) = made.leaderboard
-        tables.append(unseen.entries[0].interval.median)
+        (holdout, *_) = made.leaderboard
+        tables.append(holdout.entries[0].interval.median)
     seeds = []
     for table in tables[::2]:
         seeds.append(table.column("seed")[:3].tolist())

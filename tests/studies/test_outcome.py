@@ -146,8 +146,10 @@ def test_over_several_conditions_each_is_told():
         },
     )
     assert runs.up_to() == "a strong, b and d weak, c none"
-    told = "3 of 4 settle under weak (not c), 1 of 4 under middle (not b, c and d), 2 of 4 under "
-    assert runs.who("settle") == f"{told}strong (not b and c)"
+    reported = (
+        "3 of 4 settle under weak (not c), 1 of 4 under middle (not b, c and d), 2 of 4 under "
+    )
+    assert runs.who("settle") == f"{reported}strong (not b and c)"
     assert runs["weak"].least("settling_time") == "a and d tied (0.400 s)"
     assert runs.changes("settling_time", "weak", "strong") == (
         "a 0.400 to 0.600 s, b 0.800 s to never, c never, d 0.400 s"

@@ -172,9 +172,9 @@ def test_a_planted_region_is_found_and_told_by_the_other_half(seed):
     failed[256:] &= np.arange(256) % 2 == 0  # the half that tells
     [region] = module.regions(space("a", "b", "c"), shares, failed)
     assert sorted(region.cuts) == [module.Cut(0, low=0.625), module.Cut(2, high=0.5)]
-    told = slice(256, None)
-    assert region.rate.n == inside[told].sum()
-    assert region.rate.median * region.rate.n == pytest.approx(failed[told].sum())
+    reported = slice(256, None)
+    assert region.rate.n == inside[reported].sum()
+    assert region.rate.median * region.rate.n == pytest.approx(failed[reported].sum())
     assert region.rate.low < 0.5 < region.rate.high
     assert region.outside.median == 0.0
     assert region.outside.n == 256 - region.rate.n

@@ -326,7 +326,7 @@ def objectives(
         )
     cases = []
     for law, number in zip(laws, numbers, strict=True):
-        cases += goal.unseen(plant, law, number)
+        cases += goal.holdout(plant, law, number)
     if halved:
         cases = list(map(halved_step, cases))
     traces = run(cases, threads)

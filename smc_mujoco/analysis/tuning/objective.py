@@ -53,7 +53,7 @@ BUDGET, MAX_BUDGET = 64, 10_000  # evaluations of a search, for each gain
 Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
 Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]
 MAX_TUNING_SEED = 10**9
-UNSEEN = MAX_SEARCHES * (MAX_TUNING_SEED + 1)  # instances from this one on belong to no search
+HOLDOUT = MAX_SEARCHES * (MAX_TUNING_SEED + 1)  # instances from this one on belong to no search
 # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
 FAILURE_COST = 1e9
 
@@ -197,7 +197,7 @@ class Objective:
         """
         e = np.abs(pose_errors(x, r))
         t = case.control_period * np.arange(len(x))
-        turns = [i for i in case.plant.judged if i >= 3]
+        turns = [i for i in case.plant.scored_channels if i >= 3]
         parts = e[:, :3].sum(axis=1), e[:, turns].sum(axis=1)
         tracking = sum(float(np.trapezoid(t * part, t)) / (float(part[0]) or 1.0) for part in parts)
         variation = np.abs(np.diff(u, axis=0)).sum(axis=0) / (np.array(case.limits) * self.duration)
@@ -207,9 +207,9 @@ class Objective:
         """Return the terms of a run that fails at a time, s."""
         return FAILURE_COST * (2.0 - min(time / self.duration, 1.0)), 0.0
 
-    def unseen(self, plant: Plant | str, law: Component, instance: int) -> list[Scenario]:
+    def holdout(self, plant: Plant | str, law: Component, instance: int) -> list[Scenario]:
         """Return one run for each condition, of an instance 0, 1, ... that no search uses."""
-        return self._instance(plant, law, UNSEEN + instance)
+        return self._instance(plant, law, HOLDOUT + instance)
 
     def excess(self, case: Scenario) -> float:
         """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to

@@ -300,9 +300,11 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     else:
         below = None
     words = arm.key(traces) if arms else None
-    told = [track.told for track in tracks]
+    reported = [track.reported for track in tracks]
     title = frames.title
-    caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
+    caption = Caption(
+        traces, names, colours, title, above, scale, scales, reported, row, below, words
+    )
     charts = Charts(traces, names, colours, (width, low), scale)
     with Stage(tracks, above, caption.room, frames.camera, caption.apart, scale) as stage:
         caption.place(stage.boxes)

@@ -89,7 +89,7 @@ def fields(doc):
     """
     plant = doc["plant"]
     law = doc["law"]
-    told = [
+    reported = [
         ("the certificate", doc),
         ("plant", plant),
         ("law", law),
@@ -97,12 +97,12 @@ def fields(doc):
         (law["name"], law["gains"]),
     ]
     for part in doc["parts"]:
-        told.append((part["theorem"], part))
+        reported.append((part["theorem"], part))
         for condition in part["conditions"]:
             more = condition.keys() - {"name", "margin"}
             known = not more or condition["name"] == "restoring"
             need(known and more in (set(), {"boxes"}, {"at"}), "a condition")
-    for name, given in told:
+    for name, given in reported:
         known = set(FIELDS[name].split())
         need(known - MAY_LACK <= given.keys() <= known, f"the fields of {name}")
     need(type(plant["n"]) is int, "the number of channels")
@@ -122,18 +122,18 @@ def margins(part, derived):
     A margin is derived as (its value, the size of the terms that it sums). Its sign is that of the
     value derived, or of the one told where it was checked elsewhere.
     """
-    told = {}
+    reported = {}
     for condition in part["conditions"]:
-        told[condition["name"]] = condition["margin"]
-    same = len(told) == len(part["conditions"]) and list(told) == list(derived)
+        reported[condition["name"]] = condition["margin"]
+    same = len(reported) == len(part["conditions"]) and list(reported) == list(derived)
     need(same, f"the conditions of {part['theorem']}")
     kept = []
     for name, margin in derived.items():
-        value, terms = margin or (arb(told[name]), 0)
-        equal(told[name], value, f"the margin of {name}", terms)
+        value, terms = margin or (arb(reported[name]), 0)
+        equal(reported[name], value, f"the margin of {name}", terms)
         zero = bool(value == 0)
         kept.append(bool(value > 0) or (zero and name != "reaching"))
-        need((told[name] >= 0) is (kept[-1] or zero), f"the sign of {name}")
+        need((reported[name] >= 0) is (kept[-1] or zero), f"the sign of {name}")
     need(part["holds"] is all(kept), "whether it holds")
 
 
@@ -266,18 +266,18 @@ def saturated(doc, part, e, f):
     return derived
 
 
-def restoring(told, e, f):
+def restoring(reported, e, f):
     """Check that (1 - m) sigma(c x) >= phi(x) for x > 0, by boxes without a gap.
 
     Or that it is false at a place, with the margin m < 0 there.
     """
-    m = arb(told["margin"])
+    m = arb(reported["margin"])
     c = f.c
-    if "at" in told:
-        need(told["at"] > 0 and m < 0, "the place where the law is too weak")
-        share = 1 - phi(e, arb(told["at"])) / sigma(f, c * told["at"])
+    if "at" in reported:
+        need(reported["at"] > 0 and m < 0, "the place where the law is too weak")
+        share = 1 - phi(e, arb(reported["at"])) / sigma(f, c * reported["at"])
         return equal(m, share, "the margin of restoring", 1)
-    boxes = told["boxes"]
+    boxes = reported["boxes"]
     joined = all(box[1] == following[0] for box, following in pairwise(boxes))
     whole = joined and boxes[0][0] == 0 and boxes[-1][1] is None
     need(whole, "boxes from 0 to infinity, without a gap")

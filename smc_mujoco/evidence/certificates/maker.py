@@ -102,7 +102,12 @@ def _check(scenario: Scenario) -> None:
     """Raise ScenarioError for a scenario that no theorem here is about."""
     plant = scenario.plant
     law = scenario.law
-    if law.name not in LAWS or law.function is None or plant.name not in PLANTS or plant.own:
+    if (
+        law.name not in LAWS
+        or law.function is None
+        or plant.name not in PLANTS
+        or plant.is_user_model
+    ):
         raise ScenarioError(
             f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} "
             f"on one of {', '.join(PLANTS)}"
@@ -232,10 +237,10 @@ def _saturated(
         "x^4": -C / 4.0,
     }
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
-    for told in _restoring(loop, terms):
-        if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
-            part = _part("saturated PD", margins | {"restoring": told["margin"]}, V=V)
-            part["conditions"][1] = told
+    for reported in _restoring(loop, terms):
+        if margins := judge("saturated PD", {"V": V, "conditions": [None, reported]}):
+            part = _part("saturated PD", margins | {"restoring": reported["margin"]}, V=V)
+            part["conditions"][1] = reported
             return part
     raise ScenarioError(
         "found no boxes that prove that the law is stronger than the plant: give other gains"

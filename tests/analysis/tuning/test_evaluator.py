@@ -30,7 +30,7 @@ def test_objectives_are_those_of_each_law_on_its_own_unseen_instance():
     assert there.tolist() == [False] * 3  # in half a second
     expected = []
     for i, law in enumerate(laws):
-        expected.append(objective_of(smc.run(BRIEF.unseen("duffing", law, i))))
+        expected.append(objective_of(smc.run(BRIEF.holdout("duffing", law, i))))
     assert found == pytest.approx(expected, rel=1e-12)
     assert found[0] != found[2]
     again, _ = objectives("duffing", laws[:1], BRIEF, instances=[2])

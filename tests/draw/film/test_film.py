@@ -170,8 +170,10 @@ def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> sm
 
 def moods(trace: smc.Trace, fps: float = 30.0) -> list[tuple[str | None, int]]:
     """What a film tells of a trace, and for how many frames."""
-    told = states.timeline(trace, seconds(trace, fps))
-    return [(now.words if now else None, len(list(run))) for now, run in itertools.groupby(told)]
+    reported = states.timeline(trace, seconds(trace, fps))
+    return [
+        (now.words if now else None, len(list(run))) for now, run in itertools.groupby(reported)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -301,8 +303,8 @@ def test_words_never_flicker():
 
 
 def test_a_failed_machine_has_no_state(stuck):
-    told = states.timeline(failed(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
-    assert [now is None for now in told] == [False, False, True, True]
+    reported = states.timeline(failed(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
+    assert [now is None for now in reported] == [False, False, True, True]
     assert states.timeline(film.finite(failed(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
 
 

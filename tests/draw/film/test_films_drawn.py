@@ -71,9 +71,9 @@ def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_thei
         first,
         failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no"),
     ]
-    told = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
+    reported = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
     caption = Caption(
-        traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), told, row
+        traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), reported, row
     )
     machines = np.array([[90.0, 80, 190, 180], [140, 120, 340, 230]])
     caption.place(machines)
@@ -94,7 +94,7 @@ def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_thei
         (1.9, True, 4.0),
     ):
         pen.clear()
-        caption.over(paper(), time, (False, gone), (told[0][0], told[1][gone]), speed)
+        caption.over(paper(), time, (False, gone), (reported[0][0], reported[1][gone]), speed)
         said.append("\n".join(pen))
     for picture, clock, pace_words, other, fill, state, changed in zip(
         said,
@@ -343,8 +343,8 @@ def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
         "force": -pushes,
     }
     times = np.arange(0.0, 4.0, 1 / 30)
-    told = states.timeline(dataclasses.replace(trace, **moved), times)
-    words = [now and now.words for now in told]
+    reported = states.timeline(dataclasses.replace(trace, **moved), times)
+    words = [now and now.words for now in reported]
     for second, expected in (
         (0, moving),
         (1, resting),
@@ -375,16 +375,16 @@ def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
     )
     v = np.column_stack([0.0 * two.t, 1.0 + two.t])
     force = np.column_stack([two.t, 0.0 * two.t])
-    (told,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
-    assert told
-    assert told.words == "1 of 2 stick, 1 of 2 in play"
+    (reported,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
+    assert reported
+    assert reported.words == "1 of 2 stick, 1 of 2 in play"
 
 
 def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     """Of a film, a clip and a still; the pictures are blank."""
     asked = []
     wrote = []
-    told = []
+    reported = []
 
     def blank(frames):
         times = frames.clock.times
@@ -409,7 +409,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
 
     monkeypatch.setattr(film, "pictures", blank)
     monkeypatch.setattr(film, "encoder", encoder)
-    monkeypatch.setattr(progress.Bar, "advance", lambda bar, work: told.append(work))
+    monkeypatch.setattr(progress.Bar, "advance", lambda bar, work: reported.append(work))
     trace = machine("duffing", duration=5.0)
     size = (320, 180)
     looks = {
@@ -441,7 +441,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     assert asked[1][:3] == (0.5, 0.5, 1)
     assert asked[2][1] < 5.0  # a clip ends where little happens any more
     assert wrote == [((180, 320), 10.0), ((720, 1280), 30.0)]
-    assert set(told) == {1}
+    assert set(reported) == {1}
     with Image.open(tmp_path / "b.webp") as clip, Image.open(tmp_path / "b.png") as still:
         assert clip.n_frames == 6
         assert clip.size == size

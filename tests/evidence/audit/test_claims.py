@@ -161,7 +161,7 @@ def test_universal_claims_are_those_of_the_list():
 
 
 def entry(id="900", found=(YES,), note=""):
-    told = {
+    reported = {
         "text": "text",
         "where": "here",
         "measured": "this",
@@ -169,7 +169,9 @@ def entry(id="900", found=(YES,), note=""):
         "note": note,
     }
     return Entry(
-        id=id, evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found, **told
+        id=id,
+        evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found,
+        **reported,
     )
 
 
@@ -229,13 +231,13 @@ def test_if_all_checks_hold_the_nearest_to_its_limit_decides(only):
 def test_claims_are_json_without_loss(only):
     only(entry(found=[check("a", math.inf, "<", 1.0), check("b", math.nan, "<", -math.inf), ASIDE]))
     text = to_json(audit.document(claims(gains="study")))
-    told = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))[
+    reported = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))[
         "claims"
     ][0]
-    assert float(told["numbers"]["study"]["a"]["value"]) == math.inf
-    assert math.isnan(float(told["numbers"]["study"]["b"]["value"]))
-    assert told["beside"] == {"study": {"theory": 7.0}}
-    assert told["flips"] is False
+    assert float(reported["numbers"]["study"]["a"]["value"]) == math.inf
+    assert math.isnan(float(reported["numbers"]["study"]["b"]["value"]))
+    assert reported["beside"] == {"study": {"theory": 7.0}}
+    assert reported["flips"] is False
 
 
 # the list
@@ -247,17 +249,17 @@ def test_every_claim_of_the_list_is_there_once_and_in_order():
 
 def test_late_claims_come_last_and_every_one_is_reported(only):
     order = []
-    told = []
+    reported = []
     late = dataclasses.replace(
         entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES]
     )
     only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
     made = audit.audit(
-        gains=["study", "tuned"], report=lambda done, whole: told.append((done, whole))
+        gains=["study", "tuned"], report=lambda done, whole: reported.append((done, whole))
     )
     assert [one.id for one in made.claims] == ["1", "2"]
     assert order == ["2", "1", "2", "1"]
-    assert told == [(done, 4) for done in range(1, 5)]
+    assert reported == [(done, 4) for done in range(1, 5)]
 
 
 # runs
@@ -486,12 +488,12 @@ def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
 
 
 @pytest.mark.parametrize(
-    ("quick", "told"),
+    ("quick", "reported"),
     [
         (True, "; here, quickly, 51 x 51 points"),
         (False, "one pendulum"),
     ],
 )
-def test_a_quick_audit_tells_what_it_measures_instead(quick, told):
+def test_a_quick_audit_tells_what_it_measures_instead(quick, reported):
     (claim,) = claims(only=["18"], gains="study", quick=quick)
-    assert claim.measured.endswith(told)
+    assert claim.measured.endswith(reported)

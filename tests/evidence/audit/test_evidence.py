@@ -83,7 +83,7 @@ def done(folder):
 
 
 @pytest.fixture(scope="module")
-def told(done):
+def reported(done):
     return evidence.document(done)
 
 
@@ -106,53 +106,53 @@ def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tm
     assert here.read_bytes() == there.read_bytes()
 
 
-def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(told):
-    first, second = told["claims"]
+def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(reported):
+    first, second = reported["claims"]
     assert first["verdict"] == REFUTED
     assert first["verdicts"] == {"slow": REFUTED, "tuned": REFUTED}
     assert set(first["numbers"]["slow"]) == {"pushed: TV rate", "noise: TV rate", "largest |x|"}
     assert [len(names) for names in first["runs"].values()] == [2, 2]
     runs = []
     for name in first["runs"]["slow"]:
-        runs.append(told["runs"][name])
+        runs.append(reported["runs"][name])
     assert {run["condition"] for run in runs} == {"pushed", "noise"}
     assert [run["gains"] for run in runs] == [{"k": 3.0, "c": 2.0}] * 2
     for run in runs:
         assert len(run["scores"]) == len(run["trace"]) == 16
-    assert len({run["trace"] for run in told["runs"].values()}) == len(told["runs"]) == 4
+    assert len({run["trace"] for run in reported["runs"].values()}) == len(reported["runs"]) == 4
     assert "not_sealed" in second
     assert "a timing" in second["not_sealed"]
     assert {"numbers", "verdict"}.isdisjoint(second)
-    assert told["counts"] == {REFUTED: 1}
-    assert set(told["paper"]["files"]) == {"paper.toml", "claims.py"}
+    assert reported["counts"] == {REFUTED: 1}
+    assert set(reported["paper"]["files"]) == {"paper.toml", "claims.py"}
 
 
-def test_it_holds_what_is_recorded(told, snapshot):
+def test_it_holds_what_is_recorded(reported, snapshot):
     """Its fields and words.
 
     Hashes, numbers of runs, versions and the order of runs, by their hashes, are left out.
     """
     runs = sorted(
-        told["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]])
+        reported["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]])
     )
-    lines = [f"claim {json.dumps(one)}" for one in told["claims"]] + [
+    lines = [f"claim {json.dumps(one)}" for one in reported["claims"]] + [
         f"run {json.dumps(one)}" for one in runs
     ]
     lines += [
         f"{name} {json.dumps(one)}"
-        for name, one in told.items()
+        for name, one in reported.items()
         if name not in ("claims", "runs", "software")
     ]
-    text = "\n".join([*lines, f"software {' '.join(told['software'])}"])
+    text = "\n".join([*lines, f"software {' '.join(reported['software'])}"])
     text = re.sub('"[0-9a-f]{16}(?:[0-9a-f]{48})?"', '"HASH"', text)
     assert re.sub(r'("(?:value|k|c)": )[\d.e-]+', r"\1#", text) == snapshot
 
 
-def test_nothing_of_the_machine_is_in_it(told, folder):
-    text = json.dumps(told)
+def test_nothing_of_the_machine_is_in_it(reported, folder):
+    text = json.dumps(reported)
     assert str(folder.parent) not in text
     assert "arithmetic" not in text
-    assert "/" not in "".join(told["paper"]["files"])
+    assert "/" not in "".join(reported["paper"]["files"])
 
 
 def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_condition(monkeypatch):

@@ -113,8 +113,8 @@ def test_mutants_reverse_the_command_drop_it_forget_or_switch():
 )
 def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
     done = []
-    told = lambda done_now, whole: done.append((done_now, whole))  # noqa: E731
-    assert survivors(paper(function, asked), report=told) == ({"1": kept} if kept else {})
+    reported = lambda done_now, whole: done.append((done_now, whole))  # noqa: E731
+    assert survivors(paper(function, asked), report=reported) == ({"1": kept} if kept else {})
     assert done == [(1, 5), (2, 5), (3, 5), (4, 5)]
 
 

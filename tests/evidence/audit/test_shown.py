@@ -29,14 +29,14 @@ BESIDE = Beside("theory", 7.0)
 
 
 def claim(id, evidence, **about):
-    told = {
+    reported = {
         "text": f"sentence {id} of <this> & $that$",
         "where": "p. 1",
         "measured": "m",
         "holds_if": "h",
         "read": "abstract",
     }
-    return judged(Statement(id=id, **told | about), evidence)
+    return judged(Statement(id=id, **reported | about), evidence)
 
 
 @pytest.fixture(scope="module")

@@ -72,10 +72,10 @@ FACTS = {
 def test_a_certificate_says_what_its_theorems_say(name):
     made, (*facts, proven, ranges) = SAID[name], FACTS[name]
     assert [made.theorem, made.holds, made.stable, made.bound, made.surface] == facts
-    told = []
+    reported = []
     for sentence in made.sentences:
-        told.append(sentence.startswith("proven by"))
-    assert told[: len(proven)] == proven
+        reported.append(sentence.startswith("proven by"))
+    assert reported[: len(proven)] == proven
     assert [value for _, _, value, _ in made.ranges] == pytest.approx(ranges, abs=1e-3)
     assert ("nothing is proven under |d| <= 2 N" in made.sentences) == name.startswith("nothing")
     assert "sampling" in made.sentences[-1]

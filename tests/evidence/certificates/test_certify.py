@@ -71,16 +71,16 @@ def margins(made, theorem="saturated PD"):
 
 
 def test_margins_are_those_of_the_formulas():
-    told = margins(certificate("inverted_pendulum"))
+    reported = margins(certificate("inverted_pendulum"))
     p = smc.plant("inverted_pendulum").parameters
     gains = gain_sets.law("inverted_pendulum", "observer_free").gains
     weight = p["m"] * p["grav"] * p["l"]
-    assert told["damping"] == p["b"]
-    assert told["actuator"] == pytest.approx(6.0 - gains["lam"])
-    assert told["local"] == pytest.approx(gains["lam"] * gains["k1"] - weight)
+    assert reported["damping"] == p["b"]
+    assert reported["actuator"] == pytest.approx(6.0 - gains["lam"])
+    assert reported["local"] == pytest.approx(gains["lam"] * gains["k1"] - weight)
     x = np.linspace(1e-3, 20.0, 100_000)
     exact = (1.0 - weight * np.sin(x) / (gains["lam"] * np.tanh(gains["k1"] * x))).min()
-    assert exact - 2e-4 < told["restoring"] < exact
+    assert exact - 2e-4 < reported["restoring"] < exact
 
 
 @pytest.mark.slow
@@ -642,14 +642,14 @@ def test_no_run_contradicts_a_certificate(law):
             made = smc.audits.certify(one, smc.Uncertainty(disturbance=d0))
         except smc.ScenarioError:  # the gains are too small
             continue
-        told = list(claims(made, d0, rng))
+        reported = list(claims(made, d0, rng))
         runs = []
-        for x0, v0, push, _ in told:
+        for x0, v0, push, _ in reported:
             runs.append(dataclasses.replace(one, x0=x0, v0=v0, disturbance=push or ()))
-        for (x0, v0, push, end), trace in zip(told, smc.run(runs), strict=True):
+        for (x0, v0, push, end), trace in zip(reported, smc.run(runs), strict=True):
             late = np.abs(trace.x[-8000:]).max()
             assert late <= end, (plant, gains, d0, x0, v0, push)
-        seen += len(told)
+        seen += len(reported)
     assert seen > 3
 
 

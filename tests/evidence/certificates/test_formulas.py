@@ -113,20 +113,20 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
         "local": 2.3 * 1.7 - A - B,
     }
 
-    def margins(told, e=e, mechanism="equation", **changes):
-        data = {"V": V | changes, "conditions": [None, told]}
+    def margins(reported, e=e, mechanism="equation", **changes):
+        data = {"V": V | changes, "conditions": [None, reported]}
         found = checker.saturated({"plant": {"mechanism": mechanism}}, data, e, f)
         return {name: value and float(value[0]) for name, value in found.items()}
 
-    told = {"margin": 0.9999 * share, "boxes": boxes}
-    assert margins(told) == pytest.approx(expected | {"coupling": 0.5})
-    springs = margins(told, mechanism="springs")
+    reported = {"margin": 0.9999 * share, "boxes": boxes}
+    assert margins(reported) == pytest.approx(expected | {"coupling": 0.5})
+    springs = margins(reported, mechanism="springs")
     assert springs["coupling"] == pytest.approx(-0.5 * 0.2172336282112216)
     with pytest.raises(checker.Refused, match="x from"):
-        margins(told | {"margin": 1.001 * share})
+        margins(reported | {"margin": 1.001 * share})
     for name, value in V.items():
         with pytest.raises(checker.Refused, match=re.escape(f"the coefficient of {name} in V")):
-            margins(told, **{name: value + 1e-6})
+            margins(reported, **{name: value + 1e-6})
     feeding = {"x^4": C / 4}  # of a spring that feeds the motion, where the law is too weak
     assert margins(weak, feeds, **feeding)["restoring"] is None
     strong = {"margin": 1.0 - (A * math.sin(0.5) + 0.5 * B - 0.125 * C) / (2.3 * math.tanh(0.85))}
@@ -282,5 +282,7 @@ def test_the_bound_of_a_disturbance_is_that_of_its_sum(signals, bound):
 
 def test_a_law_that_is_bounded_is_too_weak_far_from_a_force_that_grows():
     terms = {"B": 0.05}  # so weak that the law is stronger wherever the search looks for its margin
-    told = next(maker._restoring(loop("observer_free", terms), [0.0, terms["B"], 0.0, 0.0, 0.0]))
-    assert told["margin"] < 0.0 < told["at"]
+    reported = next(
+        maker._restoring(loop("observer_free", terms), [0.0, terms["B"], 0.0, 0.0, 0.0])
+    )
+    assert reported["margin"] < 0.0 < reported["at"]

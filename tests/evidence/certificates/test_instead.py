@@ -28,7 +28,7 @@ DECIMALS = r"-?\d+\.\d+"
 
 
 @functools.cache
-def told(command):
+def reported(command):
     """The numbers that a command prints."""
     pytest.importorskip("flint")
     plant, *options = shlex.split(command)[2:]
@@ -57,16 +57,16 @@ def test_each_claim_that_does_not_hold_has_a_sentence_and_a_command():
 @pytest.mark.parametrize("command", COMMANDS)
 def test_numbers_of_sentences_are_those_of_their_certificates(command):
     for claim in (one for one in CLAIMS.values() if one.shown_by == command):
-        assert set(re.findall(DECIMALS, claim.instead)) <= told(command), claim.id
+        assert set(re.findall(DECIMALS, claim.instead)) <= reported(command), claim.id
 
 
 @pytest.mark.slow
 def test_numbers_of_the_page_are_those_of_certificates():
     shown = set().union(
-        *map(told, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"])
+        *map(reported, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"])
     )
-    shown |= told("smc-mujoco certify inverted_pendulum_network")
-    shown |= told("smc-mujoco certify inverted_pendulum --law classical --disturbance 1")
+    shown |= reported("smc-mujoco certify inverted_pendulum_network")
+    shown |= reported("smc-mujoco certify inverted_pendulum --law classical --disturbance 1")
     tables = "\n".join(
         line for line in PAGE.partition("## Claim by claim")[0].splitlines() if line.startswith("|")
     )

@@ -59,8 +59,8 @@ def test_readme_counts_the_claims_of_gaber_s_paper():
         if claim.whose == "paper":
             own.append(known("gaber")[id][0])
     sentence = r"Of (\d+) claims of .*, (\d+) are refuted and (\d+) not shown"
-    told = re.findall(sentence, (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert told == [(str(len(own)), str(own.count("refuted")), str(own.count("not shown")))]
+    reported = re.findall(sentence, (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert reported == [(str(len(own)), str(own.count("refuted")), str(own.count("not shown")))]
 
 
 @pytest.mark.slow
@@ -70,8 +70,8 @@ def test_full_verdicts_are_those_of_the_page(name):
     shown = known(name)
     assert [*found] == [*shown]
     for id, (verdict, words) in found.items():
-        told, said = shown[id]
-        assert (verdict, NUMBER.split(words)) == (told, NUMBER.split(said)), id
+        reported, said = shown[id]
+        assert (verdict, NUMBER.split(words)) == (reported, NUMBER.split(said)), id
         numbers = []
         for text in (words, said):
             numbers.append([float(one) for one in NUMBER.findall(text)])

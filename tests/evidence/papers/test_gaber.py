@@ -43,15 +43,15 @@ Drawn = Callable[[Scenario], tuple[np.ndarray, np.ndarray]]  # x and u of channe
 class Stub(Runs):
     """Runs that were never made: what they scored, and what their traces hold, is told."""
 
-    def __init__(self, told: Told | None = None, drawn: Drawn | None = None, **about):
+    def __init__(self, reported: Told | None = None, drawn: Drawn | None = None, **about):
         super().__init__(GABER, "study", **about)
-        self.told = told
+        self.reported = reported
         self.drawn = drawn
 
     def scores(self, scenarios):
-        assert self.told is not None
+        assert self.reported is not None
         others = dict.fromkeys((m.name for m in metrics()), 0.0) | {"settling_time": 1.0}
-        return [others | self.told(scenario) for scenario in scenarios]
+        return [others | self.reported(scenario) for scenario in scenarios]
 
     def traces(self, scenarios):
         return [self.trace(scenario) for scenario in scenarios]
@@ -134,7 +134,7 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
     """
     monkeypatch.setattr(measured, "nanoseconds", lambda laws: {law: 1.0 + len(law) for law in laws})
 
-    def told(s: Scenario) -> dict[str, float]:
+    def reported(s: Scenario) -> dict[str, float]:
         found = lots(s, *(m.name for m in metrics()))
         small = 0.7 * TOLERATED_ERROR * max(map(abs, s.resolved.x0)) * (1.0 + 10.0 * s.input_delay)
         return found | {"ultimate_bound": small * found["ultimate_bound"]}
@@ -143,7 +143,7 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
     for id, quick in [(id, id == "18") for id in GABER.claims] + [
         (id, True) for id in ("20", "24", "61")
     ]:
-        runs = Stub(told, drawn_by_lot, quick=quick).of(GABER.claims[id])
+        runs = Stub(reported, drawn_by_lot, quick=quick).of(GABER.claims[id])
         groups: dict[tuple[str, ...], list[Check | Beside]] = {}
         for one in measure(GABER.claims[id], runs):
             if isinstance(one, Check):
@@ -160,15 +160,17 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
     assert said == snapshot
 
 
-def by_law(**told: tuple[float, ...]) -> Told:
+def by_law(**reported: tuple[float, ...]) -> Told:
     """Law -> settling time, overshoot."""
-    return lambda s: dict(zip(("settling_time", "overshoot"), told[s.law.name], strict=False))
+    return lambda s: dict(zip(("settling_time", "overshoot"), reported[s.law.name], strict=False))
 
 
-def by_plant(metric: str, **told: float) -> Told:
+def by_plant(metric: str, **reported: float) -> Told:
     """Plant -> a metric of the paper's law; 1 for every other law."""
     return lambda s: {
-        metric: told.get(s.plant.name, told.get("others", 0.0)) if s.law.name == OURS else 1.0
+        metric: reported.get(s.plant.name, reported.get("others", 0.0))
+        if s.law.name == OURS
+        else 1.0
     }
 
 
@@ -178,11 +180,11 @@ def coupled(
     """Overshoot at the three couplings."""
     at = {0.0: 0, 0.5: 1, 5.0: 2}
 
-    def told(s: Scenario) -> dict[str, float]:
+    def reported(s: Scenario) -> dict[str, float]:
         over = {OURS: ours, CLASSICAL: classical}[s.law.name][at[s.plant.parameters["kc"]]]
         return {"overshoot": over, "settling_time": slower if s.law.name == CLASSICAL else 1.0}
 
-    return told
+    return reported
 
 
 never = math.inf
@@ -243,9 +245,11 @@ SCORED = [
 ]
 
 
-def of_ours(metric: str, rate: float, **told: float) -> Told:
+def of_ours(metric: str, rate: float, **reported: float) -> Told:
     """A metric of the paper's law as a multiple of lambda; of other laws as told."""
-    return lambda s: {metric: rate * s.law.gains["lam"] if s.law.name == OURS else told[s.law.name]}
+    return lambda s: {
+        metric: rate * s.law.gains["lam"] if s.law.name == OURS else reported[s.law.name]
+    }
 
 
 def estimated_later(ratio: float) -> Told:
@@ -287,13 +291,13 @@ def swinging(plain: float, conditioned: float) -> Told:
     """Overshoot of super-twisting, which never settles, and of the conditioned one: both must swing
     furthest.
     """
-    told = {
+    reported = {
         OURS: (1.0, 1.5),
         CLASSICAL: (1.0, 0.0),
         ADAPTIVE: (1.0, 2.0),
         HOSMC: (never, plain),
     }
-    return by_law(**told, **{CONDITIONED: (1.0, conditioned), UNCLAMPED: (never, 9.0)})
+    return by_law(**reported, **{CONDITIONED: (1.0, conditioned), UNCLAMPED: (never, 9.0)})
 
 
 def among(ours: tuple[float, float]) -> Told:
@@ -353,7 +357,9 @@ SCORED += [
 @pytest.mark.parametrize("id", dict.fromkeys(id for id, *_ in SCORED))
 def test_a_verdict_follows_the_scores_to_the_threshold(id):
     verdicts = [
-        (judged(Stub(told), id), expected) for which, told, expected in SCORED if which == id
+        (judged(Stub(reported), id), expected)
+        for which, reported, expected in SCORED
+        if which == id
     ]
     assert [found for found, _ in verdicts] == [expected for _, expected in verdicts]
 
@@ -426,8 +432,8 @@ def test_the_plane_shows_a_rise_of_v_if_there_is_one(rate, expected, monkeypatch
 )
 def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
     """Claim 14; another may be slower."""
-    told = {OURS: time, CLASSICAL: 1.0}
-    monkeypatch.setattr(measured, "nanoseconds", lambda laws: dict.fromkeys(laws, 9.0) | told)
+    reported = {OURS: time, CLASSICAL: 1.0}
+    monkeypatch.setattr(measured, "nanoseconds", lambda laws: dict.fromkeys(laws, 9.0) | reported)
     assert judged(Stub(), "14") == expected
 
 
@@ -441,9 +447,9 @@ def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
 )
 def test_rejection_needs_a_small_deviation_and_no_better_rival(away, residuals, expected):
     """Claim 46: |x0| is 2 m, so 5 % of it is 0.1 m."""
-    told = {OURS: 1.0} | dict(zip(LAWS[1:], residuals, strict=True)) | {UNCLAMPED: 9.0}
+    reported = {OURS: 1.0} | dict(zip(LAWS[1:], residuals, strict=True)) | {UNCLAMPED: 9.0}
     drawn = lambda s: (np.where(T > 5.0, away if s.disturbance else 0.0, 0.0), 0.0 * T)  # noqa: E731
-    assert judged(Stub(lambda s: {"ultimate_bound": told[s.law.name]}, drawn), "46") == expected
+    assert judged(Stub(lambda s: {"ultimate_bound": reported[s.law.name]}, drawn), "46") == expected
 
 
 def test_fluctuation_tells_the_numbers_of_a_sum_of_two_tones():
@@ -555,8 +561,8 @@ def test_a_law_that_comes_to_rest_only_with_a_delay_tolerates_none():
 )
 def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
     """Claim 61: as much is not more."""
-    told = {OURS: ours} | dict(zip(LAWS[1:], rivals, strict=True)) | {UNCLAMPED: 0.0}
-    assert judged(Stub(tolerating(told)), "61") == expected
+    reported = {OURS: ours} | dict(zip(LAWS[1:], rivals, strict=True)) | {UNCLAMPED: 0.0}
+    assert judged(Stub(tolerating(reported)), "61") == expected
 
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
@@ -601,12 +607,12 @@ def opposite(s: Scenario) -> dict[str, float]:
 def test_the_cells_that_runs_decide_follow_them():
     """Chattering, delay and smoothness; classical's cells against itself cannot change."""
     rows = ("no chattering", "delay-tolerant", "smoothness")
-    for told, expected in (
+    for reported, expected in (
         (paper_like, True),
         (opposite, False),
     ):
         cells = []
-        for one in of(Stub(told), "T"):
+        for one in of(Stub(reported), "T"):
             if one.what.startswith(rows):
                 cells.append(one)
         assert len(cells) == 12

@@ -196,12 +196,12 @@ if __name__ == "__main__":
     else:
         known = {}
     known |= {name: written(name) for name in sys.argv[1:] or shipped()}
-    told = {
+    reported = {
         name: ",\n".join(
             f"  {json.dumps(id)}: {json.dumps(one)}" for id, one in known[name].items()
         )
         for name in shipped()
         if name in known
     }
-    lines = (f" {json.dumps(name)}: {{\n{claims}\n }}" for name, claims in told.items())
+    lines = (f" {json.dumps(name)}: {{\n{claims}\n }}" for name, claims in reported.items())
     GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")

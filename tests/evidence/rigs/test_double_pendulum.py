@@ -104,8 +104,8 @@ def test_the_twin_predicts_unused_torques_better_than_the_published_model(known,
 
 def test_torques_of_unused_records_are_as_far_off_as_the_page_tells(known):
     text = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
-    told = np.array(re.findall(r"(\.\d{3}) / (\.\d{3})", text), float).reshape(2, 3, 2)
-    for rig, rows in zip((RIG, RIG.set("model_1_0")), told, strict=True):
+    reported = np.array(re.findall(r"(\.\d{3}) / (\.\d{3})", text), float).reshape(2, 3, 2)
+    for rig, rows in zip((RIG, RIG.set("model_1_0")), reported, strict=True):
         for name, row in zip(UNUSED[:3], rows, strict=True):
             found = np.sqrt(np.mean(apart(rig, known[name]) ** 2, axis=1))
             np.testing.assert_allclose(found, row, rtol=0.0, atol=6e-4)

@@ -28,7 +28,7 @@ MACHINES = (
 )
 
 
-def told(value):
+def reported(value):
     """Return a value of a rig as text: what its plant, laws and parts differ in from their
     defaults.
     """
@@ -36,13 +36,13 @@ def told(value):
         case Quantity():
             text = f"{value.value:.9g} {value.unit} in [{value.least:.9g}, {value.most:.9g}]"
         case Plant():
-            text = f"{value.name} {told(value.parameters)}"
+            text = f"{value.name} {reported(value.parameters)}"
         case Component():
-            text = f"{value.name} {told(value.gains)}, {value.source}"
+            text = f"{value.name} {reported(value.gains)}, {value.source}"
         case Mapping():
-            text = "{" + ", ".join(f"{name}: {told(one)}" for name, one in value.items()) + "}"
+            text = "{" + ", ".join(f"{name}: {reported(one)}" for name, one in value.items()) + "}"
         case tuple():
-            text = f"({', '.join(map(told, value))})"
+            text = f"({', '.join(map(reported, value))})"
         case float():
             text = f"{value:.9g}"
         case _ if dataclasses.is_dataclass(value):
@@ -52,7 +52,7 @@ def told(value):
             plain = {one.name: one.default for one in dataclasses.fields(value)}
             text = (
                 f"{type(value).__name__} "
-                f"{told({name: one for name, one in given.items() if one is not plain[name]})}"
+                f"{reported({name: one for name, one in given.items() if one is not plain[name]})}"
             )
         case _:
             text = "a function" if callable(value) else str(value)
@@ -65,7 +65,7 @@ def lines(rig):
     """
     sources: dict[str, list[str]] = {}
     for name, one in rig.quantities.items():
-        sources.setdefault(one.source, []).append(f"{name} {told(one)}")
+        sources.setdefault(one.source, []).append(f"{name} {reported(one)}")
     yield from (f"{source}: {'; '.join(known)}" for source, known in sources.items())
     for field in dataclasses.fields(Rig):
         value = getattr(rig, field.name)
@@ -74,10 +74,10 @@ def lines(rig):
                 parts = value
             else:
                 parts = (value,)
-            yield from (f"{field.name}: {told(one)}" for one in parts)
-    yield f"scenario {'; '.join(f'{name}: {told(one)}' for name, one in machine(rig).items())}"
+            yield from (f"{field.name}: {reported(one)}" for one in parts)
+    yield f"scenario {'; '.join(f'{name}: {reported(one)}' for name, one in machine(rig).items())}"
     if rig.dynamics:
-        yield f"dynamics: {told(rig.dynamics(Values(**rig.values)))}"
+        yield f"dynamics: {reported(rig.dynamics(Values(**rig.values)))}"
 
 
 def machine(rig):
@@ -100,4 +100,4 @@ def test_each_quantity_changes_the_machine(name):
     rig = rig.with_values({key: float(one[1] or one[2]) for key, one in ends.items()})
     for key in rig.quantities:
         other = rig.with_values({key: 0.5 * rig.values[key]})
-        assert told(machine(other)) != told(machine(rig)), key
+        assert reported(machine(other)) != reported(machine(rig)), key

@@ -24,7 +24,7 @@ def records():
     return [dict(np.load(DATA / f"qube-{name}.npz")) for name in RECORDS]
 
 
-def told(row):
+def reported(row):
     """The fits of a row of docs/rigs.md, (columns, records)."""
     page = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
     (cells,) = re.findall(rf"^\| {row} \| (.*) \|$", page, re.MULTILINE)
@@ -41,11 +41,11 @@ def test_the_twin_and_the_published_numbers_fit_records_as_the_page_tells():
         for rig in (RIG, RIG.set("driver"))
     )
     within = {"rtol": 0.0, "atol": 0.1}
-    np.testing.assert_allclose(ours[:, :4], told("06, 18, 30, 42"), **within)
-    np.testing.assert_allclose(ours[:, 4:], told("11"), **within)
+    np.testing.assert_allclose(ours[:, :4], reported("06, 18, 30, 42"), **within)
+    np.testing.assert_allclose(ours[:, 4:], reported("11"), **within)
     medians = np.median(published[:, :4], axis=1, keepdims=True)
     np.testing.assert_allclose(
-        medians, told("published numbers, arm m r²/12: median of these"), **within
+        medians, reported("published numbers, arm m r²/12: median of these"), **within
     )
 
 

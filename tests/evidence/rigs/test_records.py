@@ -171,8 +171,10 @@ def found(rig="emps", correlation=0.0, **changes):
 
 
 def test_a_fall_is_a_text_in_a_file(tmp_path):
-    told = found(fits=({"x": Fall(8.44), "u": Fall(8.44)},)).save(tmp_path / "a.json")
-    assert json.loads(told.read_text())["fits"] == [{"x": "falls at 8.4 s", "u": "falls at 8.4 s"}]
+    reported = found(fits=({"x": Fall(8.44), "u": Fall(8.44)},)).save(tmp_path / "a.json")
+    assert json.loads(reported.read_text())["fits"] == [
+        {"x": "falls at 8.4 s", "u": "falls at 8.4 s"}
+    ]
 
 
 FREE = {name: smc.rig("emps").values[name] for name in smc.rig("emps").free}

@@ -14,7 +14,7 @@ from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
-from benchmarks import stepper_figures as told
+from benchmarks import stepper_figures as reported
 from smc_mujoco.evidence.rigs import firmware
 from smc_mujoco.evidence.rigs.firmware import FOUR_STATES, LINEAR, STEPS, TICK, TWO_STATES
 from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS
@@ -106,7 +106,7 @@ def test_a_move_is_a_trapezoid_that_ends_at_its_target():
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_the_compiled_run_is_that_of_the_reference_loop(law):
     fields = {
-        "x0": told.start(3),
+        "x0": reported.start(3),
         "seed": 3,
         "duration": 2.5,
     } | {"reference": smc.Step(0.2, 1.0)}
@@ -123,7 +123,7 @@ def test_no_run_falls_before_its_law_acts(name):
     rig = smc.rig("stepper_furuta")
     twin = rig.set(name) if name in rig.published else rig.members()[name]
     for law in rig.laws[:3]:
-        one = twin.scenario(law, x0=told.start(8), seed=8, duration=0.1)
+        one = twin.scenario(law, x0=reported.start(8), seed=8, duration=0.1)
         assert np.abs(smc.run(one).u[:, 0]).max() > 0.0
 
 
@@ -133,7 +133,7 @@ def test_a_machine_that_tips_stops_its_motor():
     trace = smc.run(rig.scenario(x0=(0.0, 0.03), duration=2.0))
     assert abs(trace.x[-1, 1]) > 1.0
     assert (trace.u[-100:] == 0.0).all()
-    assert told.fallen(told.figures(record(alpha=lambda t: 40.0 + 0.0 * t)))
+    assert reported.fallen(reported.figures(record(alpha=lambda t: 40.0 + 0.0 * t)))
 
 
 def record(
@@ -145,7 +145,7 @@ def record(
     rates = ((f(t + h) - f(t - h)) / (2.0 * h) for f in (alpha, theta))
     measured = (alpha(t), next(rates), theta(t), next(rates))
     columns = (1e3 * t, *measured, 10.0 + 0.0 * t, speed(t), STEPS * theta(t), 0.0 * t)
-    return dict(zip(told.COLUMNS, columns, strict=True))
+    return dict(zip(reported.COLUMNS, columns, strict=True))
 
 
 def test_the_figures_of_known_signals_are_theirs():
@@ -154,7 +154,7 @@ def test_the_figures_of_known_signals_are_theirs():
     """
     w = 2.0 * math.pi * 50.0 * 26.0 / 256.0
     lag = math.radians(80.0)
-    found = told.figures(
+    found = reported.figures(
         record(
             lambda t: 2.0 * np.sin(w * t),
             lambda t: -np.sin(w * t),
@@ -177,7 +177,7 @@ def test_rests_count_from_a_fifth_of_a_second():
         phase = np.round(t / 0.02) % 32
         return np.where((phase < 5) | ((phase >= 12) & (phase < 17)), 60.0, 49.0)
 
-    found = told.figures(record(speed=speed, duration=67.0))
+    found = reported.figures(record(speed=speed, duration=67.0))
     assert found["running"] == pytest.approx(10 / 32, abs=0.01)
     assert found["resting"] == pytest.approx(15 / 32, abs=0.01)
     assert found["starts"] == pytest.approx(60.0 * 2 / 0.64, rel=0.02)
@@ -189,7 +189,7 @@ def test_seconds_count_about_their_mean_and_rests_by_their_angle():
     def alpha(t):
         return np.where(t < 43.0, 2.0, np.where(t < 63.0, -4.0, 9.0 * np.sin(math.tau * t)))
 
-    found = told.figures(
+    found = reported.figures(
         record(alpha=alpha, speed=lambda t: np.where(t < 63.0, 0.0, 60.0), duration=73.0)
     )
     assert found["second_50"] == pytest.approx(0.0, abs=1e-9)
@@ -203,9 +203,9 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
     accelerations.
     """
     rig = smc.rig("stepper_furuta")
-    one = rig.scenario(x0=told.start(1), seed=1, duration=25.0)
+    one = rig.scenario(x0=reported.start(1), seed=1, duration=25.0)
     trace = smc.run(one)
-    rows = told.logged(trace)
+    rows = reported.logged(trace)
     gaps = np.diff(rows["timestamp_ms"])
     assert pytest.approx(np.median(gaps)) == 20.0
     assert np.sum(gaps > 25.0) == pytest.approx(25, abs=2)  # a pause a second
@@ -214,33 +214,33 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
     theta = np.degrees(arm + rig.values["upright_error"])
     assert np.abs(rows["theta_deg"] - theta).max() < 0.5 * 360.0 / 4096 + 0.02
     assert np.abs(rows["vel_cmd_steps_s"]).max() > 50.0
-    loop = told.figures(rows)
+    loop = reported.figures(rows)
     assert loop["alpha_rms"] < 2.0
 
 
 def test_a_recording_is_loaded_and_one_that_lacks_a_column_refused(tmp_path):
     rows = record(np.sin)
     path = tmp_path / "hold.csv"
-    for names in (told.COLUMNS, told.COLUMNS[:-1]):
+    for names in (reported.COLUMNS, reported.COLUMNS[:-1]):
         with path.open("w", newline="") as file:
             out = csv.writer(file)
             out.writerow(names)
             out.writerows(np.column_stack([rows[name] for name in names]).tolist())
-        if names == told.COLUMNS:
-            loaded = told.load(path)
+        if names == reported.COLUMNS:
+            loaded = reported.load(path)
             for name in rows:
                 assert np.array_equal(loaded[name], rows[name])
     with pytest.raises(smc.ScenarioError, match="lacks the column position_clamped"):
-        told.load(path)
+        reported.load(path)
 
 
-@pytest.mark.parametrize("condition", told.RECORDED)
+@pytest.mark.parametrize("condition", reported.RECORDED)
 def test_the_recorded_figures_are_those_of_the_machines_file(condition):
     file = RECORDS / f"linear_{condition}.csv"
     if not file.exists():
         pytest.skip("the recordings have no licence, and are not here")
-    found = told.figures(told.load(file))
-    for name, value in told.RECORDED[condition].items():
+    found = reported.figures(reported.load(file))
+    for name, value in reported.RECORDED[condition].items():
         assert found[name] == pytest.approx(value, rel=0.05), name
 
 
@@ -256,23 +256,23 @@ def test_the_recorded_figures_are_those_of_the_machines_file(condition):
 )
 def test_laws_are_in_the_machines_order_or_not(medians, fell, expected):
     by_law = {}
-    for law, value in zip(told.ORDER, medians, strict=True):
+    for law, value in zip(reported.ORDER, medians, strict=True):
         run = {"alpha_rms": value, "alpha_max": 99.0 if law in fell else 1.0}
         by_law[law] = [run] * 3
-        assert len(told.standing([run], "alpha_rms")) == (law not in fell)
-    assert told.ordered({"set 1": by_law}) == (expected[0], pytest.approx(expected[1]))
+        assert len(reported.standing([run], "alpha_rms")) == (law not in fell)
+    assert reported.ordered({"set 1": by_law}) == (expected[0], pytest.approx(expected[1]))
 
 
 @pytest.mark.slow
 def test_the_plain_twin_has_the_machines_order_reversed(monkeypatch):
     rig = dataclasses.replace(smc.rig("stepper_furuta"), ensemble=())
-    monkeypatch.setitem(told.CONDITIONS, "hold", {"duration": 22.0})
-    plain = told.predicted(rig, "hold", 1, told.PLAIN)
-    assert told.ordered(plain) == (0, -1.0)
+    monkeypatch.setitem(reported.CONDITIONS, "hold", {"duration": 22.0})
+    plain = reported.predicted(rig, "hold", 1, reported.PLAIN)
+    assert reported.ordered(plain) == (0, -1.0)
     alone = {}
     for law, runs in plain["set 1"].items():
-        alone[law] = told.standing(runs, "alpha_rms")
+        alone[law] = reported.standing(runs, "alpha_rms")
     assert alone["linear"] > 100.0 * max(alone["two_states"], alone["four_states"])
-    whole = told.predicted(rig, "hold", 2)["set 1"]
-    assert {law: len(runs) for law, runs in whole.items()} == dict.fromkeys(told.ORDER, 2)
-    assert told.standing(whole["two_states"], "alpha_rms").min() > 100.0 * alone["two_states"]
+    whole = reported.predicted(rig, "hold", 2)["set 1"]
+    assert {law: len(runs) for law, runs in whole.items()} == dict.fromkeys(reported.ORDER, 2)
+    assert reported.standing(whole["two_states"], "alpha_rms").min() > 100.0 * alone["two_states"]

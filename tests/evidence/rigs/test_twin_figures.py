@@ -37,11 +37,11 @@ def test_whether_a_record_was_used_follows_from_the_rig(monkeypatch):
 
 def test_every_record_that_a_rig_was_identified_from_has_rows():
     # two rigs are one double pendulum, with the same records
-    told = set()
+    reported = set()
     for one in twin_figures.rows():
-        told.add(one.record)
+        reported.add(one.record)
     for name in smc.rigs():
-        assert set(smc.rig(name).identified_from) <= told, name
+        assert set(smc.rig(name).identified_from) <= reported, name
 
 
 def test_the_rows_of_emps_are_those_of_its_program():
@@ -56,16 +56,16 @@ def test_the_rows_of_emps_are_those_of_its_program():
 def test_rows_are_those_of_the_records():
     record = dict(np.load(DATA / "double_pendulum-acrobot-mcpilco-01.npz"))
     twin = smc.rig("realaigym_acrobot")
-    told = row("realaigym_acrobot", "acrobot 2", "tau_meas2 rms")
+    reported = row("realaigym_acrobot", "acrobot 2", "tau_meas2 rms")
     ((predicted, measured, _),) = twin.predictions([record])
-    assert told.machine == pytest.approx(np.std(measured["tau_meas2"]), rel=1e-3)
-    assert told.twin == pytest.approx(np.std(predicted["tau_meas2"]), rel=1e-3)
-    assert told.fit == pytest.approx(twin.fit(record)["tau_meas2"], abs=0.05)
+    assert reported.machine == pytest.approx(np.std(measured["tau_meas2"]), rel=1e-3)
+    assert reported.twin == pytest.approx(np.std(predicted["tau_meas2"]), rel=1e-3)
+    assert reported.fit == pytest.approx(twin.fit(record)["tau_meas2"], abs=0.05)
     sets = []
     for one in twin.members().values():
         sets.append(np.std(one.predictions([record])[0][0]["tau_meas2"]))
-    assert told.low == pytest.approx(min(sets), rel=1e-3)
-    assert told.high == pytest.approx(max(sets), rel=1e-3)
+    assert reported.low == pytest.approx(min(sets), rel=1e-3)
+    assert reported.high == pytest.approx(max(sets), rel=1e-3)
 
 
 def test_a_summary_is_over_the_known_figures_of_whole_twins():
@@ -103,10 +103,10 @@ def test_the_page_has_the_rows_of_benchmarks():
     for one in twin_figures.summaries(twin_figures.rows()):
         (cells,) = re.findall(rf"^\| `{one.rig}` \| {one.use} \| (.*) \|$", page, re.MULTILINE)
         count, apart, inside, published = cells.split("|")
-        told = []
+        reported = []
         for number in re.findall(r"[\d.]+", apart):
-            told.append(float(number))
-        assert told == pytest.approx([100.0 * one.median, 100.0 * one.largest], abs=0.5)
+            reported.append(float(number))
+        assert reported == pytest.approx([100.0 * one.median, 100.0 * one.largest], abs=0.5)
         assert int(count) == one.count
         assert int(inside) == one.inside
         assert published.strip() == (

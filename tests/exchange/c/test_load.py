@@ -336,8 +336,8 @@ def test_what_cannot_be_loaded_is_one_sentence(file):
 
 
 def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
-    told = tmp_path / "pid"
-    write = f'FILE *f = fopen("{told}", "w"); fprintf(f, "%d", (int)getpid()); fclose(f);'
+    reported = tmp_path / "pid"
+    write = f'FILE *f = fopen("{reported}", "w"); fprintf(f, "%d", (int)getpid()); fclose(f);'
     headers = "#include <stdio.h>\n#include <unistd.h>\n"
     waits = law("out[0] = 0.0;", f"{headers}int smc_setup(void) {{ {write} for (;;) pause(); }}")
     starts = law(
@@ -354,7 +354,7 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
             with pytest.raises(smc.ScenarioError, match=words):
                 tried.result()
     with pytest.raises(ProcessLookupError):
-        os.kill(int(told.read_text()), 0)
+        os.kill(int(reported.read_text()), 0)
 
 
 @pytest.mark.parametrize(

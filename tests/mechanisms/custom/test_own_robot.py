@@ -60,10 +60,10 @@ def test_a_text_says_of_a_channel_what_python_says(folder):
 
 
 def bounds(text, **fields):
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as reported:
         warnings.simplefilter("always")
         scenario = smc.Scenario(plant=as_plant(text), **(RUN | fields))
-    return scenario.resolved.u_max, [str(warning.message) for warning in told]
+    return scenario.resolved.u_max, [str(warning.message) for warning in reported]
 
 
 def one(y, gains, memory):

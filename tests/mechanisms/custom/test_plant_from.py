@@ -409,8 +409,8 @@ def test_u_is_the_force_on_the_joint_within_the_motor_s_limits(arm):
     )
     assert scenario.limits == (4.0, 50.0)
     for trace in smc.run(scenario), plain.run(scenario):
-        for told in trace.u, trace.applied, trace.force[1:]:
-            np.testing.assert_array_equal(told, [[4.0, 30.0]] * len(told))
+        for reported in trace.u, trace.applied, trace.force[1:]:
+            np.testing.assert_array_equal(reported, [[4.0, 30.0]] * len(reported))
         np.testing.assert_array_equal(trace.s, [[4.0, 50.0]] * len(trace.s))  # as the law was told
         assert smc.score(trace)["max_u"] == 30.0
     weaker = smc.run(dataclasses.replace(scenario, u_max=3.0))
@@ -495,8 +495,8 @@ def test_a_law_with_anti_wind_up_knows_its_motor_s_limit(arm):
         duration=8.0,
         disturbance=load,
     )
-    told, large = smc.run([base, dataclasses.replace(base, u_max=100.0)])
-    np.testing.assert_array_equal(told.x, large.x)
+    reported, large = smc.run([base, dataclasses.replace(base, u_max=100.0)])
+    np.testing.assert_array_equal(reported.x, large.x)
     assert np.abs(large.u).max() == 1.0
 
 
@@ -770,9 +770,9 @@ def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
       <compiler angle="radian"/><actuator><motor joint="j"/></actuator></mujoco>"""
     with pytest.warns(smc.errors.ScenarioWarning, match="solreflimit") as caught:
         plant = smc.plant_from(text, ["j"])
-    told = float(re.search(r"by ([0-9.]+) mrad", str(caught[0].message))[1])
+    reported = float(re.search(r"by ([0-9.]+) mrad", str(caught[0].message))[1])
     trace = smc.run(smc.Scenario(plant=plant, law="none", x0=39.9, v0=speed, duration=0.5))
-    assert 1e-3 * told * speed == pytest.approx(trace.x.max() - 40.0, rel=0.1)
+    assert 1e-3 * reported * speed == pytest.approx(trace.x.max() - 40.0, rel=0.1)
     hard = text.replace(solref, ".004 1")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -37,7 +37,7 @@ def relative_range(values: Sequence[float], least: float = 0.0, first_order: boo
     return width / smallest if smallest else math.inf
 
 
-def apart(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> bool:
+def differ(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> bool:
     """Return whether a number of a run and of the same run again are more than 5 % apart, see
     `relative_range`.
     """
