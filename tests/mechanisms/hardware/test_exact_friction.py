@@ -248,27 +248,6 @@ def test_a_step_of_constant_forces_has_the_mean_and_first_moment_of_its_friction
     assert held == pytest.approx(h * np.mean(np.abs(smooth + forces) < 1e-9), abs=h * 2e-4)
 
 
-@pytest.mark.parametrize("law", ["classical", "adaptive", "super_twisting"])
-def test_scores_do_not_depend_on_the_step(law):
-    """Steady errors of the published gains; 5.68e-4 and 1.42e-3 by an integration of this pendulum
-    by events.
-    """
-    made = smc.paper.comparison(
-        "inverted_pendulum", duration=5.0, changes={"friction": smc.Coulomb(0.1)}
-    )
-    scenario = next(scenario for scenario in made.values() if scenario.law.name == law)
-    traces = smc.run([dataclasses.replace(scenario, physics_step=PERIOD / k) for k in (1, 4)])
-    scores = [smc.score(trace) for trace in traces]
-    for name in ("steady_error", "ultimate_bound", "settling_time", "stick_time"):
-        assert scores[0][name] == pytest.approx(
-            scores[1][name],
-            rel=0.005,
-            abs=1e-9,
-        )
-    known = {"classical": 5.68e-4, "adaptive": 1.42e-3, "super_twisting": 0.0}
-    assert scores[0]["steady_error"] == pytest.approx(known[law], rel=0.005, abs=1e-9)
-
-
 EXTRAS = [
     {
         "actuator": smc.Lag(2e-3),

@@ -5,7 +5,6 @@ servos under load.
 import dataclasses
 import math
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -94,23 +93,6 @@ def test_the_pandas_friction_is_the_published_one_in_a_thousand_states():
             trace.reaction[1:], -sigmoid(trace.v[:-1], P1, P2, P3), rtol=0, atol=1e-12
         )
     assert np.ptp([trace.v for trace in traces]) > 2.0
-
-
-def test_a_coasting_joint_slows_down_by_the_formula():
-    """v' = -F(v)/M for 1 s, against the formula's integral."""
-    from scipy.integrate import solve_ivp
-
-    trace = flywheel(
-        1.0,
-        1.5,
-        friction=smc.hardware.Sigmoid(P1[3], P2[3], P3[3]),
-        duration=1.0,
-    )
-    exact = solve_ivp(
-        lambda t, v: -sigmoid(v, P1[3], P2[3], P3[3]), (0, 1), [1.5], t_eval=trace.t, rtol=1e-10
-    )
-    # of a step of 0.25 ms, of first order
-    np.testing.assert_allclose(trace.v[:, 0], exact.y[0], atol=3e-4)
 
 
 # a joint at rest
@@ -418,134 +400,3 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
                         assert friction.value(0.0, motor, load, numbers)[1:] == pytest.approx(
                             [-held, held], rel=0, abs=1e-12
                         )
-
-
-@pytest.mark.parametrize("model", ["m1", "m4", "m6"])
-def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
-    """One step of a heavy pendulum: weight and disturbance are outside, the motor's torque is that
-    of a step before.
-    """
-    servo = smc.hardware.servo("mx106", model)
-    plant = smc.plant(
-        "pendulum_network",
-        n=2,
-        kc=0.0,
-        b=0.0,
-    )
-    common = {
-        "plant": plant,
-        "friction": servo.friction,
-        "feedforward": smc.Constant(1.5),
-        "integrator": "implicitfast",
-        "law": "none",
-    }
-    start = {
-        "x0": (0.9, -0.4),
-        "v0": (0.8, 1.2),
-        "disturbance": smc.Constant(-0.6),
-    }
-    trace = smc.run(
-        smc.Scenario(
-            **common,
-            **start,
-            physics_step=1e-3,
-            duration=4e-3,
-        )
-    )
-    p = plant.values({})
-    for k in range(4):
-        load = -p.m * p.grav * p.l * np.sin(trace.x[k]) - 0.6
-        motor = np.full(2, 1.5 if k else 0.0)
-        loss, damping = published(model, SERVOS["mx106"][model], motor, load, trace.v[k])
-        np.testing.assert_allclose(
-            trace.reaction[k + 1], -(np.sign(trace.v[k]) * loss + damping * trace.v[k]), atol=1e-12
-        )
-
-
-@pytest.mark.parametrize("model", ["m1", "m2", "m4", "m6"])
-@pytest.mark.parametrize("name", ["mx106", "mx64"])
-def test_a_loop_that_comes_to_rest_on_a_servo_leaves_what_its_friction_can_hold(name, model):
-    """Motor and weight together are at the bound of the friction at rest; bristles that stick
-    unbent would give way before they hold, and rest 3 % nearer to the target.
-    """
-    servo = smc.hardware.servo(name, model)
-    trace = smc.run(
-        smc.Scenario(
-            plant=smc.plant("inverted_pendulum", m=0.4, l=0.3),
-            law=smc.law("computed_torque", kp=20.0, kd=2.0),
-            actuator=servo.motor,
-            friction=servo.friction,
-            x0=0.5,
-            duration=3.0,
-        )
-    )
-    motor = trace.u[-1, 0]
-    load = 0.4 * 9.81 * 0.3 * math.sin(trace.x[-1, 0])
-    numbers = dict(zip(servo.friction.names, servo.friction.parameters(0), strict=True))
-    low, high = servo.friction.value(0.0, motor, load, SimpleNamespace(**numbers))[1:]
-    assert trace.x[-1, 0] > 0.003
-    assert motor + load == pytest.approx(low, rel=1e-4)
-    assert high == -low
-
-
-def ends(model, weight):
-    """The torques at which a servo that holds a weight, N m, lifts it, and lets it fall."""
-    servo = smc.hardware.servo("mx106", model)
-    plant = smc.plant(
-        "pendulum_network",
-        n=2,
-        kc=0.0,
-        b=0.0,
-    )
-    p = plant.values({})
-    found = []
-    level = math.asin(weight / (p.m * p.grav * p.l))
-    for slope in (0.2, -0.2):
-        u = smc.signals.TimeSeries([0.0, 10.0], [weight, weight + 10.0 * slope])
-        common = {
-            "plant": plant,
-            "law": "none",
-            "x0": level,
-            "duration": 6.0,
-            "control_period": 5e-3,
-        }
-        trace = smc.run(
-            smc.Scenario(
-                **common,
-                feedforward=u,
-                friction=servo.friction,
-            )
-        )
-        moved = np.argmax(np.abs(trace.v[:, 0]) > 1e-3)
-        assert moved
-        found.append(trace.u[moved, 0])
-    return found
-
-
-@pytest.mark.parametrize("model", ["m1", "m2", "m4", "m5", "m6"])
-def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model):
-    """A servo lifts its weight w at the torque m for which m - w is the friction that holds, and
-    drops it at w - m.
-
-    Friction that does not depend on the load is the same both ways, so the two lie symmetrically
-    about the weight. With load-dependent friction they do not: drive and back-drive differ.
-    """
-    from scipy.optimize import brentq
-
-    weight = 1.0
-    fitted = SERVOS["mx106"][model]
-    lift, drop = ends(model, weight)
-
-    def held(m):
-        return published(model, fitted, np.array(m), np.array(-weight), np.array(0.0))[0]
-
-    up: Any = brentq(lambda m: m - weight - held(m), weight, 10.0)
-    down: Any = brentq(lambda m: weight - m - held(m), -5.0, weight)
-    assert lift == pytest.approx(up, abs=0.015)
-    assert drop == pytest.approx(down, abs=0.015)
-    driving = lift - weight
-    driven_back = weight - drop
-    if model in ("m1", "m2"):
-        assert driving == pytest.approx(driven_back, rel=0.05)
-    else:
-        assert driving > 1.3 * driven_back
