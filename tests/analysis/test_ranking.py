@@ -460,25 +460,38 @@ def test_the_least_visible_lead_follows_from_the_units_and_charges_what_the_step
     assert 1 - charged.visible(0, "a", "b") == pytest.approx(plain / 2, rel=0.05)
 
 
+SHAPES = {  # of a law's logarithms over its searches
+    "normal": lambda rng, size: rng.normal(0.0, 0.1, size),
+    "one of ten searches twice as bad": lambda rng, size: (
+        rng.normal(0.0, 0.02, size) + 0.7 * (rng.random(size) < 0.1)
+    ),
+    "two basins": lambda rng, size: rng.normal(0.0, 0.02, size) + 0.26 * (rng.random(size) < 0.5),
+    "Student's, 2 degrees": lambda rng, size: 0.03 * rng.standard_t(2, size),
+    "skew": lambda rng, size: 0.05 * np.exp(rng.normal(size=size)),
+}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("units", "family"),
     [
         (12, 1),
-        (12, 20),
+        (12, 4),
         (24, 4),
     ],
 )
-def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(units, family):
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(units, family, shape):
+    """The formula for normal samples gave 41 % where one of ten searches is twice as bad."""
     rng = np.random.default_rng(units)
     level = 0.025 / family
     seen = 0
-    for _ in range(400):
-        a, b, c, d = np.exp(0.1 * rng.normal(size=(4, units)))
+    for _ in range(200):
+        a, b, c, d = np.exp(SHAPES[shape](rng, (4, units)))
         lead = least_visible_lead(np.log(b / a), level)  # of another sample of the same laws
         found = Comparison({"a": (1 - lead) * c, "b": d}).limited(Limits(level, level, level))
         seen += found.winners == ["a"]
-    assert 0.72 <= seen / 400 <= 0.88
+    assert 0.68 <= seen / 200 <= 0.93
 
 
 # half the step
