@@ -39,8 +39,8 @@ from smc_mujoco.studies.compare import Compared, compare
 METRICS = ("settling_time", "itae", "ultimate_bound", "tv_rate")  # one a wish: fast, calm, ...
 FILM_SIZE, FILM_RATE = (960, 540), 20  # px; 1/s
 UNBEATEN = (
-    "A law is unbeaten in a condition if no other is shown to be better there, if none of its runs "
-    "fails, and if no other is shown to settle in more runs. It wins if it is shown to be better "
+    "A law is unbeaten in a condition if no other is shown to be better there, if each of its runs "
+    "arrives, and if no other is shown to settle in more runs. It wins if it is shown to be better "
     "than every other. A table names the laws that are unbeaten in the most conditions."
 )
 LIMITS = (
