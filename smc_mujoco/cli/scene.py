@@ -115,30 +115,21 @@ def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
 
 def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     """Draw the scene's figures, SVG and PNG; return the files."""
-    from smc_mujoco.draw.figure import figure, signals
+    from smc_mujoco.draw.figure import figure
     from smc_mujoco.draw.page import files
 
-    if scene.figure == "signals":
-        named = {
-            condition: {style.label(label): t for label, t in runs.items()}
-            for condition, runs in traces.items()
-        }
-        signals(named, out / "signals", scene.title)
-        return files(out / "signals")
     if scene.figure == "chattering":
         from smc_mujoco.draw.amplitudes import amplitudes
 
         amplitudes(traces, out / "chattering", title=scene.title)
         return files(out / "chattering")
+    panels = ["u"] if scene.figure == "signals" else None
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        figure(
-            list(runs.values()),
-            path,
-            labels=[*map(style.label, runs)],
-            title=_title(scene, condition),
-        )
+        names = list(map(style.label, runs))
+        title = _title(scene, condition)
+        figure(list(runs.values()), path, labels=names, title=title, panels=panels)
         written += files(path)
     return written
 

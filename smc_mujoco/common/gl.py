@@ -6,8 +6,9 @@ picture is rendered: the one that MUJOCO_GL names if it loads, else EGL, else OS
 `renderer` uses it even if MuJoCo took another one.
 
 `import mujoco` fails if MUJOCO_GL names a backend that MuJoCo does not know or cannot load.
-`choose_gl` prevents that; the command line calls it. Only Linux has a choice of backends. This
-module imports mujoco only when it is needed.
+`choose_gl` prevents that; the command line calls it, and `mend_gl` does where a name of the package
+is first used. Only Linux has a choice of backends. This module imports mujoco only when it is
+needed.
 """
 
 import atexit
@@ -17,6 +18,7 @@ import importlib
 import os
 import sys
 import threading
+import warnings
 import weakref
 from typing import TYPE_CHECKING
 
@@ -71,6 +73,16 @@ def choose_gl() -> str:
     if sys.platform == "linux" and "mujoco" not in sys.modules:
         os.environ["MUJOCO_GL"] = backend
     return backend
+
+
+def mend_gl() -> None:
+    """Replace a MUJOCO_GL with which `import mujoco` would fail, and warn of it."""
+    if not os.environ.get("MUJOCO_GL") or "mujoco" in sys.modules or not (why := note()):
+        return
+    from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
+
+    choose_gl()
+    warnings.warn(f"{why}; unset it or name another", ScenarioWarning, users_stacklevel())
 
 
 def usable(backend: str) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from smc_mujoco.common import annexes
+from smc_mujoco.common import annexes, gl
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 NAMES = re.compile(r"^from (\S+) import (\w+) as \2$", re.MULTILINE)
@@ -43,6 +43,7 @@ def lazy_module(package: str) -> LazyModule:
         """Return a public function, class or module."""
         if name not in origins and name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        gl.mend_gl()
         with delay_ctrl_c():
             what = f"{package.replace('smc_mujoco', 'smc', 1)}.{name}"
             module = annexes.module(modules.get(name) or origins[name], what)

@@ -8,13 +8,14 @@ Each run is repeated at half its physics step, and from a nudged start. Where th
 by more than 5 %, the dot is hollow.
 """
 
-import itertools
 import math
 import os
 from collections.abc import Mapping, Sequence
 
-from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
@@ -38,15 +39,13 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
     """Return the lag, s, at which two amplitudes are equal, interpolated in logarithms; NaN where
     they do not cross.
     """
-    known = []
-    for i, pair in enumerate(zip(one, other, strict=True)):
-        if all(value > 0.0 for value in pair):
-            known.append(i)
-    ratios = [math.log(one[i] / other[i]) for i in known]
-    for k, (low, high) in enumerate(itertools.pairwise(ratios)):
-        if low * high <= 0.0 and low != high:
-            start, end = (math.log(lags[known[i]]) for i in (k, k + 1))
-            return math.exp(start + (end - start) * low / (low - high))
+    table = np.log(np.array([lags, one, other], float))
+    at, first, second = table[:, np.isfinite(table).all(axis=0)]
+    ratios = first - second
+    for k in np.flatnonzero(ratios[:-1] * ratios[1:] <= 0.0):
+        if ratios[k] != ratios[k + 1]:
+            share = ratios[k] / (ratios[k] - ratios[k + 1])
+            return math.exp(at[k] + share * (at[k + 1] - at[k]))
     return math.nan
 
 
@@ -54,84 +53,76 @@ def amplitudes(
     traces: Mapping[str, Mapping[str, Trace]],
     path: str | os.PathLike[str] | None = None,
     title: str = "Chattering",
-) -> Figure | SubFigure:
+) -> Figure:
     """Draw the amplitude of s of the first channel over the actuator's lag, predicted and run.
 
     `traces` are condition -> label -> Trace, each condition with another lag.
     """
     runs: dict[str, list[Trace]] = {}
-    for label, trace in (pair for by_label in traces.values() for pair in by_label.items()):
-        runs.setdefault(label, []).append(trace)
+    for by_label in traces.values():
+        for label, trace in by_label.items():
+            runs.setdefault(label, []).append(trace)
+    laws = []
+    sources = []
+    for its in runs.values():
+        its.sort(key=lambda trace: lag(trace.scenario))
+        laws.append(its[0].scenario.law)
+        sources.append([trace.scenario.law.source for trace in its])
+    gains, shared = pages.gain_sources(sources)
+    handles = []
+    predicted = []
+    ticks = set()
     with style.page():
         page = pages.blank(style.FULL_WIDTH, PAGE_HEIGHT)
         ax = page.subplots()
-        colours = style.law_colours([its[0].scenario.law for its in runs.values()])
-        handles = []
-        predicted = {}
-        hollow = False
-        gains, shared = pages.gain_sources(
-            [[trace.scenario.law.source for trace in its] for its in runs.values()]
-        )
-        for (label, its), colour, source in zip(runs.items(), colours, gains, strict=True):
-            its.sort(key=lambda trace: lag(trace.scenario))
-            lags = [1e3 * lag(trace.scenario) for trace in its]
-            predicted[label] = (
-                lags,
-                [predict(trace.scenario, ranges=False).amplitude for trace in its],
-            )
-            ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
-            for at, trace, change in zip(lags, its, step_halving(its, 0), strict=True):
+        ax.set(xscale="log", yscale="log")
+        for (label, its), colour, source in zip(
+            runs.items(), style.law_colours(laws), gains, strict=True
+        ):
+            lags = []
+            sizes = []
+            swings = []
+            for trace in its:
+                lags.append(1e3 * lag(trace.scenario))
+                sizes.append(predict(trace.scenario, ranges=False).amplitude)
+                swings.append(channel_cycle(trace)[0])
+            ticks.update(lags)
+            predicted.append((lags, sizes))
+            ax.plot(lags, sizes, color=colour, lw=style.points(2.0))
+            for at, size, change in zip(lags, swings, step_halving(its, 0), strict=True):
+                look = {"color": colour, "mec": style.PAPER}
                 if change.marked:
-                    face = style.PAPER
-                    edge = colour
-                else:
-                    face = colour
-                    edge = style.PAPER
-                ax.plot(
-                    at, channel_cycle(trace)[0], "o", color=face, ms=style.points(7.0), mec=edge
-                )
-                hollow |= change.marked
-            handles.append(
-                Line2D(
-                    [],
-                    [],
-                    color=colour,
-                    lw=style.points(3.0),
-                    label=f"{style.label(label)}{source}",
-                )
-            )
+                    look = {"color": style.PAPER, "mec": colour}
+                ax.plot(at, size, "o", ms=style.points(7.0), **look)
+            words = f"{style.label(label)}{source}"
+            if not np.nan_to_num([*sizes, *swings]).any():
+                words += ": no limit cycle"
+            handles.append(pages.entry(words, colour))
         if len(predicted) == 2:
-            (lags, one), (_, other) = predicted.values()
-            if not math.isnan(equal := crossover(lags, one, other)):
-                place = {
-                    "xytext": (-4, 4),
-                    "textcoords": "offset points",
-                    "ha": "right",
-                    "va": "bottom",
-                }
+            (lags, one), (_, other) = predicted
+            equal = crossover(lags, one, other)
+            if not math.isnan(equal):
                 ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
-                ax.annotate(
-                    f"equal at {style.short(equal)} ms",
-                    (equal, 0.0),
-                    xycoords=("data", "axes fraction"),
-                    **place,
-                )
-        handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
-        handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
-        if hollow:
-            label = "run that half the step or a nudged start changes"
-            handles.append(
-                Line2D([], [], color=style.PAPER, mec=style.MUTED, marker="o", lw=0, label=label)
-            )
-        unit = next(iter(runs.values()))[0].scenario.plant.unit
-        ax.set(
-            xscale="log",
-            yscale="log",
-            xlabel="lag of the actuator (ms)",
-            ylabel=f"amplitude of s ({unit}/s)",
-        )
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.margins(0.04, 0.06)
+                words = f"equal at {style.short(equal)} ms"
+                place = (equal, 0.0), (-4, 4), ("data", "axes fraction"), "offset points"
+                ax.annotate(words, *place, ha="right", va="bottom")
+        dot = {"marker": "o", "lw": 0.0}
+        handles.append(pages.entry("predicted", lw=style.points(1.5)))
+        handles.append(pages.entry("run", **dot))
+        label = "run that half the step or a nudged start changes"
+        handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
+        factor, unit = style.prefixed(ax.dataLim.ymax, f"{trace.scenario.plant.unit}/s")
+        set_axes(ax, sorted(ticks), factor, unit)
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
-        pages.write(page, pages.files(path))
-    return page
+        return pages.write(page, pages.files(path))
+
+
+def set_axes(ax: Axes, lags: Sequence[float], factor: float, unit: str) -> None:
+    """Label axes with ticks at the lags, ms, and at 1, 2 and 5 of each decade of amplitude."""
+    ax.set(xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit})")
+    ax.set_xticks(lags, [f"{tick:.3g}" for tick in lags])
+    ax.set_xticks([], minor=True)
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter(lambda size, _: f"{factor * size:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.margins(0.04, 0.06)

@@ -67,10 +67,11 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
     A window has the samples in it and the one held at its left edge.
     """
     start = np.clip(np.searchsorted(t, edges + 1e-9, side="right") - 1, 0, len(t) - 1)
-    y, start, stop = y[: start[-1] + 1], start[:-1], np.append(start[1:-1], start[-1] + 1)
-    low, total, high = (f.reduceat(y, start, axis=0) for f in (np.minimum, np.add, np.maximum))
-    count = np.maximum(stop - start, 1)[:, None]
-    return Envelope((edges[:-1] + edges[1:]) / 2, low, total / count, high)
+    y = y[: start[-1] + 1]
+    count = np.maximum(np.diff([*start[:-1], start[-1] + 1]), 1)[:, None]
+    low = np.minimum.reduceat(y, start[:-1])
+    mean = np.add.reduceat(y, start[:-1]) / count
+    return Envelope((edges[:-1] + edges[1:]) / 2, low, mean, np.maximum.reduceat(y, start[:-1]))
 
 
 def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
@@ -44,7 +43,7 @@ def plot(
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
-) -> Figure | SubFigure:
+) -> Figure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by
     condition.
 
@@ -72,62 +71,53 @@ def plot(
     for name in names:
         if name != SETTLES and name not in CATALOGUE:
             raise unknown("metric", name, [SETTLES, *CATALOGUE])
-    plants, laws, conditions = (
-        list(dict.fromkeys(table.column(c).tolist())) for c in ("plant", "law", "condition")
-    )
+    plants = list(dict.fromkeys(table.column("plant").tolist()))
+    laws = list(dict.fromkeys(table.column("law").tolist()))
+    conditions = list(dict.fromkeys(table.column("condition").tolist()))
     if not plants or not names:
         raise ScenarioError(
             "no runs or no metrics to draw: give a table with rows, and at least one metric"
         )
-    colours = dict(zip(laws, style.law_colours(laws), strict=True))
-    marks = dict(zip(laws, itertools.cycle(style.MARKS), strict=False))
+    looks = {}
+    for law, colour, mark in zip(
+        laws, style.law_colours(laws), itertools.cycle(style.MARKS), strict=False
+    ):
+        looks[law] = {"color": colour, "marker": mark, "mec": "none"}
     intervals = _intervals(table, names)
-    by_plant = {group.name["plant"]: scenarios(table, group) for group in groups(table, GROUPS[:1])}
-    units = {plant: unit_of_x(plant, its) for plant, its in by_plant.items()}
     ran = set(zip(table.column("plant").tolist(), table.column("condition").tolist(), strict=True))
-    conditions_of = {
-        plant: [name for name in conditions if (plant, name) in ran] for plant in plants
-    }
+    conditions_of = {}
+    for plant in plants:
+        conditions_of[plant] = [name for name in conditions if (plant, name) in ran]
+    units = {}
+    for group in groups(table, GROUPS[:1]):
+        units[group.name["plant"]] = unit_of_x(group.name["plant"], scenarios(table, group))
     with style.page(width):
-        key, shared = _key(
-            table, colours, marks, min((interval.n for interval in intervals.values()), default=0)
-        )
-        tall = [0.5 + LINE_HEIGHT * (len(laws) + 1) * len(conditions_of[plant]) for plant in plants]
+        least = min(interval.n for interval in intervals.values())
+        key, shared = _key(table, looks, least)
+        rows = (len(laws) + 1) * np.array(list(map(len, conditions_of.values())))
+        tall = 0.5 + LINE_HEIGHT * rows
         space = pages.head_height(width, key) + style.points(0.6)
-        page = pages.blank(width, height or space + style.points(sum(tall)), fig)
+        page = pages.blank(width, height or space + style.points(tall.sum()), fig)
         axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
-        room = 72 * width / len(names) - style.points(
-            50
-        )  # what the axis' numbers and the space beside it leave
-        for i, plant in enumerate(plants):
-            for k, (name, label) in enumerate(
-                zip(names, _labels(names, units[plant], room), strict=True)
-            ):
+        room = 72 * width / len(names) - style.points(50)  # beside the numbers of the axis
+        text = style.points(pages.TEXT_SIZE)
+        for plant, high, of_plant in zip(plants, tall, axes, strict=True):
+            for ax, name in zip(of_plant, names, strict=True):
                 of_panel = {}
                 for cell, its in intervals.items():
                     if cell[:2] == (name, plant):
                         of_panel[cell[2:]] = its
-                _panel(axes[i, k], of_panel, conditions_of[plant], colours, marks, name != SETTLES)
-                axes[i, k].set_xlabel(label)
-                axes[i, k].tick_params(labelleft=k == 0)
-            over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
-            if title or len(plants) > 1:
-                its_name = style.plant_name(plant)
-            else:
-                its_name = ""
-            beside = (
-                style.width(f"{its_name}  never", style.points(pages.TEXT_SIZE), bold=True) < room
-            )
-            axes[i, 0].set_title(its_name, y=None if beside else over_never, parse_math=False)
-        pages.set_head(
-            page,
-            width,
-            title or f"Medians: {style.heading(plants, conditions, short=len(plants) > 1)}",
-            key,
-            shared,
-        )
-        pages.write(page, paths)
-    return page
+                _panel(ax, of_panel, conditions_of[plant], looks, name != SETTLES)
+                ax.set_xlabel(_label(name, units[plant]))
+                ax.tick_params(labelleft=ax is of_plant[0])
+            words = style.plant_name(plant) if title or len(plants) > 1 else ""
+            place = None
+            if style.width(f"{words}  never", text, bold=True) >= room:
+                place = 1.0 + 1.7 * text / 72 / style.points(high)  # above "never"
+            of_plant[0].set_title(words, y=place, parse_math=False)
+        heading = style.heading(plants, conditions, short=len(plants) > 1)
+        pages.set_head(page, width, title or f"Medians: {heading}", key, shared)
+        return pages.write(page, paths)
 
 
 def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, str, str], Interval]:
@@ -144,37 +134,37 @@ def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, s
                 if metric == SETTLES:
                     interval = share_interval(float((of_law == 0.0).mean()), interval.n)
                 else:
-                    middle, low, high = (max(v, MIN_SIZE) if v > 0.0 else v for v in interval[:3])
-                    interval = Interval(middle, low, high, interval.n)
+                    sizes = np.array(interval[:3])
+                    sizes[(sizes > 0.0) & (sizes < MIN_SIZE)] = MIN_SIZE
+                    interval = Interval(*sizes.tolist(), interval.n)
                 intervals[metric, *group.blocks[0], law] = interval
     return intervals
 
 
 def _key(
-    table: Columns, colours: Mapping[str, str], marks: Mapping[str, str], samples: int
+    table: Columns, looks: Mapping[str, Mapping[str, str]], samples: int
 ) -> tuple[list[Handle], str]:
     """Return the entries of the legend, law by law, and where all gains come from if that is the
     same.
     """
     known = sources(table)
-    key = []
-    gains, shared = pages.gain_sources([known.get(law, ()) for law in colours])
-    for law, source in zip(colours, gains, strict=True):
-        look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
-        key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
-    few = f"; a median's is the range of fewer than {MIN_INTERVAL_SAMPLES} samples" * (
-        samples < MIN_INTERVAL_SAMPLES
-    )
-    label = f"95 % interval{few}"
-    return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label=label)], shared
+    key: list[Handle] = []
+    line = {"lw": style.points(1.5)}
+    gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])
+    for (law, look), source in zip(looks.items(), gains, strict=True):
+        label = style.law_name(law) + source
+        key.append(pages.entry(label, look["color"], marker=look["marker"], mec="none", **line))
+    label = "95 % interval"
+    if samples < MIN_INTERVAL_SAMPLES:
+        label += f"; a median's is the range of fewer than {MIN_INTERVAL_SAMPLES} samples"
+    return [*key, pages.entry(label, **line)], shared
 
 
 def _panel(
     ax: Axes,
     intervals: Mapping[tuple[str, str], Interval],
     conditions: Sequence[str],
-    colours: Mapping[str, str],
-    marks: Mapping[str, str],
+    looks: Mapping[str, Mapping[str, str]],
     log: bool,
 ) -> None:
     """Draw a metric of one plant, (condition, law) -> its interval: a block of lines per condition,
@@ -182,72 +172,49 @@ def _panel(
 
     If `log`, its axis is logarithmic where values differ much.
     """
-    height = len(colours) + 1
-    sizes = []
-    for interval in intervals.values():
-        for v in interval[:3]:
-            if np.isfinite(v):
-                sizes.append(v)
-    if log and sizes and min(sizes) > 0.0 and max(sizes) > style.LOG_RANGE * min(sizes):
+    height = len(looks) + 1
+    sizes = np.array([interval[:3] for interval in intervals.values()])
+    sizes = sizes[np.isfinite(sizes)]
+    if log and sizes.size and 0.0 < style.LOG_RANGE * sizes.min() < sizes.max():
         ax.set_xscale("log")
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
-    for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(colours)):
+    for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(looks)):
         if (condition, law) in intervals:
-            said = (
-                f"{style.law_name(law)}, {condition.replace('_', ' ')}: "
-                f"{intervals[condition, law].median:.3g}"
-            )
-            look = {
-                "color": colours[law],
-                "marker": marks[law],
-                "ms": style.points(6),
-                "mec": "none",
-            }
-            look["gid"] = pages.hint(said)
-            _dot(ax, intervals[condition, law], j * height + k, look)
-    if not sizes:
+            _dot(ax, intervals[condition, law], j * height + k, looks[law])
+    if not sizes.size:
         ax.set_xticks([])
     for j in range(1, len(conditions)):
         ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
-    middles = [j * height + height / 2 - 1 for j in range(len(conditions))]
-    ax.set_yticks(middles, [name.replace("_", " ") for name in conditions])
+    middles = height * (np.arange(len(conditions)) + 0.5) - 1
+    ax.set_yticks(middles, np.char.replace(conditions, "_", " "))
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
 
 
-def _dot(ax: Axes, interval: Interval, line: int, look: dict) -> None:
+def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> None:
     """Draw a median with its interval. An infinite median is at the right edge, under "never"."""
-    never = {"transform": ax.get_yaxis_transform(), "clip_on": False}
     median, low, high = interval[:3]
+    color = look["color"]
+    mark = {**look, "ms": style.points(6)}
     if np.isfinite(median):
-        ax.plot(median, line, **look)
+        ax.plot(median, line, **mark)
     else:
-        ax.plot(1.0, line, **look | {"mfc": style.PAPER, "mec": look["color"]}, **never)
+        mark |= {"transform": ax.get_yaxis_transform(), "clip_on": False}
+        ax.plot(1.0, line, **mark | {"mfc": style.PAPER, "mec": color})
         drawing.note(ax, "never")
     if np.isfinite(low) and np.isfinite(high):
-        ax.plot([low, high], [line, line], color=look["color"], lw=style.points(1.5))
+        ax.plot([low, high], [line, line], color=color, lw=style.points(1.5))
     elif np.isfinite(low):  # up to "never"
         ax.plot(low, line)  # nothing is seen: the axis comprises the interval
-        look = {"arrowstyle": "-", "color": look["color"], "lw": style.points(1.5), "ls": ":"}
-        ax.annotate(
-            "", (1.0, line), (low, line), ("axes fraction", "data"), "data", arrowprops=look
-        )
+        arrow = {"arrowstyle": "-", "color": color, "lw": style.points(1.5), "ls": ":"}
+        place = (1.0, line), (low, line), ("axes fraction", "data"), "data"
+        ax.annotate("", *place, arrowprops=arrow)
 
 
-def _labels(metrics: Sequence[str], x: str, room: float) -> list[str]:
-    """Return the labels of a row of panels with the metrics' units where positions are in x.
-
-    All are in two lines if one is wider than `room`, in points.
-    """
-    labels = []
-    for metric in metrics:
-        words = "share of runs that settle"
-        bracket = ""
-        unit = ""
-        if metric != SETTLES:
-            words, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
-        labels.append(words + bracket + unit.replace("^2", "²").replace(" ", "·"))
-    if any(style.width(label, style.points(pages.TEXT_SIZE)) > room for label in labels):
-        return [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
-    return labels
+def _label(metric: str, x: str) -> str:
+    """Return the label of a panel with the metric's unit where positions are in x, on two lines."""
+    if metric == SETTLES:
+        return "share of runs\nthat settle"
+    words, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
+    return words + bracket.replace(" ", "\n") + unit.replace("^2", "²").replace(" ", "·")

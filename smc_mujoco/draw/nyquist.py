@@ -14,8 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
+from matplotlib.figure import Figure
 
 from smc_mujoco.analysis.chattering import Chattering
 from smc_mujoco.analysis.harmonics import Loop
@@ -39,7 +38,7 @@ def nyquist(
     traces: Sequence[Trace],
     changes: Sequence[StepChange],
     path: str | os.PathLike[str] | None = None,
-) -> Figure | SubFigure:
+) -> Figure:
     """Draw the harmonic balance of scenarios, and their sliding variable, predicted and run.
 
     Args:
@@ -56,33 +55,29 @@ def nyquist(
         for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True):
             words = "no limit cycle predicted, L and 1/N do not cross"
             if cycle:
-                words = (
-                    f"amplitude {style.short(cycle.amplitude)} at "
-                    f"{cycle.frequency:.3g} Hz predicted"
-                )
+                size = style.short(cycle.amplitude)
+                words = f"amplitude {size} at {cycle.frequency:.3g} Hz predicted"
             label = f"{style.law_name(scenario.law)}: {words}{source}"
-            handles.append(Line2D([], [], color=colour, lw=style.points(3), label=label))
+            handles.append(pages.entry(label, colour))
         whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)
         page = pages.blank(style.FULL_WIDTH, whole)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
-        for row, scenario, cycle, trace, colour in zip(
-            axes, scenarios, cycles, traces, colours, strict=True
-        ):
+        size = style.points(9.5)
+        rows = zip(axes, scenarios, cycles, traces, changes, colours, strict=True)
+        for (left, right), scenario, cycle, trace, change, colour in rows:
             if cycle:
-                plane(row[0], scenario, cycle, channel, colour)
+                plane(left, scenario, cycle, channel, colour)
             else:  # nothing crosses: s has the whole row
-                row[0].remove()
-                grid = row[1].get_subplotspec()
-                row[1].set_subplotspec(grid.get_gridspec()[grid.rowspan.start, :])
-            last_periods(row[1], trace, cycle, channel, colour)
-        for ax, change in zip(axes[:, 1], changes, strict=True):
+                left.remove()
+                grid = right.get_subplotspec()
+                right.set_subplotspec(grid.get_gridspec()[grid.rowspan.start, :])
+            last_periods(right, trace, cycle, channel, colour)
             if change.marked:
-                words = style.wrapped(NOTE, 72 * 0.5 * style.FULL_WIDTH, style.points(9.5), lines=2)
-                ax.set_title(words, loc="left", fontsize=style.points(9.5), fontweight="normal")
+                words = style.wrapped(NOTE, 72 * 0.5 * style.FULL_WIDTH, size, lines=2)
+                right.set_title(words, loc="left", fontsize=size, fontweight="normal")
         title = f"Chattering: {style.head(scenarios)}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
-        pages.write(page, pages.files(path))
-    return page
+        return pages.write(page, pages.files(path))
 
 
 def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:
@@ -99,53 +94,36 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     response = np.array([loop.response(w) for w in omegas]) / unit
     amplitudes = cycle.amplitude_x * np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
     inverse = np.array([1.0 / (loop.gain(a, omega) or math.nan) for a in amplitudes]) / unit
-    ax.plot(
-        response.real,
-        response.imag,
-        color=style.INK,
-        lw=style.points(1.6),
-        label="L, over frequency",
-    )
-    ax.plot(
-        inverse.real,
-        inverse.imag,
-        color=colour,
-        lw=style.points(1.6),
-        ls=(0, (4, 2)),
-        label="1/N, over amplitude",
-    )
-    cycle_label = "cycle, with harmonics of e"
-    ax.plot(
-        [-1.0], [0.0], "o", color=colour, ms=style.points(8), mec=style.PAPER, label=cycle_label
-    )
-    ax.legend(
-        loc="upper right",
-        fontsize=style.points(8.5),
-        frameon=True,
-        framealpha=0.8,
-        handlelength=1.6,
-    )
+    wide = style.points(1.6)
+    curve = {"color": style.INK, "lw": wide, "label": "L, over frequency"}
+    ax.plot(response.real, response.imag, **curve)
+    curve = {"color": colour, "lw": wide, "label": "1/N, over amplitude", "ls": (0, (4, 2))}
+    ax.plot(inverse.real, inverse.imag, **curve)
+    mark = {"color": colour, "ms": style.points(8), "mec": style.PAPER}
+    ax.plot([-1.0], [0.0], "o", label="cycle, with harmonics of e", **mark)
+    look = {"fontsize": style.points(8.5), "frameon": True, "framealpha": 0.8}
+    ax.legend(loc="upper right", handlelength=1.6, **look)
 
 
 def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour: str) -> None:
     """Draw s in the last periods of a run, the predicted amplitude as a band and an unstable one as
     lines.
     """
+    start = 0.0
+    label = "time (s)"
     if cycle:
         start = trace.t[-1] - SHOWN_PERIODS / cycle.frequency
-    else:
-        start = trace.t[0]
+        label = f"last {SHOWN_PERIODS} periods predicted (ms)"
     part = trace.t >= start
-    factor, unit = style.prefixed(
-        float(np.abs(trace.s[part, channel]).max()), f"{trace.scenario.plant.units[channel]}/s"
-    )
+    s = trace.s[part, channel]
+    unit = f"{trace.scenario.plant.units[channel]}/s"
+    factor, unit = style.prefixed(float(np.abs(s).max()), unit)
+    s = factor * s
     t = trace.t[part] - trace.t[part][0]
-    s = factor * trace.s[part, channel]
-    ax.plot(1e3 * t if cycle else t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
-    ax.set(
-        xlabel=f"last {SHOWN_PERIODS} periods predicted (ms)" if cycle else "time (s)",
-        ylabel=f"s ({unit})",
-    )
+    if cycle:
+        t = 1e3 * t
+    ax.plot(t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
+    ax.set(xlabel=label, ylabel=f"s ({unit})")
     if cycle:
         mean = float(s.mean())
         amplitude = factor * cycle.amplitude
@@ -158,12 +136,5 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
             for level in (mean - unstable, mean + unstable):
                 ax.axhline(level, color=colour, lw=style.points(1.2), ls="dotted")
             words += f"; dotted: about ±{style.short(unstable)}, unstable, within it a run rests"
-        ax.text(
-            0.99,
-            0.97,
-            words,
-            ha="right",
-            va="top",
-            transform=ax.transAxes,
-            fontsize=style.points(9.5),
-        )
+        place = {"transform": ax.transAxes, "ha": "right", "va": "top"}
+        ax.text(0.99, 0.97, words, fontsize=style.points(9.5), **place)

@@ -6,14 +6,13 @@ page of this package (8.8 in), an IEEE page or column, a slide, or has any size 
 
 import io
 import os
-import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
@@ -21,7 +20,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Annotation
-from matplotlib.ticker import AutoLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.files import replacing
@@ -29,13 +28,15 @@ from smc_mujoco.control.source import NONE, Source, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.simulation.trace import Trace
 
-DPI, PRINT_DPI = 200, 400  # of a PNG: of a full page or a slide, and of a journal's page or column
+DPI = 200  # of a PNG of a full page or a slide
+PRINT_DPI = 400  # of a journal's page or column
 FORMATS = ("svg", "png", "pdf")
-DESCRIPTION = {
-    ".svg": "Description",
-    ".png": "Description",
-    ".pdf": "Subject",
-}  # the key of a file's description
+# the key of a file's description, and what would tell the date
+METADATA = {
+    ".svg": ("Description", {"Date": None}),
+    ".png": ("Description", {}),
+    ".pdf": ("Subject", {"CreationDate": None}),
+}
 NAMED = {
     "ieee-column": (3.5, None),
     "ieee-page": (7.16, None),
@@ -43,19 +44,18 @@ NAMED = {
 }  # inches
 SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
-TEXT_SIZE, TITLE_SIZE = 11.0, 17.0  # points on a full page
-ENTRY_SAMPLE, ENTRY_SPACE = (
-    1.6,
-    2.3,
-)  # of a legend's entry, in heights of its letters: its sample, and all its spaces
+TEXT_SIZE = 11.0  # points on a full page
+TITLE_SIZE = 17.0
+ENTRY_SAMPLE = 1.6  # of a legend's entry, in heights of its letters: its sample
+ENTRY_SPACE = 2.3  # and all its spaces
 TITLE_PAD = 5.0  # points on a full page, above the title
-MAX_SHARE, MAX_SINGLE_SHARE = (
-    0.55,
-    0.95,
-)  # largest width of a legend's entry, of the page's: in several columns, in one
+# largest width of a legend's entry, of the page's: in several columns, in one
+MAX_SHARE = 0.55
+MAX_SINGLE_SHARE = 0.95
 MAX_NAME = 0.42  # of a full page's width, of a run's name in a legend
 MAX_TICKS = 9  # ticks of an axis, as of matplotlib's
-TICK_GAP = 0.6  # between labels of ticks, in heights of their letters
+TICK_LETTERS = 6  # of the label of a tick, and of the space beside it
+STEPS = (1, 2, 2.5, 5, 10)  # between ticks, as of matplotlib's AutoLocator
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
 
@@ -103,15 +103,20 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
             raise unknown("size", size, NAMED)
         return NAMED[size]
     try:
-        width, height = (float(side) for side in size)
+        width, height = map(float, size)
     except (TypeError, ValueError):
         width = height = 0.0
-    if not all(SIDE_RANGE[0] <= side <= SIDE_RANGE[1] for side in (width, height)):
+    if not SIDE_RANGE[0] <= min(width, height) <= max(width, height) <= SIDE_RANGE[1]:
         raise ScenarioError(
             f"size is {shown(size)}: give (width, height) in inches, "
             f"each {SIDE_RANGE[0]:g} to {SIDE_RANGE[1]:g}"
         )
     return width, height
+
+
+def entry(label: str, colour: str = style.MUTED, **look: Any) -> Line2D:
+    """Return a legend's entry with a line, of 3 points by default."""
+    return Line2D([], [], label=label, color=colour, **{"lw": style.points(3.0), **look})
 
 
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
@@ -131,8 +136,8 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
 def head_height(width: float, handles: Sequence[Handle]) -> float:
     """Return the height of the title and the legend, in inches."""
     labels, columns = _legend(handles, width)
-    lines = [words.count("\n") + 1 for words in labels]
-    rows = max((sum(part) for part in np.array_split(lines, columns)), default=0)
+    lines = np.char.count(labels, "\n") + 1 if labels else np.zeros(0)
+    rows = max(part.sum() for part in np.array_split(lines, columns))
     return style.points(1.9 * TITLE_SIZE + 1.45 * TEXT_SIZE * rows) / 72
 
 
@@ -148,11 +153,11 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
     beside = (ENTRY_SAMPLE + ENTRY_SPACE) * size  # of a label
     for share in (MAX_SHARE, MAX_SINGLE_SHARE):
         labels = []
-        for one in handles:
-            labels.append(style.wrapped(str(one.get_label()), share * page - beside, size, lines=2))
         widths = []
-        for label in labels:
-            widths.append(max(style.width(line, size) for line in label.split("\n")) + beside)
+        for one in handles:
+            label = style.wrapped(str(one.get_label()), share * page - beside, size, lines=2)
+            labels.append(label)
+            widths.append(beside + max(style.width(line, size) for line in label.split("\n")))
         for columns in range(len(widths), 1, -1):
             if sum(map(max, np.array_split(widths, columns))) < page - 16:
                 return labels, columns
@@ -174,20 +179,10 @@ def set_head(
     if note:
         note = style.cropped(note, MAX_SHARE * room, size)
         room -= style.width(note, size) + big
-        place = {
-            "xytext": (-8, -style.points(TITLE_PAD) - big),
-            "textcoords": "offset points",
-            "ha": "right",
-        }
-        look = {
-            "fontsize": size,
-            "color": style.MUTED,
-            "parse_math": False,
-            "annotation_clip": False,
-        }
-        text = Annotation(
-            note, (1.0, 1.0), xycoords=page.transSubfigure, **place, va="baseline", **look
-        )
+        place = {"xytext": (-8, -style.points(TITLE_PAD) - big), "textcoords": "offset points"}
+        look = {"fontsize": size, "color": style.MUTED, "ha": "right", "va": "baseline"}
+        look |= {"parse_math": False, "annotation_clip": False}
+        text = Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, **look)
         page.add_artist(text).set_in_layout(False)
     if title:
         big = max(size, min(big, big * room / style.width(title, big, bold=True)))
@@ -219,13 +214,10 @@ def run_handles(
     handles: list[Handle] = []
     gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
     for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
-        how = style.ending(trace)
-        words = (
-            style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE)
-            + source
-            + (f" ({how})" if how else "")
-        )
-        handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
+        words = style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE) + source
+        if how := style.ending(trace):
+            words += f" ({how})"
+        handles.append(entry(words, colour))
     return handles, shared
 
 
@@ -235,10 +227,12 @@ def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
 
     If all gains come from the same source, the note says so, and the texts are "".
     """
-    words = [
-        f"gains: {source}" if (source := kinds(its)) not in ("", NONE) else "" for its in sources
-    ]
-    if len(different := {text for text in words if text}) == 1:
+    words = []
+    for its in sources:
+        source = kinds(its)
+        words.append("" if source in ("", NONE) else f"gains: {source}")
+    different = {text for text in words if text}
+    if len(different) == 1:
         return [""] * len(words), different.pop()
     return [f", {text}" if text else "" for text in words], ""
 
@@ -270,98 +264,53 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
         raise ScenarioError(
             f"cannot draw to {Path(path).name!r} as {format}: end the name in .{format}"
         )
-    if ending == "pdf":
-        several = ("pdf",)
+    if format:
+        endings = (format,)
+    elif ending == "pdf":
+        endings = ("pdf",)
     else:
-        several = ("svg", "png")
-    return [base.with_name(f"{base.name}.{kind}") for kind in ((format,) if format else several)]
+        endings = ("svg", "png")
+    return [base.with_name(f"{base.name}.{ending}") for ending in endings]
 
 
-def hint(text: str) -> str:
-    """Return the gid of what shows a text in a browser, where the pointer rests on it in an SVG."""
-    return f"hint: {text}"
-
-
-def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
-    """Write a figure to files of these names, its label as their description.
+def write(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
+    """Write a whole figure to files of these names, its label as their description, and return it.
 
     The same figure gives the same files.
     """
-    if not paths:
-        return
     whole = page.get_figure(root=True)
+    if not paths:
+        return whole
     about = str(page.get_label()) or None
-    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}
     layout = whole.get_layout_engine()
     if layout is not None:
         canvas = whole.canvas
         dpi = whole.dpi
-        get_registered_canvas_class(paths[0].suffix[1:])(
-            whole
-        )  # texts are as large as this canvas draws them
+        canvas_of = get_registered_canvas_class(paths[0].suffix[1:])
+        canvas_of(whole)  # texts are as large as this canvas draws them
         whole.dpi = resolution(whole)
         layout.execute(whole)
         whole.set_canvas(canvas)
         whole.dpi = dpi
     whole.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
     for path in paths:
+        key, dates = METADATA[path.suffix]
+        look = {"format": path.suffix[1:], "dpi": resolution(whole)}
         with replacing(path) as part:
-            whole.savefig(
-                part,
-                format=path.suffix[1:],
-                dpi=resolution(whole),
-                metadata=dates[path.suffix] | {DESCRIPTION[path.suffix]: about},
-            )
-            if path.suffix == ".svg":
-                text = Path(part).read_text(encoding="utf-8")
-                Path(part).write_text(
-                    re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8"
-                )
+            whole.savefig(part, metadata=dates | {key: about}, **look)
     whole.set_layout_engine(layout)
-
-
-class Spaced(AutoLocator):
-    """Ticks at round numbers whose labels do not touch.
-
-    Matplotlib assumes labels that are three letters wide.
-    """
-
-    def __init__(self):
-        super().__init__()
-        self.size = FontProperties(size=matplotlib.rcParams["xtick.labelsize"]).get_size_in_points()
-
-    def __call__(self) -> list[float]:
-        """Return the ticks of the visible range."""
-        assert isinstance(self.axis, Axis)
-        low, high = sorted(self.axis.get_view_interval())
-        box = self.axis.axes.bbox
-        formatter = self.axis.get_major_formatter()
-        ticks = []
-        for count in range(MAX_TICKS, 0, -1):
-            self.set_params(nbins=count)
-            ticks = []
-            for tick in np.asarray(self.tick_values(low, high)).tolist():
-                if low <= tick <= high:
-                    ticks.append(tick)
-            widest = max(
-                (style.width(text, self.size) for text in formatter.format_ticks(ticks)),
-                default=0.0,
-            )
-            if ticks[1:]:
-                pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low)
-            else:
-                pitch = 0.0
-            if widest + TICK_GAP * self.size <= pitch:
-                return ticks
-        return ticks[:1]
+    return whole
 
 
 def space_ticks(page: Figure | SubFigure) -> None:
-    """Give the axes of a page ticks whose labels do not touch.
+    """Give the axes of a page so few ticks that labels of TICK_LETTERS letters do not touch.
 
     Logarithmic axes and ticks that were set stay.
     """
+    size = FontProperties(size=matplotlib.rcParams["xtick.labelsize"]).get_size_in_points()
     for ax in page.findobj(Axes):
         assert isinstance(ax, Axes)
         if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
-            ax.xaxis.set_major_locator(Spaced())
+            room = 72 * ax.get_window_extent().width / ax.figure.dpi
+            count = int(room / style.width("0" * TICK_LETTERS, size))
+            ax.xaxis.set_major_locator(MaxNLocator(min(max(count, 1), MAX_TICKS), steps=STEPS))

@@ -8,7 +8,6 @@ pixels.
 """
 
 import dataclasses
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -22,52 +21,35 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.mechanisms.hardware.part import joint_names
-from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
 from smc_mujoco.simulation.trace import Trace
 
 LAST_SAMPLES = 60  # control samples in the close-up of u
-MIN_CLOSE_UP = (
-    0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
-)
-MAX_DRAWN_CHANNELS = (
-    40  # of a network, drawn one by one: of more, evenly chosen ones and the extreme ones
-)
-LASTING_QUANTILE = (
-    0.98  # of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
-)
-MIN_WORDS = (
-    4.0  # of a panel's height, in heights of letters, from which on it has room for words; chosen
-)
+# least height of the close-up, of the largest |u|, so that it hides round-off; chosen
+MIN_CLOSE_UP = 0.02
+# of a network, drawn one by one: of more, evenly chosen ones and the extreme ones
+MAX_DRAWN_CHANNELS = 40
+# of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
+LASTING_QUANTILE = 0.98
+MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words
 CROWDED_STRIP = 3  # groups of channels, from which on a film has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
-COINCIDENT_DISTANCE = (
-    0.01  # of a panel's height, below the width of a line: curves no farther apart agree
-)
-COINCIDENT_SHARE = (
-    0.99  # of agreeing curves' samples, so that controls that switch a sample apart agree; chosen
-)
-# of the time that a panel shows: curves that agree for less have their colours there; chosen
+# of a panel's height, below the width of a line: curves no farther apart agree
+COINCIDENT_DISTANCE = 0.01
+# of agreeing curves' samples, so that controls that switch a sample apart agree; chosen
+COINCIDENT_SHARE = 0.99
+# of a run: nothing is said of curves that all agree for less; chosen
 MIN_AGREEMENT = 0.15
-ALL = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six"}
-MIN_WIDE_BAND, MAX_BANDS = (
-    0.2,
-    1,
-)  # mean height of a wide band, of a panel's, and how many share a row; chosen
+MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
+MAX_BANDS = 1  # that share a row; chosen
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
-ZOOM, MAX_ZOOMED = (
-    1.3,
-    0.5,
-)  # panels show ZOOM times the time until all rest, if that is less than this part of a run
-MIN_ERROR, MIN_RATIO = (
-    1e-9,
-    20.0,
-)  # smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
-JUMP_RATIO = (
-    2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
-)
+# panels show ZOOM times the time until all rest, if that is less than this part of a run
+ZOOM = 1.3
+MAX_ZOOMED = 0.5
+MIN_ERROR = 1e-9  # smaller errors are drawn at it; chosen
+MIN_RATIO = 20.0  # least ratio of a logarithmic axis; chosen
 QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
     **dict.fromkeys(("spread", "e", "settling"), "x"),
     **dict.fromkeys(("largest", "applied"), "u"),
@@ -86,16 +68,30 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "settling": "|x − r|",
     "largest": "largest |u|",
 }
+BLOWS = ("reaction", "contact")  # so short that runs which agree otherwise may differ in them
 PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
 # of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
 UNDIVERGED_SHARE = 0.8
 MARGIN = 0.08  # of a panel's height, above and below its curves
-REFERENCE, AGREED = (
-    "reference",
-    "agreed",
-)  # ids of a reference's lines, and of those of several traces that agree
+DASHES = (0, (4, 4))  # of a reference's line
+REFERENCE = "reference"  # id of a reference's lines
+
+
+def off_path(trace: Trace) -> np.ndarray:
+    """Return how far an arm's tip is off its path, (K+1, 1) mm."""
+    from smc_mujoco.metrics.tip import tip_error
+
+    return peaks(1e3 * tip_error(trace), trace)
+
+
+def contact_force(trace: Trace) -> np.ndarray:
+    """Return the force of a contact of an arm's tip, (K+1, 1) N."""
+    from smc_mujoco.metrics.tip import contacts
+
+    return contacts(trace).force[:, None]
+
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
@@ -108,8 +104,8 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "force": lambda trace: trace.force,
     "reaction": lambda trace: trace.reaction,
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
-    "tip": lambda trace: peaks(1e3 * tip.tip_error(trace), trace),
-    "contact": lambda trace: tip.contacts(trace).force[:, None],
+    "tip": off_path,
+    "contact": contact_force,
     "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
     "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
 }
@@ -131,20 +127,13 @@ class Panel(NamedTuple):
         The unit is "" where the words have it; or where it depends on the law, as that of s does:
         the s of twisting is e, and that of PID is a force.
         """
-        scenarios = [trace.scenario for trace in self.traces]
-        baseline = any(
-            one.law.template and one.law.template.family == "baseline" for one in scenarios
-        )
-        first_degree = scenarios[0].plant.free == 0 and all(
-            one.law.relative_degree == 1 for one in scenarios
-        )
         if self.quantity in ("tip", "contact"):
             return 1.0, ""
         unit = style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]
         if self.quantity in PEAKS:
             return 1.0, f" ({unit})"
         factor, prefixed = style.prefixed(max(map(abs, limits(self.traces, self.quantity))), unit)
-        if self.quantity != "s" or (first_degree and not baseline):
+        if self.quantity != "s" or all(map(slides_on_speed, self.traces)):
             return factor, f" ({prefixed})"
         return factor, "" if factor == 1.0 else f" / {1.0 / factor:g}"
 
@@ -155,24 +144,29 @@ class Panel(NamedTuple):
         group = self.group
         plant = self.traces[0].scenario.plant
         unit = self.scale[1]
+        single = len(group.channels) == 1
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
-        if group.driven:
-            letter = WORDS.get(name, name)
-        else:
-            letter = {"x": "q", "v": "q′"}.get(name, WORDS.get(name, name))
-        if (
-            plant.pose and name == "u" and group.unit == "m" and len(group.channels) == 1
-        ):  # of an actuator
+        letter = WORDS.get(name, name)
+        if not group.driven:
+            letter = {"x": "q", "v": "q′"}.get(name, letter)
+        if single and plant.pose and name == "u" and group.unit == "m":  # of an actuator
             return f"actuator {group.channels[0] + 1} {letter}{unit}"
-        if len(group.channels) == 1 and (plant.direct or self.channel is not None):
+        if single and (plant.direct or self.channel is not None):
             return f"{joint_names(plant)[group.channels[0]]} {letter}{unit}"
-        if name in WORDS or (
-            name == "s" and plant.mixed
-        ):  # short: mixed plants have many panels, and low ones
-            return f"{letter}{' on q' * (not group.driven)}{unit}"
-        kind = {"rad": "angle", "m": "position"}[group.unit]
-        return f"{KINDS.get(name, kind if group.driven else f'free {kind}')} {letter}{unit}"
+        if name in WORDS or (name == "s" and plant.mixed):  # mixed plants have low panels
+            return letter + ("" if group.driven else " on q") + unit
+        kind = "position" if group.unit == "m" else "angle"
+        if not group.driven:
+            kind = f"free {kind}"
+        return f"{KINDS.get(name, kind)} {letter}{unit}"
+
+
+def slides_on_speed(trace: Trace) -> bool:
+    """Return whether s has the unit of a speed: that of twisting is e, and that of PID a force."""
+    law = trace.scenario.law
+    baseline = law.template is not None and law.template.family == "baseline"
+    return law.relative_degree == 1 and not trace.scenario.plant.free and not baseline
 
 
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
@@ -181,26 +175,28 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     """
     groups = style.split(traces)
     scenarios = [trace.scenario for trace in traces]
-    if quantity in ("tip", "contact"):
-        has = []
-        for one in scenarios:
-            has.append(tip.knows_contacts(one) if quantity == "contact" else bool(one.plant.tip))
-        return [Panel(quantity, next(iter(groups)), traces)] * all(has)
     panels = [Panel(quantity, group, parts) for group, parts in groups.items()]
-    if quantity == "reaction":
-        return [
-            panel
-            for panel in panels
-            if any(np.nan_to_num(part.reaction).any() for part in panel.traces)
-        ]
+    if quantity == "tip":
+        return [panels[0]._replace(traces=traces)] if all(s.plant.tip for s in scenarios) else []
+    if quantity == "contact":
+        from smc_mujoco.metrics.tip import knows_contacts
+
+        return [panels[0]._replace(traces=traces)] if all(map(knows_contacts, scenarios)) else []
     if quantity in ("x", "e", "v"):
         return panels
-    if quantity == "force" and not any(one.actuator for one in scenarios):
+    if quantity == "force" and not any(scenario.actuator for scenario in scenarios):
         return []
-    several = 2 if quantity == "spread" else 1
-    return [
-        panel for panel in panels if panel.group.driven and len(panel.group.channels) >= several
-    ]
+    kept = []
+    for panel in panels:
+        if quantity == "reaction":
+            wanted = any(np.nan_to_num(part.reaction).any() for part in panel.traces)
+        elif quantity == "spread":
+            wanted = panel.group.driven and len(panel.group.channels) > 1
+        else:
+            wanted = panel.group.driven
+        if wanted:
+            kept.append(panel)
+    return kept
 
 
 def worst_first(traces: Sequence[Trace]) -> list[Panel]:
@@ -210,11 +206,10 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
     found = []
     for group, parts in style.split(traces).items():
         runs = [part for part in parts if part.diverged_at is None] or parts
-        means = np.max(
-            [np.nanmean(np.abs(part.x - part.r), axis=0) / scale(part) for part in runs], axis=0
-        )
-        found += zip(means.tolist(), by_channel(Panel("e", group, parts)), strict=True)
-    return [panel for _, panel in sorted(found, key=lambda one: -one[0])]
+        means = [np.nanmean(np.abs(part.x - part.r), axis=0) / scale(part) for part in runs]
+        found += zip(np.max(means, axis=0), by_channel(Panel("e", group, parts)), strict=True)
+    found.sort(key=lambda one: -one[0])
+    return [panel for _, panel in found]
 
 
 def by_channel(panel: Panel) -> list[Panel]:
@@ -223,11 +218,11 @@ def by_channel(panel: Panel) -> list[Panel]:
         return [panel]
     panels = []
     scored = panel.traces[0].scenario.plant.scored_channels
-    for k, i in enumerate(i for i in panel.group.channels if i in scored):
-        place, channel = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
-        panels.append(
-            Panel(panel.quantity, channel, [group_trace(trace, place) for trace in panel.traces], i)
-        )
+    for place, channel in enumerate(i for i in panel.group.channels if i in scored):
+        within = dataclasses.replace(panel.group, channels=(place,))
+        traces = [group_trace(trace, within) for trace in panel.traces]
+        group = dataclasses.replace(panel.group, channels=(channel,))
+        panels.append(Panel(panel.quantity, group, traces, channel))
     return panels
 
 
@@ -236,15 +231,15 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
     push at all.
     """
     group, parts = next(iter(style.split(traces).items()))
+    first = dataclasses.replace(group, channels=(0,))
+    pushing = np.any([np.nan_to_num(part.u).any(axis=0) for part in parts], axis=0)
     panels = []
-    for j in np.flatnonzero(
-        np.any([np.nan_to_num(part.u).any(axis=0) for part in parts], axis=0)
-    ).tolist():
-        one, first = (dataclasses.replace(group, channels=(i,)) for i in (j, 0))
-        of = []
+    for j in np.flatnonzero(pushing).tolist():
+        runs = []
         for part in parts:
-            of.append(dataclasses.replace(group_trace(part, first), u=part.u[:, j : j + 1]))
-        panels.append(Panel("u", one, of, j))
+            u = part.u[:, j : j + 1]
+            runs.append(dataclasses.replace(group_trace(part, first), u=u))
+        panels.append(Panel("u", dataclasses.replace(group, channels=(j,)), runs, j))
     return panels
 
 
@@ -256,73 +251,80 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     network: how far its channels are apart, the error and u. Of two joints of your own model: x and
     u of each; of more: the error and the largest u of a joint.
     """
-    groups = list(style.split(traces).items())
     plant = traces[0].scenario.plant
-    driven = [each for each in groups if each[0].driven]
-    errors = [Panel("settling", *each) for each in driven]
-    if of_tip := [panel for name in ("tip", "contact") for panel in over_groups(traces, name)]:
-        if len(of_tip) > 1:
-            return of_tip
-        return [*of_tip, *errors]
-    if all(len(group.channels) == 1 for group, _ in groups):
-        errors = errors[: len(groups) < CROWDED_STRIP]
-        return [
-            *(Panel("x", *each) for each in groups),
-            *errors,
-            *(Panel("u", *each) for each in driven),
-        ]
-    if plant.direct and plant.n == plant.driven == 2:
-        pairs = []
-        for each in groups:
-            pairs.append(zip(*(by_channel(Panel(name, *each)) for name in "xu"), strict=True))
-        return [panel for joints in pairs for pair in joints for panel in pair]
-    if plant.direct:
-        names = ("settling", "largest")
-    else:
-        names = ("spread", "settling", "u")
-    return [Panel(name, *each) for each in driven for name in names]
+    places = []
+    driven = []
+    errors = []
+    controls = []
+    for each in style.split(traces).items():
+        place = Panel("x", *each)
+        places.append(place)
+        if place.group.driven:
+            driven.append(place)
+            errors.append(place._replace(quantity="settling"))
+            controls.append(place._replace(quantity="u"))
+    contact = any(trace.scenario.contact.kind != "none" for trace in traces)
+    of_tip = over_groups(traces, "tip")
+    if contact:
+        of_tip += over_groups(traces, "contact")
+    if of_tip:
+        return of_tip if len(of_tip) > 1 else [*of_tip, *errors]
+    if max(len(place.group.channels) for place in places) == 1:
+        if len(places) >= CROWDED_STRIP:
+            errors = []
+        return [*places, *errors, *controls]
+    panels = []
+    for place in driven:
+        if plant.direct and plant.n == plant.driven == 2:
+            for joint in by_channel(place):
+                panels += [joint, joint._replace(quantity="u")]
+        else:
+            for name in ("settling", "largest") if plant.direct else ("spread", "settling", "u"):
+                panels.append(place._replace(quantity=name))
+    return panels
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     """Return the meaning of bands and lines that need an explanation: "band", "line", ... ->
     words.
     """
-    n = max(
-        (len(panel.group.channels) for panel in panels if panel.quantity not in SINGLE), default=1
-    )
-    banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
-    windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
-    over = max(filter(None, windows), default=None)
-    single = min(n, MAX_DRAWN_CHANNELS)
+    n = 1
+    banded = []
+    over = 0.0
+    for panel in panels:
+        if panel.quantity not in SINGLE:
+            n = max(n, len(panel.group.channels))
+        if panel.quantity not in (*UNBANDED, *banded):
+            banded.append(panel.quantity)
+        if panel.quantity == "u":
+            over = max(over, mean_window(panel.traces))
+    quantities = {panel.quantity for panel in panels}
     words = {}
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
     if over:
         words["line"] = f"mean over {1e3 * over:.3g} ms where it chatters"
     if n > 1:
-        if single == n:
-            words["thin lines"] = f"the {n} channels"
-        else:
-            words["thin lines"] = f"{single} of {n} channels"
-        words["thin lines"] += ", the slowest thick" * any(
-            panel.quantity == "x" for panel in panels
-        )
-    if any(panel.quantity in PEAKS for panel in panels):
+        shown = min(n, MAX_DRAWN_CHANNELS)
+        words["thin lines"] = f"the {n} channels" if shown == n else f"{shown} of {n} channels"
+        if "x" in quantities:
+            words["thin lines"] += ", the slowest thick"
+    if quantities & {*PEAKS}:
         words["peaks"] = f"largest in {1e3 * peak_window(panels[0].traces):.3g} ms"
     return words
 
 
 def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
-    """Return the labels of panels of these heights in points; the unit is on a second line if two
-    would be close.
+    """Return the labels of panels of these heights in points; the unit is on a second line if the
+    label is long.
     """
-    words = [panel.label for panel in panels]
     size = style.points(style.RC["font.size"])
-    free = [height - style.width(text, size) for height, text in zip(heights, words, strict=True)]
-    close = {i for i, (a, b) in enumerate(itertools.pairwise(free)) if (a + b) / 2 < size}
-    return [
-        text.replace(" (", "\n(") if {i - 1, i} & close else text for i, text in enumerate(words)
-    ]
+    words = []
+    for panel, height in zip(panels, heights, strict=True):
+        label = panel.label
+        long = style.width(label, size) > 0.85 * height
+        words.append(label.replace(" (", "\n(") if long else label)
+    return words
 
 
 def curve(trace: Trace, y: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -340,18 +342,17 @@ def smoothed(trace: Trace) -> bool:
     return trace.scenario.samples > COLUMNS
 
 
-def mean_window(traces: Sequence[Trace]) -> float | None:
-    """Return the longest window of the means of u, s; None if no u chatters visibly."""
+def mean_window(traces: Sequence[Trace]) -> float:
+    """Return the longest window of the means of u, s; 0 if no u chatters visibly."""
     low, high = limits(traces, "u")
-    times = []
+    longest = 0.0
     for trace in filter(smoothed, traces):
-        lines = trace.u.T[drawn_channels(trace.u)]
-        if any(
-            np.abs(smooth(u, window(trace)) - u).max() > VISIBLE_CHATTERING * (high - low)
-            for u in lines
-        ):
-            times.append(window(trace) * trace.scenario.control_period)
-    return max(times, default=None)
+        for u in trace.u.T[drawn_channels(trace.u)]:
+            chattering = np.abs(smooth(u, window(trace)) - u).max()
+            if chattering > VISIBLE_CHATTERING * (high - low):
+                longest = max(longest, window(trace) * trace.scenario.control_period)
+                break
+    return longest
 
 
 def peaks(y: np.ndarray, trace: Trace) -> np.ndarray:
@@ -381,10 +382,10 @@ def horizon(traces: Sequence[Trace]) -> float:
         for trace in parts:
             moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > REST_BAND * (high - low)
             acted = (trace.d != 0.0).any(axis=1) | (trace.r != trace.r[-1]).any(axis=1)
-            last = max(
-                last, *trace.t[moved | (acted & group.driven)][-1:], trace.diverged_at or 0.0
-            )
-        last = max([last, *(trace.scenario.jump.time for trace in parts if trace.scenario.jump)])
+            times = trace.t[moved | (acted & group.driven)]
+            last = max(last, *times[-1:], trace.diverged_at or 0.0)
+            if trace.scenario.jump:
+                last = max(last, trace.scenario.jump.time)
     if 0.0 < ZOOM * last < MAX_ZOOMED * whole:
         return ZOOM * last
     return whole
@@ -393,9 +394,8 @@ def horizon(traces: Sequence[Trace]) -> float:
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
     count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
-    return dataclasses.replace(
-        trace, **{name: array[:count] for name, array in trace.arrays().items()}
-    )
+    part = {name: array[:count] for name, array in trace.arrays().items()}
+    return dataclasses.replace(trace, **part)
 
 
 def over_time(
@@ -405,15 +405,13 @@ def over_time(
     among: Sequence[Trace] = (),
     bands: bool = True,
     names: Sequence[str] = (),
-    reported: bool = True,
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of
     the traces.
 
-    The reference of x is drawn in front, its settling band behind. Traces that agree from the start
-    are drawn once, in ink, with words; their colours begin where they part. The traces `among` set
-    the range, by default the panel's own; `bands`: whether to draw ranges behind the lines;
-    `names`: of the traces, for the words; `reported`: whether to write them.
+    The reference of x is drawn in front, its settling band behind. Words tell which traces agree,
+    as those behind are hidden. The traces `among` set the range, by default the panel's own;
+    `bands`: whether to draw ranges behind the lines; `names`: of the traces, for the words.
     """
     artists: list[Artist] = []
     name = panel.quantity
@@ -432,15 +430,8 @@ def over_time(
         clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
-    lines = [curve(trace, mean, name) for trace, mean in zip(traces, means, strict=True)]
-    shared: list[Agreement] = []
-    if name in SINGLE or len(panel.group.channels) == 1:
-        places = [(trace.t, y) for trace, y in zip(traces, exact, strict=True)]
-        shared = agreements(places, float(np.ptp(heights)))
-    starts = partings(shared, len(lines))
-    for trace, colour, mean, path, start in reversed(
-        list(zip(traces, colours, means, lines, starts, strict=True))
-    ):
+    rows = zip(traces, colours, means, strict=True)
+    for trace, colour, mean in reversed(list(rows)):
         y = QUANTITIES[name](trace)
         look: dict[str, Any] = {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:
@@ -448,19 +439,16 @@ def over_time(
         if y.shape[1] > 1:
             artists += channels(ax, trace, y, name, look)
         else:
-            artists += ax.plot(*between(path, start, np.inf), lw=style.points(LINE), **look)
+            artists += ax.plot(*curve(trace, mean, name), lw=style.points(LINE), **look)
         # a trace that is cut to a close-up may end before its run failed
         end = trace.t[-1] + trace.scenario.control_period
         if trace.diverged_at is not None and end > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
             look: dict[str, Any] = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
             artists += ax.plot(trace.t[-1], last, "X", **look)
-    for (first, *_), start, stop in shared:
-        look: dict[str, Any] = {"color": style.INK, "drawstyle": steps(traces[first], name)}
-        look["gid"] = AGREED
-        path = between(lines[first], start, stop)
-        artists += ax.plot(*path, lw=style.points(LINE), **look)
-    tell_agreements(ax, shared if reported else [], lines, names)
+    if names and name not in BLOWS and (name in SINGLE or len(panel.group.channels) == 1):
+        lines = [(trace.t, y) for trace, y in zip(traces, exact, strict=True)]
+        tell_agreements(ax, agreements(lines, float(np.ptp(heights))), names)
     return artists
 
 
@@ -477,7 +465,7 @@ def channels(
     slowest = -1
     if name == "x":
         slowest = int(np.nansum(np.abs(y - trace.r), axis=0).argmax())
-    for i in sorted({*drawn_channels(y).tolist(), slowest} - {-1}):
+    for i in sorted({*drawn_channels(y), slowest} - {-1}):
         width, alpha = (SLOWEST_LINE, 1.0) if i == slowest else (LIGHT_LINE, 0.55)
         line = curve(trace, y[:, i], name)
         artists += ax.plot(*line, alpha=alpha, lw=style.points(width), **look)
@@ -497,126 +485,79 @@ def cross() -> dict[str, Any]:
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
 
 
-Agreement = tuple[list[int], float, float]  # of these lines, from one time to another, s
+Line = tuple[np.ndarray, np.ndarray]  # times and values
+Agreement = tuple[list[int], float]  # of these lines, until a time, s; inf where they never part
 
 
-def agreements(lines: Sequence[tuple[np.ndarray, np.ndarray]], height: float) -> list[Agreement]:
-    """Return until when all lines (times and values) agree in a panel of this height, and which of
-    them never part.
-    """
-    first, last = span_of(lines)
+def agreements(lines: Sequence[Line], height: float) -> list[Agreement]:
+    """Return until when all lines agree in a panel of this height, and which of them never part."""
+    if len(lines) < 2:
+        return []
+    last = max(float(t[-1]) for t, _ in lines)
     until = []
     for one in lines:
         until.append([_parting(one, other, COINCIDENT_DISTANCE * height) for other in lines])
-    groups: list[list[int]] = []
-    for i in range(len(lines)):
-        group = next((group for group in groups if until[group[0]][i] >= last), None)
-        groups.append([i]) if group is None else group.append(i)
-    stop = min(until[0])
-    together = first < stop < last and stop - first >= MIN_AGREEMENT * (last - first)
-    start = stop if together else first
-    whole = [([*range(len(lines))], first, stop)] * (together and len(lines) > 1)
-    return [*whole, *((group, start, last) for group in groups if len(group) > 1)]
+    found = []
+    left = list(range(len(lines)))
+    if MIN_AGREEMENT * last <= min(until[0]) < last:
+        found.append((left, min(until[0])))
+    while left:
+        group = [i for i in left if until[left[0]][i] >= last]
+        left = [i for i in left[1:] if i not in group]
+        if len(group) > 1:
+            found.append((group, np.inf))
+    return found
 
 
-def span_of(lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
-    """Return the first and the last time of lines; 0 for lines without points."""
-    times = np.concatenate([t for t, _ in lines])
-    if times.size:
-        return (float(times.min()), float(times.max()))
-    return (0.0, 0.0)
-
-
-def partings(shared: Sequence[Agreement], count: int) -> list[float]:
-    """Return until when each of `count` lines agrees with another; -inf for none."""
-    return [
-        max((stop for who, _, stop in shared if i in who), default=-np.inf) for i in range(count)
-    ]
-
-
-def _parting(
-    one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray], apart: float
-) -> float:
+def _parting(one: Line, other: Line, apart: float) -> float:
     """Return until when, s, but for a small share of their points, two lines are no farther than
     `apart` apart.
     """
-    t = one[0][one[0] <= other[0].max(initial=-np.inf) + 1e-9]
-    if not t.size:
-        return -np.inf
+    t = one[0][one[0] <= other[0][-1] + 1e-9]
     near = np.abs(np.interp(t, *other) - one[1][: len(t)]) <= apart
     share = np.cumsum(near) / np.arange(1, len(t) + 1)
     return float(t[near & (share >= COINCIDENT_SHARE)].max(initial=-np.inf))
 
 
-def between(
-    path: tuple[np.ndarray, np.ndarray], start: float, stop: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the part of a line between two times, s, with its ends; nothing if it ends before."""
-    t, y = path
-    if not t.size or start >= t[-1]:
-        return t[:0], y[:0]
-    at = np.unique([*t[(t >= start) & (t <= stop)], *np.clip([start, stop], t[0], t[-1])])
-    return at, np.interp(at, t, y)
-
-
-def tell_agreements(
-    ax: Axes,
-    shared: Sequence[Agreement],
-    lines: Sequence[tuple[np.ndarray, np.ndarray]],
-    names: Sequence[str],
-    unit: str = "s",
-) -> None:
-    """Write which traces each line in ink shows, and until when, in rows where fewer of the curves
-    are.
+def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str]) -> None:
+    """Write which traces agree, and until when, above the curves: the range of the axes grows by
+    the height of the words.
     """
-    (first, last), size = span_of(lines), style.points(9.0)
-    if 72 * ax.get_window_extent().height / ax.figure.dpi < MIN_WORDS * size:
+    size = style.points(9.0)
+    height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
+    room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
+    if not shared or height < MIN_WORDS * size:
         return
-    middle = float(
-        np.mean([np.interp(0.5 * (first + last), *path) for path in lines if len(path[0])] or [0.0])
-    )
-    top = ax.transLimits.transform(ax.transScale.transform(np.array([last, middle])))[1] < 0.5
-    for k, (who, _, stop) in enumerate(shared):
-        if names:
-            few = joined([names[i] for i in who])
-        else:
-            few = f"{len(who)} of {len(lines)}"
-        parts = stop < last - 1e-9
-        if len(who) == len(lines):
-            words = ALL.get(len(who), f"all {len(who)}")
-        else:
-            words = few
-        if parts:
-            words += f" agree until {stop:.3g} {unit}"
-        else:
-            words += " agree"
-        room = 72 * ax.get_window_extent().width / ax.figure.dpi
-        if not (style.width(words, size) < room):
-            words = words.replace(" agree", "")
-        words = style.cropped(words, room, size)
-        wide = style.width(words, size)
-        gap = 0.4 * size
-        start, parting, whole = ax.xaxis.get_transform().transform(np.array([first, stop, last]))
-        ends = room * float((parting - start) / (whole - start)) - gap
-        left = ends > wide  # of where they part
-        if left:
-            x = ends
-        else:
-            x = min(ends + 2.0 * gap, room - wide)
-        down = (-1 if top else 1) * size * (0.4 + 1.3 * k)
-        look = {
-            "ha": "right" if left else "left",
-            "va": "top" if top else "bottom",
-            "fontsize": size,
-        }
-        look |= {
-            "bbox": {"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
-            "in_layout": False,
-        }
-        place = (x / room, 1.0 if top else 0.0), (0.0, down), "axes fraction", "offset points"
-        ax.annotate(words, *place, parse_math=False, **look)
-        if parts:
+    words = agreement_words(shared, names, named=True)
+    if style.width(words, size) > room:
+        words = agreement_words(shared, names, named=False)
+    for _, stop in shared:
+        if stop < np.inf:
             ax.axvline(stop, color=style.RULE, lw=style.points(0.9), zorder=1.5)
+    words = style.cropped(words, room, size)
+    free = 1.0 - 1.8 * size / height
+    axis = ax.yaxis.get_transform()
+    low, high = axis.transform(np.array(ax.get_ylim()))
+    ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
+    place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
+    look = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
+    ax.annotate(words, (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
+
+
+def agreement_words(shared: Sequence[Agreement], names: Sequence[str], named: bool) -> str:
+    """Return which traces agree, by their names or numbers, and until when."""
+    parts = []
+    for who, stop in shared:
+        words = f"{len(who)} of {len(names)}"
+        if len(who) == len(names):
+            words = "all" if len(who) > 2 else "both"
+        elif named:
+            words = joined([names[i] for i in who])
+        words += " agree"
+        if stop < np.inf:
+            words += f" until {stop:.3g} s"
+        parts.append(words)
+    return "; ".join(parts)
 
 
 def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
@@ -624,28 +565,24 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
 
     Mark short impacts outside it and print their size.
     """
-    sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
-    peak = max(size.max(initial=0.0) for size in sizes)
-    levels = [float(np.quantile(size, LASTING_QUANTILE)) for size in sizes if size.size]
-    usual = max(*levels, *map(abs, span(panel.traces, "u")))
+    peak = 0.0
+    usual = max(map(abs, span(panel.traces, "u")))
+    for trace in panel.traces:
+        sizes = np.abs(trace.reaction[np.isfinite(trace.reaction)])
+        if sizes.size:
+            peak = max(peak, float(sizes.max()))
+            usual = max(usual, float(np.quantile(sizes, LASTING_QUANTILE)))
     if not peak > 2.0 * usual > 0.0:
         return
     top = 1.16 * usual
     ax.set_ylim(-top, top)
+    look = {"ls": "", "ms": style.points(5), "mew": style.points(1.2), "clip_on": False}
     for trace, colour in zip(panel.traces, colours, strict=True):
         for side, mark in ((1, 2), (-1, 3)):  # matplotlib's ticks up and down, outside the axes
             beyond = (np.nan_to_num(side * trace.reaction).max(axis=1) > top).astype(int)
             starts = trace.t[np.flatnonzero(np.diff(beyond, prepend=0) > 0)]
-            look = {
-                "marker": mark,
-                "ls": "",
-                "color": colour,
-                "ms": style.points(5),
-                "mew": style.points(1.2),
-            }
-            ax.plot(
-                starts, np.full(len(starts), side * top), clip_on=False, in_layout=False, **look
-            )
+            heights = np.full(len(starts), side * top)
+            ax.plot(starts, heights, color=colour, marker=mark, in_layout=False, **look)
     note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
 
 
@@ -660,27 +597,28 @@ def references(traces: Sequence[Trace]) -> list[tuple[Trace, np.ndarray, np.ndar
     """Return the longest trace of each reference, with its times (K+1,) and values (K+1,), the mean
     of its channels.
     """
-    longest = sorted(traces, key=lambda trace: len(trace.t))
+    longest = {}
+    for trace in sorted(traces, key=lambda trace: len(trace.t)):
+        longest[trace.scenario.resolved.reference] = trace
     found = []
-    for trace in {trace.scenario.resolved.reference: trace for trace in longest}.values():
+    for trace in longest.values():
         r = trace.r.mean(axis=1)
-        found.append((trace, trace.t[np.isfinite(r)], r[np.isfinite(r)]))
-    return [each for each in found if len(each[1])]
+        known = np.isfinite(r)
+        if known.any():
+            found.append((trace, trace.t[known], r[known]))
+    return found
 
 
 def target(ax: Axes, panel: Panel) -> None:
     """Draw each reference (zero for an error) as long as a run has it, and its settling band."""
     bottom, top = ax.get_ylim()
     for trace, times, values in references(panel.traces):
-        (t, r), half = (
-            line(times, values if panel.quantity == "x" else 0.0 * values, 2),
-            SETTLING_BAND * scale(trace),
-        )
+        t, r = line(times, values if panel.quantity == "x" else 0.0 * values, 2)
+        half = SETTLING_BAND * scale(trace)
         if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
-        ax.plot(
-            t, r, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE
-        )
+        look = {"lw": style.points(0.8), "ls": DASHES, "zorder": 3, "gid": REFERENCE}
+        ax.plot(t, r, color=style.INK, **look)
 
 
 def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
@@ -699,7 +637,9 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
         width = style.width(words, size)
         at = room * time / last
         begin = min(at, room - width)
-        row = next((row for row, end in enumerate(ends) if end < begin), len(ends))
+        row = 0
+        while row < len(ends) and ends[row] >= begin:
+            row += 1
         ends[row:] = [begin + width + size]
         place = (begin - at, 2 + 1.2 * size * row)
         look = {"va": "bottom", "fontsize": size, "parse_math": False}
@@ -707,7 +647,7 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
 
 
 def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
-    """Draw v over x of a panel's traces, and of a reference that moves.
+    """Draw v over x of a panel's traces.
 
     A ring marks the start of a trace.
     """
@@ -716,100 +656,45 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     for axis, words in ((ax.xaxis, panel), (ax.yaxis, speed)):
         set_numbers(axis, words)
         axis.set_label_text(words.label)
-    (left, right), (low, high) = limits(traces, "x"), limits(traces, "v")
-    ax.set_xlim(left, right)
+    ax.set(xlim=limits(traces, "x"), ylim=limits(traces, "v"))
     one = traces[0].x.shape[1] == 1
-    places = [
-        (trace.t, trace.x[:, 0] / (right - left) + 1j * trace.v[:, 0] / (high - low))
-        for trace in traces
-    ]
-    shared = agreements(places, 1.0) if one else []
     width = style.points(LINE if one else LIGHT_LINE)
-    for trace, colour, start in reversed(
-        list(zip(traces, colours, partings(shared, len(traces)), strict=True))
-    ):
-        shown = drawn_channels(trace.x)
-        later = trace.t >= start
-        for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
-            ax.plot(x[later], v[later], color=colour, lw=width)
+    for trace, colour in reversed(list(zip(traces, colours, strict=True))):
+        for i in drawn_channels(trace.x):
+            x = trace.x[:, i]
+            v = trace.v[:, i]
+            ax.plot(x, v, color=colour, lw=width)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         if trace.diverged_at is not None:
             ax.plot(trace.x[-1, 0], trace.v[-1, 0], "X", color=colour, zorder=5, **cross())
-    for (first, *_), start, stop in shared:
-        part = (traces[first].t >= start) & (traces[first].t <= stop)
-        ax.plot(
-            traces[first].x[part, 0],
-            traces[first].v[part, 0],
-            color=style.INK,
-            lw=width,
-            gid=AGREED,
-        )
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
-    for trace, _, r in references(traces):
-        if len(r) > 1:
-            dr = np.gradient(r, trace.scenario.control_period)
-        else:
-            dr = 0.0 * r
-        steady = np.abs(dr) <= JUMP_RATIO * np.quantile(
-            np.abs(dr), 0.99
-        )  # where the reference does not jump
-        dr = dr[steady]
-        if dr.any():
-            ax.plot(
-                r[steady],
-                dr,
-                color=style.INK,
-                lw=style.points(0.8),
-                ls=(0, (4, 4)),
-                zorder=3,
-                gid=REFERENCE,
-            )
-            low, high = min(low, 1.05 * dr.min()), max(high, 1.05 * dr.max())
-    ax.set_ylim(low, high)
 
 
-def last_samples(
-    ax: Axes,
-    panel: Panel,
-    colours: Sequence[str],
-    among: Sequence[Trace],
-    names: Sequence[str] = (),
-) -> None:
-    """Draw the last samples of u of the first channel, each held until the next, of the longest run
-    of `among`.
+def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
+    """Draw the last samples of u of the first channel, each held until the next, of the longest
+    run.
     """
-    traces = panel.traces
-    stop = end(among)
-    set_numbers(ax.yaxis, panel._replace(traces=among))
-    begin = max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in among))
-    lines = []
-    for trace in traces:
-        part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), None)
-        lines.append((1e3 * (trace.t[part] - stop), trace.u[part, 0]))
-    shown = np.concatenate([u for _, u in lines])
-    if shown.size:
-        low = shown.min()
-        high = shown.max()
-        half = max(0.62 * (high - low), MIN_CLOSE_UP / 2 * max(map(abs, span(traces, "u")))) or 1.0
-        ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    shared = agreements(lines, float(np.ptp(ax.get_ylim())))
-    for path, colour, since in reversed(
-        list(zip(lines, colours, partings(shared, len(lines)), strict=True))
-    ):
-        ax.step(*between(path, since, np.inf), where="post", color=colour, lw=style.points(LINE))
-    for who, since, until in shared:
-        path = between(lines[who[0]], since, until)
-        ax.step(*path, where="post", color=style.INK, lw=style.points(LINE), gid=AGREED)
-    tell_agreements(ax, shared, lines, names, "ms")
-    if all(trace.diverged_at is not None for trace in traces):
-        if len(traces) == 1:
-            words = "the run failed"
-        else:
-            words = "all runs failed"
-        ax.text(
-            0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=style.MUTED
-        )
+    stop = end(panel.traces)
+    set_numbers(ax.yaxis, panel)
+    begin = max(0.0, stop - LAST_SAMPLES * panel.traces[0].scenario.control_period)
+    ends = []
+    for trace, colour in reversed(list(zip(panel.traces, colours, strict=True))):
+        part = trace.t >= begin - 1e-9
+        u = trace.u[part, 0]
+        t = 1e3 * (trace.t[part] - stop)
+        ax.step(t, u, where="post", color=colour, lw=style.points(LINE))
+        if u.size:
+            ends += [u.min(), u.max()]
+    if ends:
+        least = MIN_CLOSE_UP / 2 * max(map(abs, span(panel.traces, "u")))
+        half = max(0.62 * np.ptp(ends), least) or 1.0
+        middle = (min(ends) + max(ends)) / 2
+        ax.set_ylim(middle - half, middle + half)
+    else:
+        words = "the run failed" if len(panel.traces) == 1 else "all runs failed"
+        place = {"transform": ax.transAxes, "ha": "center", "va": "center"}
+        ax.text(0.5, 0.5, words, color=style.MUTED, **place)
         ax.tick_params(labelleft=False)
     ax.set_xlim(1e3 * (begin - stop), 0.0)
 
@@ -830,7 +715,7 @@ def crowded(panel: Panel) -> bool:
     return wide > MAX_BANDS
 
 
-def drawn_channels(y: np.ndarray) -> np.ndarray:
+def drawn_channels(y: np.ndarray) -> list[int]:
     """Return the indices of the channels of y, (K + 1, n), that are drawn one by one.
 
     Those of its least and largest value are among them, so that their curves reach as far as those
@@ -838,11 +723,9 @@ def drawn_channels(y: np.ndarray) -> np.ndarray:
     """
     n = y.shape[1]
     if n <= MAX_DRAWN_CHANNELS:
-        return np.arange(n)
-    extremes = [int(np.nanargmin(y)) % n, int(np.nanargmax(y)) % n]
-    return np.unique(
-        [*np.linspace(0, n - 1, MAX_DRAWN_CHANNELS - 2).round().astype(int), *extremes]
-    )
+        return list(range(n))
+    chosen = np.linspace(0, n - 1, MAX_DRAWN_CHANNELS).round().astype(int)
+    return sorted({*chosen.tolist(), int(np.nanargmin(y)) % n, int(np.nanargmax(y)) % n})
 
 
 def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:
@@ -851,16 +734,17 @@ def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:
     """
     values = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
     if not values:
-        shares = [UNDIVERGED_SHARE if trace.plant_diverged else 1.0 for trace in traces]
-        whole = [QUANTITIES[name](trace) for trace in traces]
-        values = [y[: max(1, int(share * len(y)))] for y, share in zip(whole, shares, strict=True)]
+        for trace in traces:
+            y = QUANTITIES[name](trace)
+            share = UNDIVERGED_SHARE if trace.plant_diverged else 1.0
+            values.append(y[: max(1, int(share * len(y)))])
     return [y for y in values if np.isfinite(y).all()]
 
 
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     """Return the least and largest value of the runs that last."""
-    values = lasting(traces, name) or [np.zeros(1)]
-    return float(min(y.min() for y in values)), float(max(y.max() for y in values))
+    values = np.concatenate([np.ravel(y) for y in lasting(traces, name)] or [np.zeros(1)])
+    return float(values.min()), float(values.max())
 
 
 def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from smc_mujoco.analysis.sensitivity import CHANCE, Cut, SobolResult, Space, in_words
@@ -20,9 +19,11 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
-ROW_HEIGHT, MIN_HEIGHT = 0.42, 3.6  # inches, of an axis, and of the panels
+ROW_HEIGHT = 0.42  # inches, of an axis
+MIN_HEIGHT = 3.6  # of the panels
 PALE_SHARE = 0.6  # of white in a bar's light part: chosen
 DOT_SIZE = 26.0  # points squared, of a run
+TONES = 12  # of runs, from the best score to the worst
 
 
 def draw(
@@ -32,50 +33,41 @@ def draw(
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
-) -> Figure | SubFigure:
+) -> Figure:
     """Draw a sensitivity; arguments as in `figure`."""
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     colour = style.law_colour(found.scenario.law)
     pale = style.mixed(colour, style.PAPER, PALE_SHARE)
     name = style.law_name(found.scenario.law)
-    handles: list[Handle] = [
-        Patch(facecolor=colour, label="alone"),
-        Patch(facecolor=pale, label="with others, 95 % interval"),
-        Line2D(
-            [],
-            [],
-            ls="",
-            marker="o",
-            color=colour,
-            label=f"a run, darker: worse {CATALOGUE[found.metric].label}",
-        ),
-        *(
-            [Line2D([], [], ls="", marker="x", color=style.INK, label="a run that fails")]
-            * bool(found.failed.any())
-        ),
-    ]
     with style.page(width):
-        head = pages.head_height(width, handles)
-        tall = max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes))
-        page = pages.blank(width, height or head + style.points(tall), fig)
+        worse = f"a run, darker: worse {CATALOGUE[found.metric].label}"
+        handles: list[Handle] = [
+            Patch(facecolor=colour, label="alone"),
+            Patch(facecolor=pale, label="with others, 95 % interval"),
+            pages.entry(worse, colour, lw=0, marker="o"),
+        ]
+        if found.failed.any():
+            handles.append(pages.entry("a run that fails", style.INK, lw=0, marker="x"))
+        tall = style.points(max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes)))
+        page = pages.blank(width, height or pages.head_height(width, handles) + tall, fig)
         bars, runs = page.subplots(1, 2, width_ratios=[1.0, 1.1])
         _bars(bars, found, colour, pale)
         _runs(runs, found, colour)
-        reported = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
-        pages.set_head(page, width, title or reported, handles)
-        pages.write(page, paths)
-    return page
+        about = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
+        pages.set_head(page, width, title or about, handles)
+        return pages.write(page, paths)
 
 
 def _bars(ax: Axes, found: SobolResult, colour: str, pale: str) -> None:
     """Draw both indices of each axis, the largest at the top."""
     rows = np.arange(len(found.axes))
-    first, total = ([getattr(axis, kind) for axis in found.axes] for kind in ("first", "total"))
-    ax.barh(rows, [100 * max(its.median, 0.0) for its in total], 0.62, color=pale)
-    ax.barh(rows, [100 * min(max(its.median, 0.0), 1.0) for its in first], 0.3, color=colour)
-    ends = np.clip([(its.low, its.high) for its in total], 0.0, 1.0) * 100
-    ax.hlines(rows, *ends.T, color=style.INK, lw=style.points(1.2))
+    first = np.array([axis.first.median for axis in found.axes])
+    total = np.array([axis.total[:3] for axis in found.axes])
+    median, low, high = 100 * np.clip(total, 0.0, 1.0).T
+    ax.barh(rows, median, 0.62, color=pale)
+    ax.barh(rows, 100 * np.clip(first, 0.0, 1.0), 0.3, color=colour)
+    ax.hlines(rows, low, high, color=style.INK, lw=style.points(1.2))
     ax.set_yticks(rows, [in_words(axis.name) for axis in found.axes])
     ax.set(
         xlim=(0.0, 100.0), xlabel=f"share of the variance of {CATALOGUE[found.metric].label} (%)"
@@ -89,42 +81,38 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
     indices.
     """
     space = found.space
+    at = []
     if found.regions:
-        wanted = [cut.axis for cut in found.regions[0].cuts]
-    else:
-        wanted = []
-    ranked = [space.names.index(axis.name) for axis in found.axes if axis.name != CHANCE]
-    at = [*wanted, *(i for i in ranked if i not in wanted)][:2]
-    scales = [style.prefixed(space.ends[i][1], space.ends[i][2]) for i in at]
-    columns = [
-        factor * space.column(i, found.shares) for i, (factor, _) in zip(at, scales, strict=True)
-    ]
-    if len(at) < 2:  # one axis has the score beside it
+        at = [cut.axis for cut in found.regions[0].cuts]
+    for axis in found.axes:
+        place = space.names.index(axis.name)
+        if axis.name != CHANCE and place not in at:
+            at.append(place)
+    columns = []
+    factors = []
+    for i, axis in zip(at, (ax.xaxis, ax.yaxis), strict=False):
+        _, high, unit = space.ends[i]
+        factor, unit = style.prefixed(high, unit)
+        factors.append(factor)
+        columns.append(factor * space.column(i, found.shares))
+        axis.set_label_text(f"{in_words(space.names[i])} ({unit or 'of nominal'})")
+        constant = space.columns[i]
+        if constant and constant.geometric:
+            axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    if len(columns) < 2:  # one axis has the score beside it
         columns.append(found.values)
         ax.set_ylabel(f"{CATALOGUE[found.metric].label} ({found.unit})")
     order = np.argsort(found.values)  # the worst on top
-    place = np.empty(len(order))
-    place[order] = np.linspace(0.0, 1.0, len(order))
-    shades = np.array(style.ramp(colour, 12))
-    tone = shades[np.minimum((place * len(shades)).astype(int), len(shades) - 1)]
-    for marker, kind, of in (
-        ("o", ~found.failed, tone),
-        ("x", found.failed, np.full(len(tone), style.INK)),
-    ):
+    shades = np.array(style.ramp(colour, TONES))
+    tones = np.empty(len(order), object)
+    tones[order] = shades[np.linspace(0.0, TONES - 0.5, len(order)).astype(int)]
+    tones[found.failed] = style.INK
+    for marker, kind in (("o", ~found.failed), ("x", found.failed)):
         picked = order[kind[order]]
-        ax.scatter(
-            columns[0][picked],
-            columns[1][picked],
-            style.points(DOT_SIZE),
-            of[picked].tolist(),
-            marker=marker,
-        )
-    for k, (i, (_, unit)) in enumerate(zip(at, scales, strict=True)):
-        (ax.set_xlabel, ax.set_ylabel)[k](f"{in_words(space.names[i])} ({unit or 'of nominal'})")
-        if (constant := space.columns[i]) and constant.geometric:
-            (ax.set_xscale, ax.set_yscale)[k]("log", base=2)
+        look = {"c": tones[picked].tolist(), "marker": marker, "s": style.points(DOT_SIZE)}
+        ax.scatter(columns[0][picked], columns[1][picked], **look)
     if found.regions:
-        _border(ax, found.regions[0].cuts, at, [factor for factor, _ in scales], space)
+        _border(ax, found.regions[0].cuts, at, factors, space)
 
 
 def _border(
@@ -139,13 +127,5 @@ def _border(
         if cut.high < 1.0:
             ends[k][1] = factors[k] * space.value(cut.axis, cut.high)
     (left, right), (low, high) = ends
-    border = Rectangle(
-        (left, low),
-        right - left,
-        high - low,
-        fill=False,
-        ls="--",
-        ec=style.INK,
-        lw=style.points(1.2),
-    )
-    ax.add_patch(border)
+    look = {"fill": False, "ls": "--", "ec": style.INK, "lw": style.points(1.2)}
+    ax.add_patch(Rectangle((left, low), right - left, high - low, **look))

@@ -78,11 +78,11 @@ class Session:
             raise ScenarioError(
                 "no view: the runs differ in control_period or duration: give both the same"
             )
-        prepared = [prepare(scenario) for scenario in scenarios]
+        prepared = list(map(prepare, scenarios))
         with callback.installed():
             self.batches = [ScenarioBatch([one], threads=1) for one in prepared]
         self.scenarios = tuple(scenarios)
-        self.sliders = [sliders(scenario) for scenario in self.scenarios]
+        self.sliders = list(map(sliders, scenarios))
         self.advance_to(sample)
 
     @property
@@ -191,17 +191,13 @@ class Session:
         """Start again with the number of a slider."""
         self.change(lambda s: slider.changed(s, value), run)
 
-    def keyframe(self, key: int) -> None:
-        """Start again from a keyframe of the model."""
-        self.change(lambda s: at_keyframe(s, self.batches[0].base, key))
-
     def save(self, path: Path) -> Path:
         """Write a new scene file whose runs are these to the bit; refuse what it could not
         repeat.
         """
         runs = {f"{s.law.name} {i + 1}": describe(s) for i, s in enumerate(self.scenarios)}
         runs = json.loads(json.dumps(runs))
-        if [restore(run) for run in runs.values()] != list(self.scenarios):
+        if tuple(map(restore, runs.values())) != self.scenarios:
             raise ScenarioError(
                 "the session cannot be saved: a scene file cannot name its law or plant"
             )
@@ -218,11 +214,11 @@ class Session:
 
 def sliders(s: Scenario) -> dict[str, Slider]:
     """Return name -> slider of a run's gains and conditions."""
-    if len(s.law.parts) > 1:
-        gains = {}
-    else:
-        gains = gain_sliders(s.law)
-    return gains | {name: one for name, one in condition_sliders(s).items() if takes(s, one)}
+    found = {} if len(s.law.parts) > 1 else gain_sliders(s.law)
+    for name, slider in condition_sliders(s).items():
+        if takes(s, slider):
+            found[name] = slider
+    return found
 
 
 def laws_of(plant: Plant) -> list[str]:
@@ -242,29 +238,6 @@ def law_for(plant: Plant, law: Law | Template | str) -> Law | Template | str:
         return law
 
 
-def at_keyframe(scenario: Scenario, model: mujoco.MjModel, key: int) -> Scenario:
-    """Return a scenario that starts in a keyframe; refuse one that the channels' x0 and v0 cannot
-    give.
-    """
-    qpos = model.key_qpos[key]
-    qvel = model.key_qvel[key]
-    joints = models.moving_joints(model)[0]
-    if scenario.plant.pose:
-        first = model.jnt_qposadr[joints[0]]
-        dof = model.jnt_dofadr[joints[0]]
-        turn = np.zeros(3)
-        mujoco.mju_quat2Vel(turn, qpos[first + 3 : first + 7], 1.0)
-        x0 = [*qpos[first : first + 3], *turn]
-        v0 = qvel[dof : dof + 6]
-    else:
-        x0 = qpos[model.jnt_qposadr[joints]]
-        v0 = qvel[model.jnt_dofadr[joints]]
-    started = dataclasses.replace(scenario, x0=tuple(map(float, x0)), v0=tuple(map(float, v0)))
-    if not all(map(np.allclose, models.initial_state(model, started), (qpos, qvel))):
-        raise ScenarioError(f"no start from keyframe {key}: it moves joints without a channel")
-    return started
-
-
 def gain_sliders(law: Law) -> dict[str, Slider]:
     """Return a slider for each finite gain that all channels share: a tenth to ten times it, 0 to 1
     for 0.
@@ -275,16 +248,12 @@ def gain_sliders(law: Law) -> dict[str, Slider]:
             "law": dataclasses.replace(s.law, gains={**s.law.gains, name: gain})
         }
 
-    return {
-        name: Slider(
-            gain,
-            min(gain / 10.0, gain * 10.0),
-            max(gain / 10.0, gain * 10.0) if gain else 1.0,
-            fields(name),
-        )
-        for name, gain in law.gains.items()
-        if not isinstance(gain, tuple) and math.isfinite(gain)
-    }
+    found = {}
+    for name, gain in law.gains.items():
+        if not isinstance(gain, tuple) and math.isfinite(gain):
+            low, high = sorted((gain / 10.0, gain * 10.0))
+            found[name] = Slider(gain, low, high if gain else 1.0, fields(name))
+    return found
 
 
 def condition_sliders(s: Scenario) -> Mapping[str, Slider]:

@@ -8,7 +8,6 @@ the joint's reaction. Friction and contacts are in the reaction too: with them t
 of the actuator's force, which does not tell when a rotor is in play.
 """
 
-import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -46,15 +45,13 @@ class Shape(NamedTuple):
 
 def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
-    if scenario.jump is None:
-        steps = [0]
-    else:
-        steps = [0, scenario.jump_step]
     compiled = models.compile_model(scenario)
-    return [
-        Shape(step * scenario.resolved.physics_step, models.with_values(compiled, scenario, step))
-        for step in steps
-    ]
+    found = [Shape(0.0, models.with_values(compiled, scenario, 0))]
+    if scenario.jump:
+        step = scenario.jump_step
+        model = models.with_values(compiled, scenario, step)
+        found.append(Shape(step * scenario.resolved.physics_step, model))
+    return found
 
 
 def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> list[State | None]:
@@ -65,18 +62,15 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> l
     gap = backlash_gap(trace.scenario)
     contact = np.any(np.stack([extended(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
     sliding = np.array([extended(~on, trace.t, hold) for on in at_rest(trace).T])
-    if gap:
-        sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T])
-    else:
-        sides = None
+    sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T])
     states: list[State | None] = []
     for time in times.tolist():
         k = int(np.searchsorted(trace.t, time + 1e-9)) - 1
-        words = [stick_words(~sliding[:, k])] if dry else []
-        if sides is not None:
-            words += [backlash_words(sides[:, k])]
-        else:
-            words += []
+        words = []
+        if dry:
+            words.append(stick_words(~sliding[:, k]))
+        if gap:
+            words.append(backlash_words(sides[:, k]))
         if trace.diverged_at is not None and time >= trace.diverged_at:
             states.append(None)
         elif contact[k]:
@@ -84,7 +78,7 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> l
         else:
             sticks = dry and not sliding[:, k].all()
             states.append(State(", ".join(words), STUCK if sticks else CALM) if words else None)
-    return debounced(states, times, hold)
+    return states
 
 
 def at_rest(trace: Trace) -> np.ndarray:
@@ -95,34 +89,6 @@ def at_rest(trace: Trace) -> np.ndarray:
     for group, part in conventions.by_group(trace).items():
         rest[:, group.channels] = conventions.at_rest(part)
     return rest
-
-
-def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) -> list[State | None]:
-    """Return the states, with those shorter than `hold` s replaced by the ones before.
-
-    Contacts are kept.
-    """
-    runs = [
-        list(run)
-        for _, run in itertools.groupby(range(len(states)), key=lambda frame: states[frame])
-    ]
-    result = list(states)
-    for run, after in itertools.pairwise(runs):
-        state = states[run[0]]
-        if run[0]:
-            before = result[run[0] - 1]
-        else:
-            before = states[after[0]]
-        brief = times[after[0]] - times[run[0]] < hold - 1e-9
-        if (
-            brief
-            and state
-            and before
-            and state.mood != STRUCK
-            and (run[0] or before.mood != STRUCK)
-        ):
-            result[run[0] : after[0]] = [before] * len(run)
-    return result
 
 
 def has_dry_friction(scenario: Scenario) -> bool:
@@ -139,11 +105,6 @@ def has_dry_friction(scenario: Scenario) -> bool:
         model.pair(i).name.startswith(RUB) and model.pair_friction[i, 0] > 0.0
         for i in range(model.npair)
     )
-
-
-def has_contact(scenario: Scenario) -> bool:
-    """Return whether the machine can hit something."""
-    return scenario.contact.kind != "none" and bool(_channels(shapes(scenario)[0].model)[0])
 
 
 def backlash_gap(scenario: Scenario) -> float:

@@ -54,11 +54,6 @@ class Panel(plugin.ViewerPlugin):
             self.button("reset", session.reset)
             imgui.SameLine()
             self.button(f"save as scene {SAVED_AS}", functools.partial(session.save, SAVED_AS))
-            for key in range(self.viewer.model.nkey):
-                name = (
-                    self.viewer.model.key(key).name.removeprefix("smc:") or key
-                )  # "smc:start" is that of a user
-                self.button(f"keyframe {name}", functools.partial(session.keyframe, key))
             for run in range(len(session.scenarios)):
                 self.run(run)
             if len(session.scenarios) == 1:

@@ -15,7 +15,7 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,31 +43,23 @@ FAILED = "#A9AFB6"
 DISTURBANCE = "#3A3F46"
 BAND = "#DDE1E5"
 RULE = "#B9BFC5"
+HUES = 36  # of the grid from which colours are chosen
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours,
 # the disturbance's and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6),
 # 2009).
 REACTION = "#9018F0"
+NEUTRAL = (PAPER, INK, DISTURBANCE, REACTION, FAILED)  # colours that no law has
 LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
 MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
-PREFIXES = {
-    -2: "M",
-    -1: "k",
-    0: "",
-    1: "m",
-    2: "µ",
-    3: "n",
-}  # of units, by the power of 1000 that a number is given
-CAMEL = re.compile(
-    r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])"
-)  # where a word begins in DCMotor, but not in LuGre
+# of units, by the power of 1000 that a number is given
+PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}
+# where a word begins in DCMotor, but not in LuGre
+CAMEL = re.compile(r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])")
 MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve they begin again
-MAX_DIGITS, MAX_VALUES = 17, 8  # digits that tell two numbers apart; numbers of a label
-WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
+MAX_VALUES = 8  # numbers of a label
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
-LIGHTEST, DARKEST = (
-    61.0,
-    21.0,
-)  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper; of a ramp
+LIGHTEST = 61.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper
+DARKEST = 21.0  # of a ramp
 # linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
 SIGHTS = np.array([
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -172,6 +164,11 @@ def law_colour(law: Component | str) -> str:
     return chosen.get(name) or list(chosen.values())[zlib.crc32(name.encode()) % len(chosen)]
 
 
+def trace_colours(traces: Sequence[Trace]) -> list[str]:
+    """Return one colour per trace, that of its law, all different."""
+    return law_colours([trace.scenario.law for trace in traces])
+
+
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
@@ -182,30 +179,26 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     its colour, from light to dark.
     """
     names = [_template(law)[1] for law in laws]
-    colours: dict[int, str] = {}
+    everyone = range(len(laws))
     places = dict.fromkeys(palette()["stated"], 0)
     for place, name in enumerate(palette()["chosen"], 1):
         places[name] = place
-    library = [i for i, name in enumerate(names) if name in places]
+    library = [i for i in everyone if names[i] in places]
     library.sort(key=lambda i: (places[names[i]], names[i]))
-    others = [i for i, name in enumerate(names) if name not in places]
+    colours: dict[int, str] = {}
     changed = []
-    for i in library + others:
-        again = [k for k, name in enumerate(names) if name == names[i]]
+    for i in dict.fromkeys([*library, *everyone]):
         wanted = law_colour(laws[i])
-        shades = len(again) > 1
-        if shades:
-            wanted = ramp(wanted, len(again))[again.index(i)]
-        if not shades and any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
+        several = names.count(names[i])
+        if several > 1:
+            colours[i] = ramp(wanted, several)[names[:i].count(names[i])]
+        elif any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
             changed.append(i)
         else:
             colours[i] = wanted
-    for i in sorted(changed):
-        used = [*colours.values(), PAPER, INK, DISTURBANCE, REACTION, FAILED]
-        colours[i] = _farthest(
-            [colour for colour in _grid(len(colours)) if colour not in used], used
-        )
-    return [colours[i] for i in range(len(laws))]
+    found = _farthest([*colours.values(), *NEUTRAL], len(changed))
+    colours |= zip(sorted(changed), found, strict=True)
+    return [colours[i] for i in everyone]
 
 
 @functools.cache
@@ -220,36 +213,33 @@ def palette() -> dict[str, dict[str, str]]:
 
 def spread(count: int) -> list[str]:
     """Return colours, each the farthest from the neutral ones and from all before it."""
-    used = [PAPER, INK, DISTURBANCE, REACTION, FAILED]
+    return _farthest(NEUTRAL, count)
+
+
+def _farthest(used: Sequence[str], count: int) -> list[str]:
+    """Return so many colours of the grid, each the one whose least `distance` to the used ones and
+    to those before it is largest.
+    """
+    grid = np.array(list(map(_seen, _grid())))
+    chosen = list(used)
     for _ in range(count):
-        used.append(_farthest([colour for colour in _grid(0) if colour not in used], used))
-    return used[len(used) - count :]
-
-
-def _farthest(colours: Sequence[str], others: Sequence[str]) -> str:
-    """Return the colour whose `distance` to the nearest of the others is largest."""
-    seen, beside = (np.array([_seen(colour) for colour in some]) for some in (colours, others))
-    apart = np.linalg.norm(seen[:, None] - beside, axis=-1).min(axis=(1, 2))
-    return colours[int(apart.argmax())]
+        beside = np.array(list(map(_seen, chosen)))
+        apart = np.linalg.norm(grid[:, None] - beside, axis=-1).min(axis=(1, 2))
+        chosen.append(_grid()[int(apart.argmax())])
+    return chosen[len(used) :]
 
 
 @functools.cache
-def _grid(count: int) -> tuple[str, ...]:
-    """Return a grid of colours that are neither pale nor dull, at least twice as many as
-    `count`.
-    """
-    hues = 36
-    while hues < count / 2:
-        hues *= 2  # a few grids serve all counts
-    parts = itertools.product(range(hues), (0.24, 0.33, 0.42, 0.51, 0.6), (0.45, 0.7, 0.95))
-    colours = (
-        "#"
-        + "".join(
-            f"{round(255 * c):02X}" for c in colorsys.hls_to_rgb(k / hues, lightness, saturation)
-        )
-        for k, lightness, saturation in parts
-    )
-    return tuple(colour for colour in colours if _seen(colour)[0][0] < LIGHTEST)
+def _grid() -> list[str]:
+    """Return a grid of colours that are neither pale nor dull."""
+    grid = []
+    parts = itertools.product(range(HUES), (0.24, 0.33, 0.42, 0.51, 0.6), (0.45, 0.7, 0.95))
+    for hue, lightness, saturation in parts:
+        shade = colorsys.hls_to_rgb(hue / HUES, lightness, saturation)
+        colour = "#" + bytes(round(255 * part) for part in shade).hex().upper()
+        if _seen(colour)[0][0] < LIGHTEST:
+            grid.append(colour)
+    return grid
 
 
 @functools.cache
@@ -289,16 +279,6 @@ def label(name: str) -> str:
     return in_words(name) if name in known else name
 
 
-def law_initials(law: str) -> str:
-    """Return a law's name in two or three letters, for narrow places."""
-    template, name = _template(law)
-    return (
-        (template and template.short)
-        or "".join(word[:1] for word in name.split("_")).upper()[:3]
-        or "?"
-    )
-
-
 def _template(law: Component | str) -> tuple[Template | None, str]:
     """Return the template of a law, if there is one, and the law's name."""
     if isinstance(law, str):
@@ -325,97 +305,54 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
             )
         return [label if isinstance(label, str) else shown(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
-    reported = []
+    told = []
     for trace, name in zip(traces, names, strict=True):
-        alike = [run for run, other in zip(traces, names, strict=True) if other == name]
-        words = differences(trace, alike, traces)
-        reported.append(f"{name}: {words}" if words else name)
+        words = differences(trace, traces)
+        told.append(f"{name}: {words}" if words else name)
     numbered = []
-    for i, name in enumerate(reported):
-        several = reported.count(name) > 1
-        numbered.append(f"{name} {reported[:i].count(name) + 1}" if several else name)
+    for i, name in enumerate(told):
+        several = told.count(name) > 1
+        numbered.append(f"{name} {told[:i].count(name) + 1}" if several else name)
     return numbered
 
 
-def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
+def differences(trace: Trace, others: Sequence[Trace]) -> str:
     """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no
     noise, m = 0.7".
 
     Where the condition differs, its name replaces the fields that are equal in all its runs.
     """
-    settings = _differing(_settings, trace, alike)
-    condition = settings.pop("condition", "")
+    scenario = trace.scenario
+    alike = [run for run in others if law_name(run.scenario.law) == law_name(scenario.law)]
+    same = [run for run in alike if run.scenario.condition == scenario.condition]
     parts = []
-    if condition:
-        named = trace.scenario.condition
-        same = _differing(
-            _settings, trace, [run for run in alike if run.scenario.condition == named]
-        )
-        for name in CONDITION_FIELDS:
-            if name not in same:
-                settings.pop(name, None)
-        parts.append(condition)
-    parts += settings.values()
-    true = _differing(
-        lambda run: vars(run.scenario.plant.values(run.scenario.mismatch)), trace, others
-    )
-    for name, words in true.items():
-        parts.append(f"plant's {words}" if name in trace.scenario.law.gains else words)
+    for name, words in _settings(trace).items():
+        runs = same if name in CONDITION_FIELDS else alike
+        if any(_settings(run).get(name) != words for run in runs):
+            parts.append(words)
+    for name, words in _parameters(trace).items():
+        if any(_parameters(run)[name] != words for run in others):
+            parts.append(f"plant's {words}" if name in scenario.law.gains else words)
     return ", ".join(parts)
 
 
-def _differing(
-    settings: Callable[[Trace], Mapping[str, object]], trace: Trace, others: Sequence[Trace]
-) -> dict[str, str]:
-    """Return the settings of a run that not all others share, in words that tell it from the
-    others.
-    """
-    mine, *tables = _in_parts([settings(run) for run in (trace, *others)])
-    words = {}
-    for name, value in mine.items():
-        unequal = [table.get(name) for table in tables if table.get(name) != value]
-        digits = 3
-        while unequal and name not in words:
-            text = _setting(name, value, digits)
-            digits += 1
-            if digits > MAX_DIGITS or text not in [_setting(name, x, digits - 1) for x in unequal]:
-                words[name] = text
-    return words
-
-
-def _in_parts(tables: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
-    """Return settings with the fields of a part or signal, such as "disturbance omega", where all
-    are of one kind.
-    """
-    found = [dict(table) for table in tables]
-    for name in tables[0]:
-        values = [table.get(name) for table in tables]
-        parts = []
-        for value in values:
-            parts.append(value[0] if isinstance(value, tuple) and len(value) == 1 else value)
-        kind = type(parts[0])
-        if (
-            dataclasses.is_dataclass(kind)
-            and {type(part) for part in parts} == {kind}
-            and kind.__name__.lower() != name
-        ):
-            fields = [field.name for field in dataclasses.fields(kind)]
-            for table, part in zip(found, parts, strict=True):
-                table |= {f"{name} {field}": getattr(part, field) for field in fields}
-                del table[name]
-    return found
-
-
 @once_per_trace
-def _settings(trace: Trace) -> Mapping[str, object]:
-    """Return the gains of a run, and the fields of its scenario."""
+def _settings(trace: Trace) -> Mapping[str, str]:
+    """Return the condition and the gains of a run, and the other fields of its scenario, in
+    words.
+    """
     scenario = trace.scenario
-    fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
-    kept = {}
-    for name, value in fields.items():
+    values = {"condition": scenario.condition, **scenario.law.gains}
+    for name in Scenario.fields():
         if name not in ("law", "plant", "mismatch"):
-            kept[name] = value
-    return dict(scenario.law.gains) | kept
+            values[name] = getattr(scenario, name)
+    return {name: _setting(name, value) for name, value in values.items()}
+
+
+def _parameters(trace: Trace) -> dict[str, str]:
+    """Return the true parameters of a run's machine in words."""
+    true = vars(trace.scenario.plant.values(trace.scenario.mismatch))
+    return {name: _setting(name, value) for name, value in true.items()}
 
 
 def distinct(names: Sequence[str]) -> list[str]:
@@ -428,7 +365,7 @@ def distinct(names: Sequence[str]) -> list[str]:
     return list(names)
 
 
-def _setting(name: str, value: object, digits: int = 3) -> str:
+def _setting(name: str, value: object) -> str:
     """Return a gain or a field of a scenario in words."""
     words = name.replace("_", " ")
     if name == "condition":
@@ -437,40 +374,38 @@ def _setting(name: str, value: object, digits: int = 3) -> str:
         return f"jump at {value.time:g} s"
     if value is True:
         return words
-    text = _value(value, digits).removeprefix(f"{capital(words)}, ")  # a noise is a Noise
-    if value is None or value is False or value == () or text == capital(words):
+    if value in (None, False, ()) and not isinstance(value, int | float):
+        return f"no {words}"
+    text = _value(value).removeprefix(f"{capital(words)}, ")  # a noise is a Noise
+    if text == capital(words):
         return f"no {words}"
     first = value[0] if isinstance(value, tuple) else value
-    if isinstance(first, int | float):
-        return f"{words} = {text}"
-    return f"{words} {text}"
+    return f"{words} = {text}" if isinstance(first, int | float) else f"{words} {text}"
 
 
-def _value(value: object, digits: int) -> str:
+def _value(value: object) -> str:
     """Return a value of a field in words, such as "0.5", "Coulomb 0.005" or "Encoder, counts
     2000".
     """
     if isinstance(value, int | float):
-        return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"
+        return f"{value:.6g}"
     if isinstance(value, tuple):
         parts = value[:1] if len(set(value)) == 1 else value
-        few = ", ".join(_value(part, digits) for part in parts)
+        few = ", ".join(map(_value, parts))
         return few if len(parts) <= MAX_VALUES else f"{len(value)} values"
-    if not dataclasses.is_dataclass(value):
-        return str(value).replace("_", " ")
     if isinstance(value, Component):
         return law_name(value)
+    if not dataclasses.is_dataclass(value):
+        return str(value).replace("_", " ")
     kind = re.sub(CAMEL, lambda start: f" {start[1].lower()}", type(value).__name__)
+    words = [kind]
     fields = dataclasses.fields(value)
-    said = {}
     for field in fields:
         part = getattr(value, field.name)
         if part != field.default:
-            said[field.name] = _value(part, digits)
-    if len(fields) == 1:
-        return " ".join([kind, *said.values()])
-    kind = said.pop("kind", kind)
-    return ", ".join([kind, *(f"{name.replace('_', ' ')} {said[name]}" for name in said)])
+            said = _value(part)
+            words.append(said if len(fields) == 1 else f"{field.name.replace('_', ' ')} {said}")
+    return (" " if len(fields) == 1 else ", ").join(words)
 
 
 def ending(trace: Trace) -> str:
@@ -490,29 +425,28 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
     """
     who_at: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
-        plant = trace.scenario.plant
-        jump = trace.scenario.jump
-        if jump is None:
-            events = []
-        else:
-            events = [(jump.time, plant.change(jump.factors))]
+        events = set()
+        if jump := trace.scenario.jump:
+            events.add((jump.time, trace.scenario.plant.change(jump.factors)))
         for push in pushes([trace]) if blows else ():
             size = short(math.hypot(push.x, push.y, push.z))
-            events.append((push.time, f"blow of {size} N for {1e3 * push.width:.3g} ms"))
-        for event in dict.fromkeys(events):
+            events.add((push.time, f"blow of {size} N for {1e3 * push.width:.3g} ms"))
+        for event in events:
             who_at.setdefault(event, []).append(name)
-    words: dict[float, list[str]] = {}
+    words: dict[float, str] = {}
     for (time, what), who in sorted(who_at.items()):
-        words.setdefault(time, []).append(
-            what if len(who) == len(traces) else f"{', '.join(who)}: {what}"
-        )
-    return {time: "; ".join(parts) for time, parts in words.items()}
+        change = what if len(who) == len(traces) else f"{', '.join(who)}: {what}"
+        words[time] = f"{words[time]}; {change}" if time in words else change
+    return words
 
 
 def pushes(traces: Sequence[Trace]) -> list[Push]:
     """Return the blows on the bodies of arms."""
-    arms = [trace.scenario for trace in traces if trace.scenario.plant.tip]
-    return [push for scenario in arms for push in scenario.disturbance if isinstance(push, Push)]
+    found = []
+    for trace in traces:
+        if trace.scenario.plant.tip:
+            found += [push for push in trace.scenario.disturbance if isinstance(push, Push)]
+    return found
 
 
 @functools.cache
@@ -523,11 +457,8 @@ def font(size: float, bold: bool = False):
     import matplotlib
     from PIL import ImageFont
 
-    if bold:
-        name = "DejaVuSans-Bold.ttf"
-    else:
-        name = "DejaVuSans.ttf"
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), size)
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(Path(matplotlib.get_data_path(), "fonts", "ttf", name), size)
 
 
 def width(text: str, size: float, bold: bool = False) -> float:
@@ -537,10 +468,12 @@ def width(text: str, size: float, bold: bool = False) -> float:
 
 def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
     """Return the text on one line, with an ellipsis at its end if it is wider than the room."""
-    text = cut = " ".join(text.split())
-    while cut and width(cut if cut == text else f"{cut}…", size, bold) > room:
-        cut = cut[:-1]
-    return text if cut == text else f"{cut.rstrip()}…"
+    text = " ".join(text.split())
+    if width(text, size, bold) <= room:
+        return text
+    while text and width(f"{text}…", size, bold) > room:
+        text = text[:-1]
+    return f"{text.rstrip()}…"
 
 
 def wrapped(text: str, room: float, size: float, lines: int) -> str:
@@ -552,12 +485,14 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
     broken = []
     words = re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
     while words and len(broken) < lines - 1:
-        count = next(
-            (n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1
-        )
+        count = len(words)
+        while count > 1 and width(" ".join(words[:count]), size) > room:
+            count -= 1
         broken.append(cropped(" ".join(words[:count]), room, size))
         words = words[count:]
-    return "\n".join([*broken, cropped(" ".join(words), room, size)] if words else broken)
+    if words:
+        broken.append(cropped(" ".join(words), room, size))
+    return "\n".join(broken)
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
@@ -577,7 +512,10 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
         raise ScenarioError(
             f"traces of {' and '.join(plants)} share no axes: draw one plant at a time"
         )
-    if len({tuple((g.name, g.unit) for g in groups(trace.scenario)) for trace in traces}) > 1:
+    kinds = set()
+    for trace in traces:
+        kinds.add(tuple((group.name, group.unit) for group in groups(trace.scenario)))
+    if len(kinds) > 1:
         raise ScenarioError(
             f"traces of {plants[0]} differ in their kinds of channels: "
             "draw those with the same ones at a time"
@@ -596,16 +534,17 @@ def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
     All traces are of one plant.
     """
     kinds = zip(*(groups(trace.scenario) for trace in traces), strict=True)
-    return {
-        kind[0]: [group_trace(trace, group) for trace, group in zip(traces, kind, strict=True)]
-        for kind in kinds
-    }
+    parts = {}
+    for kind in kinds:
+        parts[kind[0]] = list(map(group_trace, traces, kind))
+    return parts
 
 
 def units(group: Group) -> dict[str, str]:
     """Return the units of x, v, u and s of a group's channels, and of a force on them."""
     x = group.unit
-    u, force = (unit.replace(" ", "·") for unit in (group.effort, EFFORT[x]))
+    u = group.effort.replace(" ", "·")
+    force = EFFORT[x].replace(" ", "·")
     return {"x": x, "v": f"{x}/s", "u": u, "s": f"{x}/s", "force": force}
 
 
@@ -617,11 +556,9 @@ def plant_name(plant: Plant | str, short: bool = False) -> str:
     if isinstance(plant, str):
         known = catalogue().get(plant)
         return plant_name(known, short) if known else plant
-    return (
-        (short and plant.short)
-        or plant.label
-        or (plant.name if plant.is_user_model else in_words(plant.name))
-    )
+    if short and plant.short:
+        return plant.short
+    return plant.label or (plant.name if plant.is_user_model else in_words(plant.name))
 
 
 def head(scenarios: Sequence[Scenario]) -> str:
@@ -662,14 +599,8 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def mixed(colour: str, other: str, share: float) -> str:
     """Return a colour mixed with this share of another."""
-    return "#" + "".join(
-        f"{round(a + share * (b - a)):02X}" for a, b in zip(rgb(colour), rgb(other), strict=True)
-    )
-
-
-def lighter(colour: str) -> str:
-    """Return a law's colour for a dark page: mixed with white."""
-    return mixed(colour, PAPER, WHITE_SHARE)
+    pairs = zip(rgb(colour), rgb(other), strict=True)
+    return "#" + bytes(round(a + share * (b - a)) for a, b in pairs).hex().upper()
 
 
 def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
@@ -679,10 +610,8 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
         for share in np.linspace(0.0, 0.95, 96):
             shades.append(mixed(colour, other, share))
     lightness = np.array([_seen(shade)[0][0] for shade in shades])
-    return [
-        shades[int(np.abs(lightness - level).argmin())]
-        for level in np.linspace(lightest, DARKEST, count)
-    ]
+    wanted = np.linspace(lightest, DARKEST, count)
+    return [shades[i] for i in np.abs(lightness - wanted[:, None]).argmin(axis=1)]
 
 
 @functools.cache
@@ -690,8 +619,9 @@ def letters_on(colour: str) -> str:
     """Return the colour of letters that have more contrast with a colour, white or ink (WCAG
     2.2).
     """
-    on, ink, paper = (_luminance(shade) + 0.05 for shade in (colour, INK, PAPER))
-    return INK if on / ink > paper / on else PAPER
+    on = _luminance(colour) + 0.05
+    darker = on / (_luminance(INK) + 0.05)
+    return INK if darker > (_luminance(PAPER) + 0.05) / on else PAPER
 
 
 def _luminance(colour: str) -> float:

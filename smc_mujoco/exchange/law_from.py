@@ -4,7 +4,7 @@ objects.
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -22,6 +22,22 @@ READERS = {
     ".onnx": policy,
     ".pt2": policy,
 }
+
+
+@overload
+def law_from(  # a template of C or of an FMU, the law of a network
+    source: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    units: str | None = None,
+    **options: Any,
+) -> Any: ...
+
+
+@overload
+def law_from(
+    source: object, *, name: str | None = None, units: str | None = None, **options: Any
+) -> Component: ...
 
 
 def law_from(

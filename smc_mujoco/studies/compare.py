@@ -37,7 +37,7 @@ from smc_mujoco.studies.table import Table
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.studies.worst_case import WorstCase
@@ -190,7 +190,7 @@ class Compared(Tables):
         path: str | os.PathLike[str] | None = None,
         metrics: Sequence[str] = (),
         **options: Any,
-    ) -> "Figure | SubFigure":
+    ) -> "Figure":
         """Draw the medians with their intervals by condition, as `smc.plot` does with a table.
 
         Args:

@@ -53,7 +53,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 METRIC = "rms_error"
 # physics steps by default, for a plant of one channel: up to 20 s of a core
@@ -170,7 +170,7 @@ class Sensitivity(Tables, SobolResult):
             "failed": self.failed.tolist(),
         }
 
-    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
+    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure":
         """Draw the indices, and the runs over the two axes that tell most; arguments as in
         `smc.figure`.
         """

@@ -33,7 +33,7 @@ from smc_mujoco.simulation.trace import warn_of_broken
 from smc_mujoco.studies import run_key
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 METRIC = "rms_error"
 # s, default of attacked runs: the error counts from a quarter of it on, when laws have settled
@@ -118,7 +118,7 @@ class WorstCase(Tables):
         """That of `WorstCases`, with one line."""
         return WorstCases([self]).tables
 
-    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
+    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure":
         """Draw the worst run beside the scenario as it was given; arguments as in `smc.figure`."""
         return WorstCases([self]).figure(path, **options)
 
@@ -165,7 +165,7 @@ class WorstCases(Tables, list[WorstCase]):
                 notes.append(f"{case.nominal.law.name}: {case.outside}")
         return notes
 
-    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
+    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure":
         """Draw the worst runs of all laws, or of one law beside the given run; arguments as in
         `smc.figure`.
         """

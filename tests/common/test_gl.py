@@ -61,6 +61,18 @@ def report(hidden: tuple[str, ...] = (), first: str = "", **variables: str) -> t
     return backend, note, missing
 
 
+@pytest.mark.parametrize("wish", ["osmesa", "egl", "x"])
+def test_a_script_runs_whatever_mujoco_gl_names_and_is_warned_once(wish):
+    code = HIDE.format(words=ALL) + "import smc_mujoco as smc; smc.ScenarioError, smc.Noise\n"
+    command = [sys.executable, "-c", code + "import mujoco"]
+    environment = os.environ | {"MUJOCO_GL": wish}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (line,) = [line for line in done.stderr.splitlines() if "ScenarioWarning" in line]
+    for word in (f"MUJOCO_GL={wish}", "films are off", "unset it"):
+        assert word in line
+
+
 @pytest.fixture(scope="module")
 def renders() -> None:
     """Skip where pictures cannot be rendered."""

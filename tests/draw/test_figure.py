@@ -247,13 +247,12 @@ def test_the_close_up_shows_no_round_off(pair, level):
     ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
     for u in (ends, held, np.full_like(held, level)):
         ax = Figure().subplots()
-        panels.last_samples(
-            ax, shown._replace(traces=[dataclasses.replace(pair[0], u=u)]), ["#000000"], pair[:1]
-        )
+        run = dataclasses.replace(pair[0], u=u)
+        panels.last_samples(ax, shown._replace(traces=[run]), ["#000000"])
         low, high = ax.get_ylim()
         assert high - low >= 0.0199 * np.abs(u).max()
         assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
     full = Figure().subplots()
     switching = dataclasses.replace(pair[0], u=np.sign(held - level))
-    panels.last_samples(full, shown._replace(traces=[switching]), ["#000000"], pair[:1])
+    panels.last_samples(full, shown._replace(traces=[switching]), ["#000000"])
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it

@@ -36,12 +36,8 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     )
     hit = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, disturbance=push))
     page = figure([hit])
-    shown = page.axes[:3]
-    assert [ax.get_ylabel() for ax in shown] == [
-        "reach e (m)",
-        "reach u (N)",
-        "tip off its path (mm)",
-    ]
+    shown = page.axes[:4]
+    assert shown[3].get_ylabel().startswith("tip off its path")
     assert [text.get_text() for ax in shown for text in ax.texts] == ["blow of 50 N for 20 ms"]
     for ax in shown:
         assert [0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines]

@@ -125,26 +125,6 @@ def test_a_saved_file_holds_the_name_of_a_plant_as_text_and_replaces_no_other(na
     assert path.read_text(encoding="utf-8") == text
 
 
-def test_an_own_arm_starts_from_its_keyframe_and_is_saved(arm, tmp_path):
-    (scenario,) = studio.runs_of(smc.plant_from(arm, ["shoulder"], keyframe="up"), ["pid"])
-    session = Session([dataclasses.replace(scenario, duration=0.2, x0=1.0)])
-    session.keyframe(0)
-    assert session.scenarios[0].x0 == (3.0,)
-    assert session.scenarios[0].v0 == (0.5,)
-    watch(session)
-    (saved,) = scene.read(session.save(tmp_path / "view.py")).conditions["view"].values()
-    same(session, [saved])
-
-
-def test_a_quadrotor_starts_from_its_keyframe():
-    plant = smc.plant_from(ROOT / "examples/quadrotor.xml", channels=["body"], keyframe="hover")
-    session = Session(studio.runs_of(plant, []))
-    session.keyframe(0)
-    assert not session.message
-    session.advance(0.1)
-    assert session.state(0)[0].shape == (7,)
-
-
 class Page:
     """A stand-in for Studio's, which tells the mouse's pull, N, in some frames only."""
 

@@ -140,4 +140,3 @@ def test_contrasts_are_those_of_wcag():
     assert 4.5 < light / grey < 4.7
     assert style.letters_on("#757575") == style.PAPER
     assert style.letters_on("#FFE000") == style.INK
-    assert style.lighter("#006400") == "#599A59"  # 35 % white

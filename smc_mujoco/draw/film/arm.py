@@ -1,7 +1,7 @@
-"""What a film shows of an arm: paths of its tip, torques against their limits, the force of a
-contact, and blows.
+"""What a film draws over its pictures of arms and free bodies: paths of tips and places, torques
+against their limits, the force of a contact, and blows.
 
-All are drawn over the rendered picture, so they cost little and no link hides them.
+It costs little, and no link hides it.
 """
 
 import math
@@ -86,45 +86,11 @@ class Trail:
         image.paste(self.colour, tuple(self.corner.tolist()), self.mask)
 
 
-class Paths:
-    """Paths that the machines on a stage take, and the wanted ones, drawn over its pictures.
-
-    These are the paths of the tips of arms, and of the places of free bodies.
-    """
-
-    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], stage: Stage):
-        self.trails = []
-        s = stage.scale
-        for trace, colour, place in zip(traces, colours, stage.where, strict=True):
-            lines = (trace.x[:, :3], trace.r[:, :3])
-            if not trace.scenario.plant.pose:
-                lines = tip.tip_paths(trace)
-            found = []
-            for points in lines:
-                above = np.maximum(points + place, (-np.inf, -np.inf, 0.0))
-                found.append(stage.project(above).clip(-OUTSIDE, np.add(stage.size, OUTSIDE)))
-            path, wanted = found
-            look = (style.INK, WANTED_PATH_WIDTH * s, WANTED_OPACITY)
-            own = Trail(path, trace.t, colour, PATH_WIDTH * s)
-            self.trails.append((Trail(wanted, trace.t, *look), own))
-
-    def draw(self, image: Image.Image, time: float) -> None:
-        """Draw the wanted paths, and the actual ones until a time, s."""
-        for wanted, own in self.trails:
-            wanted.draw(image, np.inf)
-            own.draw(image, time)
-
-    def over(self, picture: np.ndarray, time: float) -> np.ndarray:
-        """Return a picture with the paths until a time, s."""
-        image = Image.fromarray(picture)
-        self.draw(image, time)
-        return np.asarray(image)
-
-
 class Overlay:
-    """What is drawn over pictures of the arms on a stage, between `edges`, (frames + 1,) s.
+    """What is drawn over pictures of the machines on a stage, between `edges`, (frames + 1,) s.
 
-    `room` has what is shown below each label, (machines, 4) px.
+    These are the paths of the tips of arms, or of the places of free bodies. Arms have their forces
+    too; `room` has what is shown below each label, (machines, 4) px.
     """
 
     def __init__(
@@ -140,30 +106,53 @@ class Overlay:
         self.stage = stage
         self.edges = edges
         self.room = room
-        self.paths = Paths(traces, colours, stage)
         self.scale = stage.scale
+        self.trails = []  # the wanted path of each machine, and its own
         self.shares = []  # torques as shares of their limits, (frames, joints), -1 .. 1: means
-        self.errors = []  # (frames,) m
+        self.errors = []  # of tips, (frames,) m
         self.forces = {}  # of a contact, (frames, 3) N
         self.newton = 0.0  # m of an arrow
         barred = all(map(has_bars, traces))
-        for k, trace in enumerate(traces):
+        largest = 0.0
+        for k, (trace, colour) in enumerate(zip(traces, colours, strict=True)):
+            if trace.scenario.plant.tip:
+                path, wanted = tip.tip_paths(trace)
+                error = tip.tip_error(trace)[:, None]
+                self.errors.append(windows(trace.t, error, edges).mean[:, 0])
+            else:
+                path = trace.x[:, :3]
+                wanted = trace.r[:, :3]
+            look = (style.INK, WANTED_PATH_WIDTH, WANTED_OPACITY)
+            pair = (self.trail(k, wanted, *look), self.trail(k, path, colour, PATH_WIDTH))
+            self.trails.append(pair)
             if barred:
                 share = windows(trace.t, trace.applied, edges).mean / trace.scenario.limits
                 self.shares.append(np.clip(share, -1.0, 1.0))
-            self.errors.append(windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0])
             if tip.knows_contacts(trace.scenario):
                 self.forces[k] = windows(trace.t, tip.contacts(trace).push, edges).mean
-        sizes = [np.linalg.norm(force, axis=1).max() for force in self.forces.values()]
-        largest = max(sizes, default=0.0)
+                largest = max(largest, np.linalg.norm(self.forces[k], axis=1).max())
         if largest:
             self.newton = FORCE_ARROW / largest
+
+    def trail(
+        self, k: int, points: np.ndarray, colour: str, width: float, opacity: float = 1.0
+    ) -> Trail:
+        """Return a path of machine k in the picture, from points (m, 3) m."""
+        above = np.maximum(points + self.stage.where[k], (-np.inf, -np.inf, 0.0))
+        places = self.stage.project(above).clip(-OUTSIDE, np.add(self.stage.size, OUTSIDE))
+        return Trail(places, self.traces[k].t, colour, width * self.scale, opacity)
+
+    def lost(self, k: int, frame: int) -> bool:
+        """Return whether a machine is so far off its path that a ghost shows where it should be."""
+        return not self.errors or bool(self.errors[k][frame] > MAX_TIP_ERROR)
 
     def over(self, picture: np.ndarray, frame: int) -> np.ndarray:
         """Return the picture of a frame with all this, as the machines stand on the stage."""
         time = float(self.edges[frame + 1])
         image = Image.fromarray(picture)
-        self.paths.draw(image, time)
+        for wanted, own in self.trails:
+            wanted.draw(image, np.inf)
+            own.draw(image, time)
         for k, forces in self.forces.items():
             size = float(np.linalg.norm(forces[frame]))
             if size > 0.5:
@@ -178,7 +167,8 @@ class Overlay:
                     place = self.stage.find(k, blow.body) - BLOW_DISTANCE * peak / size
                     start = place - BLOW_ARROW * peak / size
                     self.arrow(image, start, place, size, after=False)
-            self.gauges(ImageDraw.Draw(image), k, frame)
+            if self.errors:
+                self.gauges(ImageDraw.Draw(image), k, frame)
         return np.asarray(image)
 
     def arrow(
@@ -192,23 +182,21 @@ class Overlay:
         if np.linalg.norm(end - start) > 1.0:
             outline = arrows.outline(np.linspace(start, end, 40), SHAFT_WIDTH * s)
             arrows.paint(image, outline, arrows.rgba(style.REACTION))
-        x, y = (end if after else start).tolist()
-        rightwards = end[0] >= start[0]
-        look = {"anchor": "rm", "stroke_width": round(2 * s), "stroke_fill": style.PAPER}
-        gap = -6 * s
-        if rightwards == after:
-            look["anchor"] = "lm"
-            gap = 6 * s
-        letters = style.font(LETTERS * s, bold=True)
         words = f"{force:.0f} N"
-        ImageDraw.Draw(image).text((x + gap, y), words, style.REACTION, letters, **look)
+        wide = style.width(words, LETTERS * s, bold=True)
+        x, y = (end if after else start).tolist()
+        x += 6 * s if (end[0] >= start[0]) == after else -6 * s - wide
+        x = min(x, image.width - wide - 2 * s)
+        letters = style.font(LETTERS * s, bold=True)
+        rim = {"stroke_width": round(2 * s), "stroke_fill": style.PAPER}
+        ImageDraw.Draw(image).text((x, y), words, style.REACTION, letters, anchor="lm", **rim)
 
     def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
         """Draw the bars of a machine, and how far its tip is off its path."""
         s = self.scale
         left, top, right, bottom = self.room[k].tolist()
         off = 1e3 * self.errors[k][frame]  # mm
-        words = f"{off:.{1 if off < 9.95 else 0}f} mm"
+        words = f"{off:.1f} mm" if off < 9.95 else f"{off:.0f} mm"
         bold = style.font(LETTERS * s, bold=True)
         letters = style.font(LETTERS * s)
         if not self.shares:
@@ -222,10 +210,7 @@ class Overlay:
             end = x + BAR_WIDTH * s
             draw.rectangle((x, zero - half, end, zero + half), style.PAPER, style.RULE)
             low, high = sorted((zero, zero - value * half))
-            if abs(value) > 0.999:
-                colour = style.FAILED
-            else:
-                colour = self.colours[k]
+            colour = style.FAILED if abs(value) > 0.999 else self.colours[k]
             draw.rectangle((x + 1, low, end - 1, high), colour)
             place = ((x + end) / 2, zero + half + 2 * s)
             draw.text(place, str(i), style.MUTED, letters, anchor="ma")

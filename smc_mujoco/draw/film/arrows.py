@@ -4,9 +4,8 @@ An arrow is the mean over the time of a frame. A bar behind the control's is its
 how far a control swings that switches faster than the film. With a drive, arrow and bar show its
 force, and a pale arrow the command. Arrows lie along a pendulum's arc, beyond the bob; or along the
 rail, above the cart, in the picture if it carries something. At a hinge of a user's model, whose
-links may have any shape, they bend around its axis. On a free body the control's are those of its
-actuators, at their places, and the disturbance's is one force from its middle. All are drawn over
-the picture, so that no link hides them.
+links may have any shape, they bend around its axis. A free body has one arrow, of the disturbance's
+force. All are drawn over the picture, so that no link hides them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +17,6 @@ from PIL import Image, ImageDraw, ImageFilter
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
-from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
 from smc_mujoco.metrics.conventions import Group, groups
 from smc_mujoco.simulation import model as models
@@ -54,9 +52,9 @@ NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the s
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-FLIGHT_LENGTH = 2.2  # on a free body, in distances of its actuators
+FLIGHT_LENGTH = 2.2  # at a free body, in radii of its largest part
 FLIGHT_THICKNESS = 0.07
-FLIGHT_DISTANCE = 0.6  # of the disturbance's arrow from the middle of a free body
+FLIGHT_DISTANCE = 0.6  # from the middle of a free body to its arrow
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -82,8 +80,6 @@ class Mount(NamedTuple):
     front: np.ndarray | None  # to the camera, (3,), for a slide that carries something
     beyond: bool = False  # on the other side of a hinge than the body, in a network
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
-    place: np.ndarray | None = None  # of an actuator of a free body, m, in the axes of the body
-    way: np.ndarray | None = None  # of its force
 
 
 def mounts(
@@ -97,48 +93,27 @@ def mounts(
     to the camera.
     """
     plant = scenario.plant
+    model = models.compile_model(scenario)
     if plant.pose:
-        return flying_mounts(scenario, joints)
-    if not plant.on_stage:
-        extent = float(models.compile_model(scenario).stat.extent)
+        reach = float(model.geom_rbound[model.geom_bodyid > 0].max(initial=0.0))
+        slide = Mount(0, FLIGHT_LENGTH * reach, FLIGHT_THICKNESS * reach, None)
+        hinge = slide
+    elif not plant.on_stage:
+        extent = float(model.stat.extent)
         slide = Mount(0, USER_LENGTH * extent, USER_THICKNESS * extent, front)
         hinge = slide._replace(unit=1.0, radius=USER_RADIUS * extent)
     else:
         before = front if plant.free else None
-        slide = Mount(
-            0,
-            SLIDE_LENGTH * rail,
-            min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail),
-            before,
-            plant.network,
-        )
+        thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
+        slide = Mount(0, SLIDE_LENGTH * rail, thick, before, plant.network)
         turning = NETWORK_FACTOR if plant.n > 1 else 1.0
         usual = catalogue().get(plant.name)
         if plant.n == 1 and "l" in plant.parameters and usual:  # no smaller on a short rod
             turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])
         hinge = slide._replace(unit=turning)
-    kinds = zip(joints, slides, strict=True)
-    return [(slide if slides_here else hinge)._replace(joint=j) for j, slides_here in kinds]
-
-
-def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
-    """Return a Mount for each channel of a free body; the first ones are those of its actuators."""
-    model = models.with_values(models.compile_model(scenario), scenario)
-    data = mujoco.MjData(model)
-    joint = free_joint(model)
-    drives = drive_ids(model)
-    mujoco.mj_kinematics(model, data)
-    body = model.jnt_bodyid[joint]
-    places = np.zeros((len(joints), 3))
-    ways = np.zeros((len(joints), 3))
-    sites = data.site_xpos[model.actuator_trnid[drives, 0]]
-    places[: len(drives)] = (sites - data.xpos[body]) @ data.xmat[body].reshape(3, 3)
-    ways[: len(drives)] = exerted(model, joint, drives.tolist())[:, :3]
-    arm = float(np.linalg.norm(places, axis=1).max()) or USER_LENGTH * float(model.stat.extent)
-    mount = Mount(0, FLIGHT_LENGTH * arm, FLIGHT_THICKNESS * arm, None)
     found = []
-    for j, place, way in zip(joints, places, ways, strict=True):
-        found.append(mount._replace(joint=j, place=place, way=way))
+    for joint, slides_here in zip(joints, slides, strict=True):
+        found.append((slide if slides_here else hinge)._replace(joint=joint))
     return found
 
 
@@ -166,68 +141,39 @@ class Scale(NamedTuple):
     control: float
     disturbance: float
     reaction: float = 0.0
-    exceeded: tuple[str, ...] = ()  # names of those above whose values exceed their longest arrow
     drive: bool = False  # whether a drive's force is shown, such as a motor's
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     """Return the scale of the arrows for each group of driven channels."""
-    if traces[0].scenario.plant.pose:
-        return flying_scales(traces)
     by_group = {}
     for group, parts in style.split(traces).items():
+        if traces[0].scenario.plant.pose:
+            pushes = [np.linalg.norm(trace.d[:, :3], axis=1).max() for trace in traces]
+            by_group[group] = Scale(0.0, float(max(pushes)) if group.unit == "m" else 0.0)
+            continue
         if not group.driven:
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        control = _sizes(parts, "applied")
-        push = _sizes(parts, "d")
-        peak = longest = _sizes(parts, "reaction")[0]
-        if control[1] and same:
-            longest = min(peak, control[1])
+        control = _longest(parts, "applied")
+        reaction = max(map(abs, panels.span(parts, "reaction")))
+        if control and same:
+            reaction = min(reaction, control)
         if drive:
-            control = tuple(np.maximum(control, _sizes(parts, "force")).tolist())
-        sizes = {"control": control, "disturbance": push, "reaction": (peak, longest)}
-        exceeded = tuple(name for name, (most, lasting) in sizes.items() if most > 1.01 * lasting)
-        by_group[group] = Scale(control[1], push[1], longest, exceeded, drive)
+            control = max(control, _longest(parts, "force"))
+        by_group[group] = Scale(control, _longest(parts, "d"), reaction, drive)
     return by_group
 
 
-def flying_scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
-    """Return the scale of the arrows of free bodies, all with the position: its actuators are not
-    its channels.
-    """
-    control = 0.0
-    push = 0.0
-    for trace in traces:
-        lasting = np.isfinite(trace.x).all(axis=1)
-        control = max(control, float(np.abs(trace.applied[lasting]).max(initial=0.0)))
-        pushes = np.linalg.norm(trace.d[lasting, :3], axis=1)
-        push = max(push, float(pushes.max(initial=0.0)))
-    by_group = {}
-    for group in style.split(traces):
-        if group.unit == "m":
-            by_group[group] = Scale(control, push)
-        else:
-            by_group[group] = Scale(0.0, 0.0)
-    return by_group
-
-
-def flying(
-    loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str
-) -> list[tuple[int, Arrow]]:
-    """Return the arrows of a free body in one frame, each with its channel: of actuators and of the
-    disturbance.
-    """
+def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale) -> list[tuple[int, Arrow]]:
+    """Return the arrow of a free body in one frame with its channel: that of the disturbance."""
     push = loads["disturbance"].mean[frame, :3]
     size = float(np.linalg.norm(push))
-    drawn = []
-    for i, force in enumerate(loads["control"].mean[frame]):
-        drawn.append((i, Arrow(0.0, float(force / (scale.control or np.inf)), rgba(colour))))
-    if size and scale.disturbance:
-        grey = rgba(style.DISTURBANCE)
-        drawn.append((0, Arrow(0.0, size / scale.disturbance, grey, way=push / size)))
-    return [(i, arrow) for i, arrow in drawn if abs(arrow.high) > MIN_LENGTH]
+    if size <= MIN_LENGTH * scale.disturbance:
+        return []
+    length = size / scale.disturbance
+    return [(0, Arrow(0.0, length, rgba(style.DISTURBANCE), way=push / size))]
 
 
 def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
@@ -235,9 +181,9 @@ def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
     return (*(np.array(style.rgb(colour)) / 255).tolist(), opacity)
 
 
-def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the largest magnitude of a quantity in runs that last, and the one without brief
-    values of over twice it.
+def _longest(traces: Sequence[Trace], name: str) -> float:
+    """Return the largest magnitude of a quantity in runs that last, without brief values of over
+    twice it.
 
     A brief value takes at most 1 - LASTING_QUANTILE of the time.
     """
@@ -245,7 +191,7 @@ def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     usual = 0.0
     for y in panels.lasting(traces, name):
         usual = max(usual, float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()))
-    return peak, usual if peak > 2.0 * usual > 0.0 else peak
+    return usual if peak > 2.0 * usual > 0.0 else peak
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
@@ -292,15 +238,9 @@ def path(
     owner = model.jnt_bodyid[mount.joint]
     low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
-    if mount.place is not None and mount.way is not None:
-        turn = data.xmat[owner].reshape(3, 3)
-        if arrow.way is None:
-            way = turn @ mount.way
-            start = turn @ mount.place
-        else:
-            way = arrow.way
-            start = mount.unit * FLIGHT_DISTANCE * way
-        return data.xpos[owner] + start + mount.unit * along * way, mount.thick
+    if arrow.way is not None:
+        start = data.xpos[owner] + mount.unit * FLIGHT_DISTANCE * arrow.way
+        return start + mount.unit * along * arrow.way, mount.thick
     if mount.radius:
         right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
         if not right.any():

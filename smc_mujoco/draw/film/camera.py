@@ -71,9 +71,14 @@ def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room)
         [room.left - x, room.right - x, y - room.bottom, y - room.top]
     ) * pixel(size)
     sides = [(across, left, right), (up, low, high)]
-    bounds = [(np.max(p - b * z), np.min(p - a * z), a, b) for p, a, b in sides]
-    distance = max((low - high) / (b - a) for low, high, a, b in bounds)
-    centre = [(low - b * distance + high - a * distance) / 2 for low, high, a, b in bounds]
+    distance = -np.inf
+    for p, a, b in sides:
+        distance = max(distance, (np.max(p - b * z) - np.min(p - a * z)) / (b - a))
+    centre = []
+    for p, a, b in sides:
+        nearest = np.max(p - b * z) - b * distance
+        farthest = np.min(p - a * z) - a * distance
+        centre.append((nearest + farthest) / 2)
     return turn @ np.array([*centre, distance])
 
 

@@ -13,15 +13,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.film.arrows import Scale
 from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
-from smc_mujoco.draw.states import (
-    CALM,
-    STRUCK,
-    STUCK,
-    State,
-    backlash_gap,
-    has_contact,
-    has_dry_friction,
-)
+from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
 from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -82,8 +74,10 @@ class Caption:
         self.clock += self.wide("8× slower") + 2 * LETTERS * s
         title = title or style.head([trace.scenario for trace in traces])
         self.title = style.cropped(title, inside - self.clock, TITLE_SIZE * s, bold=True)
-        notes = [self.wide(f"{words} since {time:g} s") for time, words in self.changes.items()]
-        self.note_room = min(max(notes, default=0.0) + EDGE * s, 0.4 * inside)
+        note = 0.0
+        for time, words in self.changes.items():
+            note = max(note, self.wide(f"{words} since {time:g} s"))
+        self.note_room = min(note + EDGE * s, 0.4 * inside)
         sources = [trace.scenario.law.source.words for trace in traces]
         self.source = by_words(dict(zip(names, sources, strict=True)))
         if parts is None:
@@ -126,9 +120,11 @@ class Caption:
             sizes[:] = np.array(below) * s
             return sizes
         for k, trace in enumerate(self.traces):
-            words = {state.words for state in (states[k] if states else ()) if state}
-            sizes[k, 0] = max((self.wide(text) + 1.2 * LETTERS * s for text in words), default=0.0)
-            self.gauges[k] = gauges(trace.scenario) and not words
+            for state in states[k] if states else ():
+                if state:
+                    wide = self.wide(state.words) + 1.2 * LETTERS * s
+                    sizes[k, 0] = max(sizes[k, 0], wide)
+            self.gauges[k] = gauges(trace.scenario) and not sizes[k, 0]
             if self.gauges[k]:
                 sizes[k, 0] = STRIP_WIDTH * s
         if sizes.any():
@@ -303,14 +299,14 @@ class Caption:
         s = self.scale
         paper = image.copy()
         letters = style.font(LETTERS * s)
-        places = [(KEY_TOP + KEY_PITCH * i) * s for i in range(len(self.key))]
-        for y, text in zip(places, self.key, strict=True):
+        places = (KEY_TOP + KEY_PITCH * np.arange(len(self.key))) * s
+        for y, text in zip(places.tolist(), self.key, strict=True):
             if y + KEY_PITCH * s > self.room.top:
                 right = (EDGE + 4) * s + style.width(text, LETTERS * s)
                 box = ((EDGE - 4) * s, y - 1, right, y + KEY_PITCH * s)
                 ImageDraw.Draw(paper).rectangle(box, style.PAPER)
         paper = Image.blend(image, paper, 0.75)
-        for y, text in zip(places, self.key, strict=True):
+        for y, text in zip(places.tolist(), self.key, strict=True):
             ImageDraw.Draw(paper).text((EDGE * s, y), text, style.DISTURBANCE, letters)
         return paper
 
@@ -362,33 +358,25 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
         unit = "u" if quantity == "control" else "force"
         words = []
         for group, scale in scales.items():
-            size = getattr(scale, quantity)
-            if quantity in scale.exceeded:
-                more = " or more"
-            else:
-                more = ""
-            if size:
-                words.append(f"{style.short(size)} {style.units(group)[unit]}{more}")
+            if size := getattr(scale, quantity):
+                words.append(f"{style.short(size)} {style.units(group)[unit]}")
         return ", ".join(words)
 
     words = []
     plant = traces[0].scenario.plant
     if sizes := longest("control"):
         drive = any(scale.drive for scale in scales.values())
-        if plant.pose:
-            what = "force of an actuator"
-        else:
-            what = "mean control"
-        if drive:
-            what = "force of the drive"
+        what = "force of the drive" if drive else "mean control"
         words.append(f"arrow: {what}, longest {sizes}")
-        words.append("line: path; dark: the wanted path" if plant.pose else "bar: its range")
+        words.append("bar: its range")
         if drive:
             words.append("pale arrow: command")
+    if plant.pose:
+        words.append("line: path; dark: the wanted path")
     if sizes := longest("disturbance"):
         words.append(f"dark arrow: disturbance, longest {sizes}")
     if sizes := longest("reaction"):
-        words.append(f"violet arrow: {reaction_words(traces)}, longest {sizes}")
+        words.append(f"violet arrow: reaction, longest {sizes}")
     words.append("translucent: reference")
     if plant.scenery:
         words.append(plant.scenery)
@@ -404,16 +392,6 @@ def gauges(scenario: Scenario) -> bool:
     """Return whether a strip shows the counts of a scenario's encoder: for one channel."""
     sensor = scenario.sensor
     return sensor is not None and sensor.counts < math.inf and scenario.plant.n == 1
-
-
-def reaction_words(traces: Sequence[Trace]) -> str:
-    """Return what the reaction of these traces consists of."""
-    plants = [trace.scenario.plant for trace in traces]
-    if any(plant.direct and (plant.rubs or not plant.smooth) for plant in plants):
-        return "friction, limits and contact"
-    runs = [trace.scenario for trace in traces if trace.scenario.realistic]
-    kinds = {"friction": has_dry_friction, "contact": has_contact, "backlash": backlash_gap}
-    return " and ".join(kind for kind, has in kinds.items() if any(map(has, runs)))
 
 
 def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:

@@ -36,14 +36,13 @@ TIME_TICKS = 5  # at most, until all rest
 FUTURE_LINE = 0.45  # opacity of what is still to come
 FUTURE_BAND = 0.12
 LANE_BAND = 0.45  # opacity of a band in a lane of its own
-LANE_WIDTH = 0.82  # of a panel's width; beside a lane is how far u swings
+LANE_GAP = 8  # points between a lane, and how far u swings
 LANE_HEIGHT = 0.84  # of a lane's pitch
 END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 LEFT = 0.062  # of the width: where the charts begin
 RIGHT = 0.985
 CHART_GAP = 0.0664  # of the width, between two charts
-SAME_PLACE = 0.5  # of a dot's radius: all dots no farther apart are one, in ink
 
 Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, its colours
 
@@ -85,15 +84,11 @@ class Charts:
             rows = []
             for ax, panel in zip(axes, strip, strict=True):
                 set_titles(ax, panel, DPI * scale / 72)
-                found = [(ax, panel, colours)]
-                wide = ax.get_window_extent().width
                 laned = in_lanes(panel)
-                if laned:
-                    found = lanes(ax, panel, colours)
-                    wide *= LANE_WIDTH
+                found = lanes(ax, panel, colours) if laned else [(ax, panel, colours)]
                 bands = laned or not panels.crowded(panel)
                 for row, part, shades in found:
-                    self.set_time(row, wide)
+                    self.set_time(row)
                     row.tick_params(length=0)
                     panels.mark(row, style.marks(traces, names), named=False)
                     artists += panels.over_time(row, part, shades, panel.traces, bands, names)
@@ -132,14 +127,15 @@ class Charts:
         """Return the time, s, at a share of a chart's width."""
         return np.interp(share, self.shares, self.times)
 
-    def set_time(self, ax: Axes, wide: float) -> None:
-        """Set the time axis of axes so wide, px, with the grey strip after all rest."""
+    def set_time(self, ax: Axes) -> None:
+        """Set the time axis of axes, with the grey strip after all rest."""
         ax.set_xscale("function", functions=(self.share, self.time))
         ax.set_xlim(0.0, self.end)
+        wide = ax.get_window_extent().width  # px
         last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * ax.figure.dpi / 72) / wide
         stop = min(1.01 * self.window, self.end)
         ticks = MaxNLocator(TIME_TICKS).tick_values(0.0, self.window)
-        ticks = [tick for tick in ticks if self.share(tick) < last and tick < stop]
+        ticks = ticks[(self.share(ticks) < last) & (ticks < stop)].tolist()
         ax.set_xticks([*ticks, self.end], [*(f"{tick:g}" for tick in ticks), f"{self.end:g} s"])
         for label in ax.get_xticklabels()[-1:]:
             label.set_horizontalalignment("right")
@@ -160,9 +156,6 @@ class Charts:
             for (t, y), colour in zip(paths, self.colours, strict=True):
                 if time <= t[-1] + 1e-9 and np.isfinite(y[0]):
                     lasting.append((now, float(np.interp(time, t, y)), colour))
-            heights = [y for _, y, _ in lasting]
-            if len(lasting) > 1 and np.ptp(heights) < SAME_PLACE * self.dot:
-                lasting = [(now, y, style.INK) for y in heights]
             dots += reversed(lasting)  # the first on top
         image = Image.fromarray(charts)
         for x, y, colour in dots:
@@ -205,9 +198,12 @@ def lanes(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Row]:
     """
     ax.set_axis_off()
     pitch = 1.0 / len(panel.traces)
+    point = ax.figure.dpi / 72  # px
+    beside = style.width("smooth", LETTERS * point) + LANE_GAP * point
+    wide = 1.0 - beside / ax.get_window_extent().width
     rows = list[Row]()
     for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True), 1):
-        lane = ax.inset_axes((0.0, 1.0 - i * pitch, LANE_WIDTH, LANE_HEIGHT * pitch))
+        lane = ax.inset_axes((0.0, 1.0 - i * pitch, wide, LANE_HEIGHT * pitch))
         lane.tick_params(labelbottom=i == len(panel.traces), labelleft=False)
         rows.append((lane, panel._replace(traces=[trace]), [colour]))
     return rows
@@ -235,7 +231,8 @@ def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
     else:
         words = "smooth"
     look = {"va": "center", "fontsize": LETTERS, "color": style.INK}
-    lane.text(1.035, 0.5, words, transform=lane.transAxes, **look)
+    place = {"xytext": (LANE_GAP, 0.0), "textcoords": "offset points"}
+    lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look)
 
 
 def set_titles(ax: Axes, panel: Panel, point: float) -> None:
@@ -243,13 +240,17 @@ def set_titles(ax: Axes, panel: Panel, point: float) -> None:
     `point` in px.
     """
     ax.set_title(panel.label)
-    words = []
-    for name, text in panels.meaning([panel]).items():
-        if not (name == "band" and panels.crowded(panel)):
-            words.append(f"{name}: {text}")
-    choices = [", ".join(words[:count]) for count in range(len(words), 0, -1)]
+    choices = []
     if panel.quantity == "x":
         choices = [f"▼ settled to {100 * SETTLING_BAND:g} %", f"▼ {100 * SETTLING_BAND:g} %"]
+    else:
+        meaning = panels.meaning([panel])
+        if panels.crowded(panel):
+            meaning.pop("band", None)
+        words = [f"{name}: {text}" for name, text in meaning.items()]
+        while words:
+            choices.append(", ".join(words))
+            words.pop()
     label = style.width(panel.label, TITLE_LETTERS * point, bold=True)
     room = ax.get_window_extent().width - label - 10 * point
     fitting = [text for text in choices if style.width(text, LETTERS * point) <= room]

@@ -11,33 +11,23 @@ import numpy as np
 from smc_mujoco.common import extras
 from smc_mujoco.common.errors import ScenarioError
 
-# Ending of a film -> codec, its quality and arguments of ffmpeg. All are chosen.
-CODECS = {
-    # Clean on a slide at about 1 MB for 10 s; half the time of x264's default preset, and no larger
-    # files.
-    ".mp4": {"codec": "h264", "crf": 21, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
-    # Letters stay clean at 100 to 200 kB for 5 s. Every browser plays VP9, and no patent covers it.
-    ".webm": {
-        "codec": "vp9",
-        "crf": 34,
-        "ffmpeg_args": "-b:v 0 -deadline good -cpu-used 4 -row-mt 1 -g 60",
-    },
-}
+# Clean on a slide at about 1 MB for 10 s; half the time of x264's default preset, and no larger
+# files. All are chosen.
+CODEC = {"codec": "h264", "crf": 21, "ffmpeg_args": "-preset veryfast -movflags +faststart"}
 
 
 @contextlib.contextmanager
 def encoder(
     path: Path, shape: tuple[int, int], fps: float
 ) -> Iterator[Callable[[np.ndarray], None]]:
-    """Yield a function that adds a picture (height, width, 3) to a film, .mp4 or .webm.
+    """Yield a function that adds a picture (height, width, 3) to a film, .mp4.
 
     The film is whole afterwards.
 
     Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end
     first.
     """
-    codec = CODECS[path.suffix]
-    writer = mediapy().VideoWriter(path, shape, encoded_format="yuv420p", fps=fps, **codec)
+    writer = mediapy().VideoWriter(path, shape, encoded_format="yuv420p", fps=fps, **CODEC)
     try:
         with sigint_blocked():
             writer.__enter__()
@@ -47,7 +37,7 @@ def encoder(
         if isinstance(error.__context__, KeyboardInterrupt):  # ffmpeg complains of half a picture
             raise KeyboardInterrupt from None
         words = " ".join(str(error).split())
-        raise ScenarioError(f"cannot write {path.suffix[1:]}: {words}") from error
+        raise ScenarioError(f"cannot write mp4: {words}") from error
 
 
 def mediapy() -> ModuleType:

@@ -23,7 +23,7 @@ from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
-from smc_mujoco.draw.film import arm, arrows, pace, scene
+from smc_mujoco.draw.film import arrows, pace, scene
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
@@ -35,6 +35,8 @@ from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from mediapy import VideoMetadata
+
+    from smc_mujoco.draw.film import arm
 
 FPS = 30.0
 WEBP_FPS = 20.0
@@ -76,8 +78,8 @@ class Frames:
     def __post_init__(self) -> None:
         self.camera = checked(self.camera)
         if self.at is not None:
-            end = max(float(trace.t[-1]) for trace in style.same_plant(self.traces))
-            time = number("at", self.at, low=0.0, high=end + 1e-9)
+            last = end(style.same_plant(self.traces))
+            time = number("at", self.at, low=0.0, high=last + 1e-9)
             self.clock = Clock(np.array([time]), np.ones(1))
         else:
             self.clock = pace.clock(self.traces, self.fps, self.speed)
@@ -85,7 +87,8 @@ class Frames:
             ends = items_of("span", self.span)
             if len(ends) != 2:
                 raise ScenarioError(f"span is {errors.shown(self.span)}: give two times, in s")
-            start, stop = (number("span", end) for end in ends)
+            start = number("span", ends[0])
+            stop = number("span", ends[1])
             self.clock = self.clock.part(start, stop)
             if not len(self):
                 raise ScenarioError(
@@ -236,7 +239,7 @@ def _write_webp(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
         raise ScenarioError(
             f"a .webp of {count} frames: give a span with at most {MAX_WEBP_FRAMES}, or an .mp4"
         )
-    images = [Image.fromarray(picture) for picture in made]
+    images = list(map(Image.fromarray, made))
     ends = [round(1000 / frames.fps)] * (count - 1) + [LAST_FRAME_TIME]
     images[0].save(
         part, save_all=True, append_images=images[1:], duration=ends, loop=0, quality=60, method=4
@@ -271,7 +274,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
     traces = style.same_plant(frames.traces)
     names = style.labels(traces, frames.labels)
-    colours = style.law_colours([trace.scenario.law for trace in traces])
+    colours = style.trace_colours(traces)
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
     width, height = _checked_size(frames.size)
@@ -281,62 +284,51 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     low = 2 * round(CHARTS_SHARE * height / 2)
     above = (width, height - low)
     times = frames.clock.times
-    first = times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS)
-    edges = np.append(first, times)
-    traces = [finite(trace) for trace in traces]
+    step = times[1] - times[0] if len(times) > 1 else 1 / FPS
+    edges = np.append(times[0] - step, times)
+    traces = list(map(finite, traces))
     scenario = traces[0].scenario
     scales = arrows.scales(traces)
-    arms = scene.are_arms([trace.scenario for trace in traces])
+    arms = all(trace.scenario.plant.tip for trace in traces)
+    if arms or scenario.plant.pose:
+        from smc_mujoco.draw.film import arm
     whole = end(traces)
-    grid = np.linspace(
-        0.0, whole, min(MAX_GRID, max(1, round(FPS * whole))) + 1
-    )  # also for a still
+    count = min(MAX_GRID, max(1, round(FPS * whole)))
+    grid = np.linspace(0.0, whole, count + 1)  # also for a still
     tracks = []
     for trace, colour in zip(traces, colours, strict=True):
         tracks.append(MachineTrack(trace, colour, edges, grid, scales, arms))
     row = scene.in_a_row(scenario, scene.turn(scenario, frames.camera))
+    below = None
+    words = None
     if arms:
         below = arm.room(traces, width / len(traces) / scale)
-    else:
-        below = None
-    words = arm.key(traces) if arms else None
-    reported = [track.reported for track in tracks]
+        words = arm.key(traces)
+    told = [track.reported for track in tracks]
     title = frames.title
-    caption = Caption(
-        traces, names, colours, title, above, scale, scales, reported, row, below, words
-    )
+    caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
     charts = Charts(traces, names, colours, (width, low), scale)
     with Stage(tracks, above, caption.room, frames.camera, caption.apart, scale) as stage:
         caption.place(stage.boxes)
-        if arms:
+        over = None
+        if arms or scenario.plant.pose:
             over = arm.Overlay(traces, colours, stage, edges, caption.badges)
-        else:
-            over = None
-        if scenario.plant.pose:
-            flights = arm.Paths(traces, colours, stage)
-        else:
-            flights = None
         for frame, time in enumerate(times.tolist()):
             picture = stage.render(posed(stage, tracks, over, frame, time))
             if over:
                 picture = over.over(picture, frame)
-            if flights:
-                picture = flights.over(picture, time)
-            picture = caption.over(
-                picture,
-                time,
-                tuple(track.failed(time) for track in tracks),
-                tuple(track.states[frame] for track in tracks),
-                float(frames.clock.speeds[frame]),
-                float(frames.clock.shown[frame]),
-            )
+            speed = float(frames.clock.speeds[frame])
+            shown = float(frames.clock.shown[frame])
+            failed = [track.failed(time) for track in tracks]
+            states = [track.states[frame] for track in tracks]
+            picture = caption.over(picture, time, failed, states, speed, shown)
             yield np.concatenate([picture, charts.at(time)])
 
 
 def posed(
     stage: Stage,
     tracks: Sequence[MachineTrack],
-    over: arm.Overlay | None,
+    over: "arm.Overlay | None",
     frame: int,
     time: float,
 ) -> list[tuple[int, int, arrows.Arrow]]:
@@ -354,7 +346,7 @@ def posed(
             stage.aim(k, None)
             continue
         stage.set_colour(k, track.colour)
-        lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
+        lost = over is None or over.lost(k, frame)
         stage.aim(k, track.r[frame] if lost else None, time)
         drawn += [(k, *pair) for pair in track.drawn[frame].arrows]
     return drawn

@@ -82,7 +82,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
 
     whole = end(traces)
     grid = np.arange(max(1, round(whole * fps))) / fps
-    runs = [finite(trace) for trace in traces]
+    runs = list(map(finite, traces))
     travel = travel_of(runs, np.append(grid, whole))
     powers = np.ceil(np.log2(np.maximum(travel / MAX_TRAVEL, 1.0)) - 1e-9)
     powers = np.asarray(
@@ -99,8 +99,9 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     )
     longest = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1])
     playback = np.ones(len(grid))
-    steps = [(slowest, MAX_HALVINGS) for slowest in range(MAX_HALVINGS, 0, -1)]
-    for slowest, around_pushes in [*steps, *((0, k) for k in range(MAX_HALVINGS, -1, -1))]:
+    for saved in range(2 * MAX_HALVINGS + 1):  # first around other motion, then around pushes
+        slowest = max(0, MAX_HALVINGS - saved)
+        around_pushes = min(MAX_HALVINGS, 2 * MAX_HALVINGS - saved)
         playback = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, slowest), REST_SPEED)
         playback[pushed] = 0.5**around_pushes
         if (1.0 / playback).sum() / fps <= longest:
@@ -113,7 +114,9 @@ def travel_of(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
     channel's range.
     """
     lasting = [trace for trace in runs if trace.diverged_at is None] or runs
-    low, high = (f([f(trace.x, axis=0) for trace in lasting], axis=0) for f in (np.min, np.max))
+    places = np.concatenate([trace.x for trace in lasting])
+    low = places.min(axis=0)
+    high = places.max(axis=0)
     size = np.where(high > low, high - low, np.inf)
     travel = np.zeros(len(edges) - 1)
     for trace in runs:

@@ -210,9 +210,12 @@ def lane(
             right[0] = 1.0
         right /= np.linalg.norm(right)
         sides = [points @ right for points in reaches]
-        gaps = [left.max() - other.min() for left, other in itertools.pairwise(sides)]
-        wide = max(gaps, default=0.0)
-        tall = max(float(np.ptp(points[:, 2])) for points in reaches)
+        wide = 0.0
+        for left, other in itertools.pairwise(sides):
+            wide = max(wide, left.max() - other.min())
+        tall = 0.0
+        for points in reaches:
+            tall = max(tall, float(np.ptp(points[:, 2])))
         gap = ARM_GAP if scenarios[0].plant.tip else ROW_GAP
         return (wide + gap * max(wide, tall)) * right
     length = float(np.linalg.norm(step))
@@ -253,11 +256,6 @@ def fixed_boxes(model: mujoco.MjModel) -> np.ndarray:
     data = mujoco.MjData(model)
     forward(model, data)
     return boxes(model, data)[still(model)]
-
-
-def are_arms(scenarios: Sequence[Scenario]) -> bool:
-    """Return whether all machines have a tip, which a film then shows."""
-    return all(scenario.plant.tip for scenario in scenarios)
 
 
 def first_channels(scenario: Scenario) -> Scenario:

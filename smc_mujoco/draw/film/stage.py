@@ -5,7 +5,6 @@ The camera stands at the nearest place from which every machine stays inside the
 leaves, wherever its trace takes it.
 """
 
-import itertools
 import warnings
 from collections.abc import Sequence
 
@@ -38,8 +37,6 @@ class Stage:
     top, right, bottom.
     """
 
-    changed = True  # whether more than poses
-
     def __init__(
         self,
         tracks: Sequence[MachineTrack],
@@ -55,12 +52,21 @@ class Stage:
         first = tracks[0].trace.scenario
         self.is_users = not first.plant.on_stage
         self.turn = turn = scene.turn(first, chosen)
-        self.puppets = [Puppet(track.trace.scenario, turn[:, 2]) for track in tracks]
-        scenarios = [puppet.scenario for puppet in self.puppets]
-        self.shown = [puppet.shown for puppet in self.puppets]
-        cut = scene.in_a_row(scenarios[0], turn)
-        pairs = list(zip(self.puppets, tracks, strict=True))
-        reaches = [puppet.reach(track, cut) for puppet, track in pairs]
+        cut = scene.in_a_row(first, turn)
+        self.puppets = []
+        scenarios = []
+        reaches = []
+        self.shown = []
+        self.blocks = []  # of the positions of all
+        start = 0
+        for track in tracks:
+            puppet = Puppet(track.trace.scenario, turn[:, 2])
+            self.puppets.append(puppet)
+            scenarios.append(puppet.scenario)
+            reaches.append(puppet.reach(track, cut))
+            self.shown.append(puppet.shown)
+            self.blocks.append(slice(start, start + puppet.model.nq))
+            start += puppet.model.nq
         self.where, seen, self.place = placed(self.puppets, reaches, turn, size, room, apart)
         self.model = scene.compose(scenarios, self.where, size)
         if not self.is_users:
@@ -68,8 +74,6 @@ class Stage:
         self.data = mujoco.MjData(self.model)
         self.goal = mujoco.MjData(self.model)
         self.aimed = np.zeros(len(tracks), bool)
-        ends = np.cumsum([0, *(puppet.model.nq for puppet in self.puppets)]).tolist()
-        self.blocks = [slice(*pair) for pair in itertools.pairwise(ends)]
         material = self.model.geom_matid
         painted = self.model.mat_rgba[material]
         self.paint = np.where((material >= 0)[:, None], painted, self.model.geom_rgba)
@@ -77,17 +81,10 @@ class Stage:
         radius = self.largest_radius(
             float((self.place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2])
         )
-        self.links, self.mounts = [], []
-        for k, puppet in enumerate(self.puppets):
-            puppet.place = self.where[k]
-            names = [joint.name for joint in joints(models.spec(puppet.scenario))]
-            ids = [self.model.joint(f"m{k}/{name}").id for name in names]
-            moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
-            self.links.append(np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible))
-            mounts = []
-            for joint, mount in zip(ids, puppet.mounts, strict=True):
-                mounts.append(mount._replace(joint=joint, radius=min(mount.radius, radius)))
-            self.mounts.append(mounts)
+        self.links = []
+        self.mounts = []
+        for k in range(len(tracks)):
+            self.find_joints(k, visible, radius)
         self.shape = [-1] * len(tracks)
         self.colours = [""] * len(tracks)
         for k, track in enumerate(tracks):
@@ -97,24 +94,38 @@ class Stage:
         film = self.model.camera("film")
         film.pos = self.place
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
-        flat = [self.project(points) for points in seen]
-        self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in flat])
+        self.boxes = np.stack(list(map(self.box, seen)))
         scene.forward(self.model, self.data)
         scene.set_floor(self.model, turn, self.place, size, np.concatenate(seen))
-        if self.is_users and not any(len(links) for links in self.links):
+        if self.is_users and not any(map(len, self.links)):
             warnings.warn(
                 f"the picture of {first.plant.name} shows no part that moves: "
                 "give it geoms in groups 0 to 2 that are not transparent",
                 ScenarioWarning,
                 users_stacklevel(),
             )
-        self.canvas = Canvas(self.model, self.data, size, arms=scene.are_arms(scenarios))
+        self.canvas = Canvas(self.model, self.data, size, arms=bool(first.plant.tip))
 
     def __enter__(self) -> "Stage":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.canvas.close()
+
+    def find_joints(self, k: int, visible: np.ndarray, radius: float) -> None:
+        """Find the geoms that the joints of machine k move, and the mounts of its arrows; bent ones
+        have at most this radius, m.
+        """
+        puppet = self.puppets[k]
+        puppet.place = self.where[k]
+        ids = []
+        mounts = []
+        for joint, mount in zip(joints(models.spec(puppet.scenario)), puppet.mounts, strict=True):
+            ids.append(self.model.joint(f"m{k}/{joint.name}").id)
+            mounts.append(mount._replace(joint=ids[-1], radius=min(mount.radius, radius)))
+        moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
+        self.links.append(np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible))
+        self.mounts.append(mounts)
 
     def largest_radius(self, distance: float) -> float:
         """Return the largest radius of a bent arrow at a distance from the camera, m."""
@@ -133,7 +144,6 @@ class Stage:
         if now == self.shape[k]:
             return
         self.shape[k] = now
-        self.changed = True
         single = self.puppets[k].shapes[now].model
         for geom in range(single.ngeom):
             name = single.geom(geom).name
@@ -152,7 +162,6 @@ class Stage:
         if self.colours[k] == colour:
             return
         self.colours[k] = colour
-        self.changed = True
         rgb = np.array(style.rgb(colour)) / 255
         if not self.is_users:
             self.model.mat(f"m{k}/accent").rgba[:3] = rgb
@@ -194,8 +203,7 @@ class Stage:
         """
         scene.forward(self.model, self.data)
         scene.forward(self.model, self.goal)
-        picture = self.canvas.draw(self.add_ghosts, whole=self.changed)
-        self.changed = False
+        picture = self.canvas.draw(self.add_ghosts)
         if not drawn:
             return picture
         image = Image.fromarray(picture)
@@ -225,6 +233,11 @@ class Stage:
     def project(self, points: np.ndarray) -> np.ndarray:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""
         return camera.project(points, self.turn, self.place, self.size)
+
+    def box(self, points: np.ndarray) -> np.ndarray:
+        """Return the box around points (m, 3) m in the picture, px: left, top, right, bottom."""
+        flat = self.project(points)
+        return np.append(flat.min(axis=0), flat.max(axis=0))
 
     def find(self, k: int, name: str) -> np.ndarray:
         """Return where a site of machine k is, or the centre of mass of a body, (3,) m."""
@@ -271,9 +284,7 @@ def placed(
     where[:, 2] -= [puppet.lowered for puppet in puppets]
     if not scenarios[0].plant.on_stage:  # the floor hides what is below it
         where[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
-    floor = -np.inf
-    if scene.are_arms(scenarios):
-        floor = 0.0
+    floor = 0.0 if scenarios[0].plant.tip else -np.inf
 
     def fitted(where: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         lowest = (-np.inf, -np.inf, floor)

@@ -94,7 +94,7 @@ def drawn(
     for k, time in enumerate(edges[1:].tolist()):
         found = []
         if trace.scenario.plant.pose and sizes:
-            found = arrows.flying(acting, k, sizes[0], colour)
+            found = arrows.flying(acting, k, sizes[0])
         else:
             for i, size in enumerate(sizes):
                 found += [(i, arrow) for arrow in arrows.arrows(acting, k, i, size, colour)]

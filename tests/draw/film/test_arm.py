@@ -95,7 +95,7 @@ def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
     monkeypatch.setattr(tip, "tip_paths", lambda trace: (low, low))
     shown = overlay(dataclasses.replace(trace, t=np.array([0.0, 0.1, 0.2])))
     floor = project(np.zeros((1, 3)))[0, 1]
-    for trail in shown.paths.trails[0]:
+    for trail in shown.trails[0]:
         rows = np.flatnonzero((drawn(trail, 1.0) != 255).any(axis=(1, 2)))
         assert floor - 55 <= rows.min() <= floor - 45
         assert rows.max() <= floor + 2

@@ -111,4 +111,4 @@ def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
         if "violet" in word:
             words.append(word)
     assert len(words) == 1
-    assert words[0].startswith("violet arrow: friction, limits and contact, longest ")
+    assert words[0].startswith("violet arrow: reaction, longest ")
