@@ -49,8 +49,8 @@ def plot(
 
     Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that
     share one of several sets of gains are one sample. There is a column of panels per metric and a
-    row per plant. A dot at the right edge, under "never", is a law whose median run fails or does
-    not settle. Sizes below 1e-9 are drawn at it.
+    row per plant. A hollow dot at the right edge, under "never" or "not arrived", is a law whose
+    median run fails, does not settle, or has not arrived. Sizes below 1e-9 are drawn at it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -107,13 +107,13 @@ def plot(
                 for cell, its in intervals.items():
                     if cell[:2] == (name, plant):
                         of_panel[cell[2:]] = its
-                _panel(ax, of_panel, conditions_of[plant], looks, name != SETTLES)
+                _panel(ax, of_panel, conditions_of[plant], looks, name)
                 ax.set_xlabel(_label(name, units[plant]))
                 ax.tick_params(labelleft=ax is of_plant[0])
             words = style.plant_name(plant) if title or len(plants) > 1 else ""
             place = None
-            if style.width(f"{words}  never", text, bold=True) >= room:
-                place = 1.0 + 1.7 * text / 72 / style.points(high)  # above "never"
+            if style.width(f"{words}  not arrived", text, bold=True) >= room:
+                place = 1.0 + 1.7 * text / 72 / style.points(high)  # above the note
             of_plant[0].set_title(words, y=place, parse_math=False)
         heading = style.heading(plants, conditions, short=len(plants) > 1)
         pages.set_head(page, width, title or f"Medians: {heading}", key, shared)
@@ -165,17 +165,17 @@ def _panel(
     intervals: Mapping[tuple[str, str], Interval],
     conditions: Sequence[str],
     looks: Mapping[str, Mapping[str, str]],
-    log: bool,
+    metric: str,
 ) -> None:
     """Draw a metric of one plant, (condition, law) -> its interval: a block of lines per condition,
     a dot per law.
 
-    If `log`, its axis is logarithmic where values differ much.
+    Its axis is logarithmic where values differ much, but for the share of runs that settle.
     """
     height = len(looks) + 1
     sizes = np.array([interval[:3] for interval in intervals.values()])
     sizes = sizes[np.isfinite(sizes)]
-    if log and sizes.size and 0.0 < style.LOG_RANGE * sizes.min() < sizes.max():
+    if metric != SETTLES and sizes.size and 0.0 < style.LOG_RANGE * sizes.min() < sizes.max():
         ax.set_xscale("log")
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(looks)):
@@ -183,6 +183,9 @@ def _panel(
             _dot(ax, intervals[condition, law], j * height + k, looks[law])
     if not sizes.size:
         ax.set_xticks([])
+    if any(not np.isfinite(interval.median) for interval in intervals.values()):
+        late = CATALOGUE[metric].unit == "s" or CATALOGUE[metric].error
+        drawing.note(ax, "never" if late else "not arrived")
     for j in range(1, len(conditions)):
         ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
     middles = height * (np.arange(len(conditions)) + 0.5) - 1
@@ -193,7 +196,7 @@ def _panel(
 
 
 def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> None:
-    """Draw a median with its interval. An infinite median is at the right edge, under "never"."""
+    """Draw a median with its interval. An infinite median is at the right edge."""
     median, low, high = interval[:3]
     color = look["color"]
     mark = {**look, "ms": style.points(6)}
@@ -202,10 +205,9 @@ def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> No
     else:
         mark |= {"transform": ax.get_yaxis_transform(), "clip_on": False}
         ax.plot(1.0, line, **mark | {"mfc": style.PAPER, "mec": color})
-        drawing.note(ax, "never")
     if np.isfinite(low) and np.isfinite(high):
         ax.plot([low, high], [line, line], color=color, lw=style.points(1.5))
-    elif np.isfinite(low):  # up to "never"
+    elif np.isfinite(low):  # up to the edge
         ax.plot(low, line)  # nothing is seen: the axis comprises the interval
         arrow = {"arrowstyle": "-", "color": color, "lw": style.points(1.5), "ls": ":"}
         place = (1.0, line), (low, line), ("axes fraction", "data"), "data"

@@ -365,8 +365,10 @@ class Rows:
         laws=("classical", "super_twisting", "pid"),
         seeds=6,
         still="",
+        away=(),
     ):
         self.still = still
+        self.away = away
         cells = itertools.product(
             ("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds)
         )
@@ -386,6 +388,7 @@ class Rows:
         nothing = ("failure", "half_step", "trends", "search")
         empty |= dict.fromkeys(nothing, np.full(n, None, object))
         empty["diverged_at"] = np.full(n, np.nan)
+        empty["arrived"] = np.array([row[2] not in self.away for row in self.rows])
         if name in empty:
             return empty[name]
         if name in ("plant", "condition", "law", "seed"):
@@ -451,6 +454,21 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
         if dot.get_marker() in ("o", "s", "D"):
             shares.add(float(np.array(dot.get_xdata())[0]))
     assert shares == {0.0 if size else 1.0}
+
+
+@pytest.mark.parametrize("metric", ["tv_rate", "energy", "ultimate_bound", "settling_time"])
+def test_a_law_whose_runs_have_not_arrived_has_no_dot_among_others(metric):
+    page = smc.plot(Rows(away=("pid",)), metrics=[metric])
+    for ax in page.axes:
+        hollow = [line for line in ax.lines if str(line.get_mfc()).lower() == style.PAPER.lower()]
+        if metric == "ultimate_bound":  # an error, which is known
+            assert not hollow
+            assert not ax.get_title(loc="right")
+            continue
+        assert [line.get_xdata()[0] for line in hollow] == [1.0, 1.0]
+        words = "never" if metric == "settling_time" else "not arrived"
+        assert ax.get_title(loc="right") == words
+    check(page)
 
 
 def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
