@@ -38,8 +38,8 @@ class MachineTrack:
     """The part of a trace in a film whose frames end at edges[1:], s; an arm has neither arrows nor
     states.
 
-    `framing` and `reported` are its arrows and states at the times `grid`, s, of the whole run, which
-    set the place of all.
+    `framing` and `reported` are its arrows and states at the times `grid`, s, of the whole run,
+    which set the place of all.
     """
 
     def __init__(
