@@ -141,6 +141,7 @@ class AllTurnAlike:
         yield Field("actuator_user", (slice(None), list(ROTOR.fields or ()).index("spin")), 1.0)
 
 
+@pytest.mark.filterwarnings("ignore:control_period is 5 s")
 @pytest.mark.parametrize("fall", [0.0, 3.0], ids=["steady", "slowing down"])
 def test_a_tumbling_body_with_spinning_rotors_keeps_its_angular_momentum(fall):
     """Without lever and torque per thrust nothing turns the body but its rotors."""

@@ -665,7 +665,7 @@ DRY = {
 
 
 def dry_arm(kind):
-    """A plant with dry friction of its file, which needs a force to stay level."""
+    """The text and plant of an arm with dry friction, which needs a force to stay level."""
     joint, carried, more = DRY[kind]
     motors = '<motor joint="a"/>'
     if carried:
@@ -675,52 +675,6 @@ def dry_arm(kind):
     text = f"""<mujoco><worldbody><body><joint name="a" {joint}/>{LINK.format(0.3, 0.5)}{carried}
       </body></worldbody>{more}<actuator>{motors}</actuator></mujoco>"""
     return text, smc.plant_from(text, ["a", "b"] if carried else ["a"])
-
-
-@smc.law_function(gains={"kp": 1.0, "kd": 1.0})
-def pd(y, gains, memory):
-    """A PD loop of its own: `pid` filters the rate."""
-    return -gains.kp * y.e - gains.kd * y.de, 0.0
-
-
-def set_valued(text, x0, kp, kd, duration):
-    """Where a PD loop on joints comes to rest: steps of 0.25 ms that end in friction's set."""
-    h = 2.5e-4
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    data = mujoco.MjData(model)
-    rows = []
-    levels = []
-    for dof in np.flatnonzero(model.dof_frictionloss):
-        rows.append(np.eye(model.nv)[dof])
-        levels.append(h * model.dof_frictionloss[dof])
-    for tendon in range(model.ntendon):
-        rows.append(model.wrap_prm[:2])
-        levels.append(h * model.tendon_frictionloss[tendon])
-    J = np.array(rows)
-    x = np.array(x0, float)
-    v = np.zeros(model.nv)
-    M = np.zeros((model.nv, model.nv))
-    pushed = np.zeros(len(J))
-    for k in range(round(duration / h)):
-        if k % 4 == 0:
-            u = np.clip(-kp * x - kd * v, -20.0, 20.0)
-        data.qpos[:] = x
-        data.qvel[:] = v
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        mujoco.mj_fullM(model, data, M)
-        inverse = np.linalg.inv(M)
-        w = v + h * inverse @ (u + data.qfrc_passive - data.qfrc_bias)
-        delassus = J @ inverse @ J.T
-        for _ in range(10):
-            for i, level in enumerate(levels):
-                slip = J[i] @ w + delassus[i] @ pushed
-                pushed[i] = np.clip(pushed[i] - slip / delassus[i, i], -level, level)
-        w = w + inverse @ J.T @ pushed
-        x = x + 0.5 * h * (v + w)
-        v = w
-    return x
 
 
 @pytest.mark.parametrize(
@@ -738,19 +692,6 @@ def test_dry_friction_of_the_file_holds_what_weighs_less(kind, fields):
     assert scenario.exact_friction == alone
     assert np.abs(held.x[1000:] - held.x[1000]).max() < 2e-7
     assert np.abs(held.x).max() < (3e-3 if kind == "geared" else 1e-6)  # the file's gear is soft
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["hinge", "arm", "tendon"])
-def test_a_loop_rests_where_set_valued_friction_of_the_file_holds_it(kind):
-    text, plant = dry_arm(kind)
-    x0 = [0.3, -0.25][: plant.n]
-    law = pd(kp=40.0, kd=3.0)
-    common = {"plant": plant, "law": law, "x0": x0, "u_max": 20.0, "duration": 1.0}
-    exact = set_valued(text, x0, 40.0, 3.0, 1.0)
-    for fields in ({}, {"physics_step": 1e-3}, {"integrator": "RK4"}):
-        trace = smc.run(smc.Scenario(**common, **fields))
-        np.testing.assert_allclose(trace.x[-1], exact, rtol=0.02)
 
 
 def test_the_file_s_own_softness_of_dry_friction_stays():
