@@ -81,14 +81,16 @@ def control(address, sim, data):  # noqa: PLR0912
     k = step // steps
     within = step % steps
     failure = record.FINE
+    if _interfered(sim):
+        failure = record.INTERRUPTED
     _remove_exact_friction(sim, data)
     if stage == 0:
         _sum_forces(sim, data)
         if _diverged(sim, data):
             failure = record.DIVERGED
-        elif k >= sim.samples or _interfered(sim):  # or the simulation is stepped beyond its end
+        elif k >= sim.samples:  # the simulation is stepped beyond its end
             failure = record.INTERRUPTED
-        else:
+        elif failure == record.FINE:
             failure = _sample(address, sim, data, k, within)
         _actuate(sim, data, step)
     elif sim.drive_step.rise_first != 0.0:
