@@ -201,7 +201,9 @@ class Group:
 
     def scores(self, by_row: ByRow) -> Scores:
         """Return the scores of the laws in the blocks in which a metric applies."""
-        cubes = [np.where(self.rows >= 0, row[self.rows], np.nan) for row in by_row]
+        cubes = []
+        for row in by_row:
+            cubes.append(np.where(self.rows >= 0, row[self.rows], np.nan))
         cube = cubes[0]
         if np.isnan(cube).all():
             return Scores([], {}, {}, {}, {}, {}, {})
@@ -338,7 +340,10 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     if scenario is None or metric == SETTLES:
         return 0.0
     entry = CATALOGUE[metric]
-    driven = [group for group in channel_groups(scenario) if group.driven]
+    driven = []
+    for group in channel_groups(scenario):
+        if group.driven:
+            driven.append(group)
     T = scenario.duration
     # a free body may rest anywhere
     if scenario.plant.pose:

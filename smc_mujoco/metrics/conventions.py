@@ -91,7 +91,10 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
 
     A scenario's u may be a voltage.
     """
-    plant = machine if isinstance(machine, Plant) else machine.plant
+    if isinstance(machine, Plant):
+        plant = machine
+    else:
+        plant = machine.plant
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -119,8 +122,14 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     whole = trace.arrays()
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
-    columns = [i for i in group.channels if i in plant.scored_channels]
-    arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
+    columns = []
+    for i in group.channels:
+        if i in plant.scored_channels:
+            columns.append(i)
+    arrays = {}
+    for name, array in whole.items():
+        if name != "t":
+            arrays[name] = array[:, columns]
     if (
         plant.pose and group.unit == "m" and trace.x.shape[1] == plant.n
     ):  # forces are of the actuators

@@ -241,7 +241,10 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
             joint = dataclasses.replace(group, channels=(i,))
             part = group_trace(trace, joint)
             power = np.abs(trace.force[:, i] * trace.v[:, i])
-            found = {m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)}
+            found = {}
+            for m in metrics():
+                if m.applies_to(joint):
+                    found[m.name] = float(m.formula(part))
             found["peak_power"] = float(power.max())
             found["work"] = float(np.trapezoid(power, trace.t))
             values[names[i]] = found

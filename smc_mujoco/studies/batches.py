@@ -32,7 +32,10 @@ def result_columns(trace: Trace) -> ResultColumns:
     if trace.failure is not None:
         return failed
     try:
-        known = {name: value for name, value in score(trace).items() if not math.isnan(value)}
+        known = {}
+        for name, value in score(trace).items():
+            if not math.isnan(value):
+                known[name] = value
         return failed | known | {"trends": to_json(trends(trace)), "arrived": arrived(trace)}
     except ScenarioError as error:  # not finite, though nothing failed
         return failed | {"failure": str(error)}

@@ -66,8 +66,13 @@ class Lead(NamedTuple):
         if self.floor:
             text = f"{self.law} is below {self.floor}, {self.rival} is not"
             least = 1.0 / self.effect.high
-            return text if least < MIN_TIMES else f"{text}: at least {number(least)} times less"
-        samples = "sets of gains" if self.effect.sets else "runs"
+            if least < MIN_TIMES:
+                return text
+            return f"{text}: at least {number(least)} times less"
+        if self.effect.sets:
+            samples = "sets of gains"
+        else:
+            samples = "runs"
         ahead = f"ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
         return f"{ratio} of {self.rival} ({low} to {high}), {ahead}"
 
@@ -262,7 +267,10 @@ class Board(Tables):
         for block in self.blocks:
             if block.lead and block.lead.floor:
                 return block.lead.words
-        seen = [lead for lead in map(self.visible, self.best) if not math.isnan(lead)]
+        seen = []
+        for lead in map(self.visible, self.best):
+            if not math.isnan(lead):
+                seen.append(lead)
         if not seen:
             return "cannot tell them apart"
         return f"cannot tell them apart ({_detects(max(seen))})"
@@ -271,7 +279,10 @@ class Board(Tables):
         """Return the largest, over the blocks, of the least leads that would have been seen, a
         share; NaN for none.
         """
-        known = [block.visible[law] for block in self.blocks if law in block.visible]
+        known = []
+        for block in self.blocks:
+            if law in block.visible:
+                known.append(block.visible[law])
         return max(known, default=math.nan)
 
     @property

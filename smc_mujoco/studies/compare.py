@@ -116,7 +116,10 @@ class Compared(Tables):
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
                 # inf: no bound, or a number of the plant
-                best = [f"{k}={gain_text(v)}" for k, v in law.gains.items() if v != math.inf]
+                best = []
+                for k, v in law.gains.items():
+                    if v != math.inf:
+                        best.append(f"{k}={gain_text(v)}")
                 gains.append((plant, law.name, law.source.words, f"{len(sets)}", ", ".join(best)))
             for name, time in self.times.get(plant, {}).items():
                 of_law = (number(value) for value in (time.ratio, time.median, time.high))
@@ -274,7 +277,10 @@ def compare(
     tested = [find_condition(name) for name in listed("conditions", conditions)]
     trial = Trial(machines, tested, length, starts, Path(out), threads, progress, seed)
     chosen: dict[str, list[Law | Template]] = {}
-    of_all = None if laws is None else [law_or_template(law) for law in listed_laws(laws)]
+    if laws is None:
+        of_all = None
+    else:
+        of_all = [law_or_template(law) for law in listed_laws(laws)]
     for plant in machines:
         chosen[plant.name] = of_all or [law_or_template(law) for law in _usual(plant)]
     trial.check(chosen)
@@ -295,7 +301,9 @@ def compare(
         by = ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant)
     holdout = trial.holdout(candidates, seeds)
-    sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in holdout}
+    sources = {}
+    for p in holdout:
+        sources[p] = {c.law.name: (c.law.source,) for c in candidates[p]}
     boards[:0] = objective_boards(holdout, sources, defaults, relevant)
     return Compared(
         table=table,
@@ -354,7 +362,10 @@ def _times(
 
 def _usual(plant: Plant) -> list[Any]:
     """Return the laws to compare on a plant if none are given."""
-    known = [name for name in gain_sets.COMPARED if suits(catalogue()[name], plant)]
+    known = []
+    for name in gain_sets.COMPARED:
+        if suits(catalogue()[name], plant):
+            known.append(name)
     known = [name for name in known if gain_sets.in_set(plant, name, "tuned")] or known
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]

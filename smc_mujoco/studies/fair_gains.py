@@ -127,7 +127,10 @@ def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
 
     found = tuned.law.source
     if tuned.before < tuned.objective:
-        own = "defaults" if default.source.kind == source.DEFAULT else "own gains"
+        if default.source.kind == source.DEFAULT:
+            own = "defaults"
+        else:
+            own = "own gains"
         kept = default.sourced(found.kind, found.search)
         return Candidate(kept, (kept,), f"its {own}, better than those tried")
     sets = []
@@ -170,7 +173,10 @@ class Trial(NamedTuple):
 
     def check(self, laws: Mapping[str, Laws]) -> None:
         """Refuse, before gains are searched, two things of one name, and what moves nothing."""
-        every = [coerce.law(law) for of_plant in laws.values() for law in of_plant]
+        every = []
+        for of_plant in laws.values():
+            for law in of_plant:
+                every.append(coerce.law(law))
         check_names(self.plants, every, self.conditions)
         for plant in self.plants:
             for condition in self.conditions:
@@ -201,7 +207,10 @@ class Trial(NamedTuple):
             candidates = [_without_search(plant, law, gains) for law in laws[plant.name]]
             kinds = {candidate.law.source.kind for candidate in candidates if candidate}
             known[plant.name] = candidates
-            starts[plant.name] = None if source.SHIPPED in kinds else self.starts
+            if source.SHIPPED in kinds:
+                starts[plant.name] = None
+            else:
+                starts[plant.name] = self.starts
             if tune and not defaults:
                 self._check_tunable(plant, laws[plant.name], candidates, starts[plant.name])
         made: dict[str, list[Candidate]] = {}
@@ -267,7 +276,10 @@ class Trial(NamedTuple):
 
         goal = self._goal(plant, starts)
         default = coerce.law(law)
-        template = law if isinstance(law, Template) else default.template
+        if isinstance(law, Template):
+            template = law
+        else:
+            template = default.template
         ranges = template and (dict(template.gains), dict(template.conditions))
         folder = self.folder / "gains"
 

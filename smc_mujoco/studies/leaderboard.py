@@ -72,7 +72,9 @@ def leaderboard(
     boards.failures = paired_runs.failures(table)
     groups = paired_runs.groups(table, by)
     ran = [paired_runs.scenarios(table, group) for group in groups]
-    sources = [paired_runs.sources(table, group.rows[group.rows >= 0]) for group in groups]
+    sources = []
+    for group in groups:
+        sources.append(paired_runs.sources(table, group.rows[group.rows >= 0]))
     made: dict[tuple[int, str], Board] = {}
     for metric in dict.fromkeys(metrics):
         by_row = paired_runs.by_row(table, metric)
@@ -121,7 +123,9 @@ def objective_boards(
     for plant, alone in compared.items():
         comparison = alone.limited(limits)
         untuned = _untuned(sources[plant], defaults)
-        sets = {law: np.atleast_2d(numbers) for law, numbers in holdout[plant].sets.items()}
+        sets = {}
+        for law, numbers in holdout[plant].sets.items():
+            sets[law] = np.atleast_2d(numbers)
         seeds = int(comparison.seeds[0])
         boards.append(
             Board(
@@ -191,7 +195,10 @@ def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
     if len(efforts) > 1:
         return UNITS[metric]
     effort = efforts.pop()
-    bracketed = effort if effort.isalpha() else f"({effort})"
+    if effort.isalpha():
+        bracketed = effort
+    else:
+        bracketed = f"({effort})"
     return UNITS[metric].replace("({u})", bracketed).replace("{u}", effort)
 
 
@@ -226,7 +233,9 @@ def _block(
     laws = np.array(comparison.laws)
     sets = comparison.sets[:, at]
     several = sets[sets > 1].tolist()
-    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
+    changes = {}
+    for law in comparison.laws:
+        changes[law] = comparison.step_change(at, law)
     best = [comparison.laws.index(law) for law in comparison.best[at]]
     level = comparison.level[at][np.ix_(best, best)].all()
     runs = int(comparison.seeds[at])
@@ -299,7 +308,10 @@ def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str,
     first = order[0]
     seen = {}
     for i in sorted(order):
-        rival = i if i != first else _closest(comparison, at, first, order)
+        if i != first:
+            rival = i
+        else:
+            rival = _closest(comparison, at, first, order)
         lead = comparison.visible(at, names[first], names[rival])
         if not math.isnan(lead) and math.isfinite(comparison.centres[i, at]):
             seen[names[i]] = lead

@@ -102,7 +102,10 @@ class Outcome:
         for name, runs in self.traces.items():
             found[name] = {}
             for label, run in runs.items():
-                found[name][label] = math.nan if run.failure is not None else float(value(run))
+                if run.failure is not None:
+                    found[name][label] = math.nan
+                else:
+                    found[name][label] = float(value(run))
         return found
 
     def size(self, measure: Measure, unit: str = "") -> str:
@@ -201,7 +204,10 @@ class Outcome:
             least = floor(self.traces[condition][next(iter(known))].scenario, measure)
         level = {}
         for label, value in known.items():
-            worse, better = (value, best) if sign > 0.0 else (best, value)
+            if sign > 0.0:
+                worse, better = (value, best)
+            else:
+                worse, better = (best, value)
             if worse == better or not exceeds(worse, better, least):
                 level[label] = value
         return level
@@ -228,7 +234,9 @@ class Outcome:
         units = set()
         for runs in self.traces.values():
             units |= {CATALOGUE[measure].unit_in(run.scenario) for run in runs.values()}
-        return "" if len(units) > 1 or units == {"1"} else "".join(units)
+        if len(units) > 1 or units == {"1"}:
+            return ""
+        return "".join(units)
 
 
 def _range(values: Sequence[float], unit: str) -> str:
@@ -249,7 +257,10 @@ def _from_to(pair: tuple[float, float], unit: str) -> str:
     """Return two values, or one if their texts are equal: "1.12 to 1.13 s", "0.4 s to never"."""
     texts = []
     for value in pair:
-        text = "failed" if math.isnan(value) else number(value)
+        if math.isnan(value):
+            text = "failed"
+        else:
+            text = number(value)
         texts.append(f"{text} {unit}".rstrip() if math.isfinite(value) else text)
     if all(map(math.isfinite, pair)) and texts[0] != texts[1]:
         texts[0] = number(pair[0])
@@ -356,7 +367,9 @@ def _check_runs(what: str, names: str, given: object) -> None:
 @functools.cache
 def scenes() -> Catalogue[Path]:
     """Return name -> file of every scene that comes with the package, or with another one."""
-    library = {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
+    library = {}
+    for path in sorted(shipped("scenes").glob("*.py")):
+        library[path.stem] = path
     return Catalogue(library, added("smc_mujoco.scenes", _of_package))
 
 

@@ -129,7 +129,9 @@ class Store:
             data = pa.concat_tables(parts).take(order).combine_chunks()
             for name in sorted({column for key in names for column in changes.get(key, ())}):
                 pairs = zip(names, data[name].to_pylist(), strict=True)
-                values = [changes.get(key, {}).get(name, value) for key, value in pairs]
+                values = []
+                for key, value in pairs:
+                    values.append(changes.get(key, {}).get(name, value))
                 column = pa.array(values, data.field(name).type)
                 data = data.set_column(data.column_names.index(name), data.field(name), column)
             return data
@@ -241,7 +243,9 @@ def _compute(
 ) -> None:
     """Compute runs, given by key, and store their rows as they finish."""
     # made before any run: a law may change its globals
-    first = {id(scenario): {"hash": key} for key, scenario in missing.items()}
+    first = {}
+    for key, scenario in missing.items():
+        first[id(scenario)] = {"hash": key}
 
     def finish(batch: Batch, finished: Sequence[Trace]) -> None:
         rows = []

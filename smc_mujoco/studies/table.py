@@ -126,7 +126,9 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
             raise ScenarioError(
                 f"it unpacks to {size / 1e6:,.0f} MB, and {MAX_UNPACKED / 1e6:,.0f} MB are allowed"
             )
-        groups = [file.read_row_group(i) for i in range(file.num_row_groups)]
+        groups = []
+        for i in range(file.num_row_groups):
+            groups.append(file.read_row_group(i))
         if groups:
             rows = pa.concat_tables(groups)
         else:
@@ -187,7 +189,10 @@ class Table:
         return f"Table({len(self)} runs: {', '.join(counts)})"
 
     def _repr_html_(self) -> str:
-        names = [name for name in PREVIEW if name in self.data.column_names]
+        names = []
+        for name in PREVIEW:
+            if name in self.data.column_names:
+                names.append(name)
         rows = [
             list(row.values()) for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist()
         ]

@@ -146,7 +146,10 @@ def which(
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     machine = as_plant(plant)
-    given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
+    if isinstance(needs, str):
+        given = needs.split(",")
+    else:
+        given = listed("needs", needs)
     names = []
     for need in given:
         name = need.strip() if isinstance(need, str) else need
@@ -163,7 +166,10 @@ def which(
     tested = [find_condition(name) for name in listed("conditions", conditions)]
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress, seed)
     trial.check({machine.name: chosen})
-    searches, budget = (3, 16) if quick else (SEARCHES, BUDGET)
+    if quick:
+        searches, budget = (3, 16)
+    else:
+        searches, budget = (SEARCHES, BUDGET)
     candidates = trial.gains({machine.name: chosen}, defaults, searches, budget)
     table = trial.run(candidates, seeds)
     settles, fit = _fit(table)
@@ -175,7 +181,9 @@ def which(
     )
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {machine.name}: ask for others")
-    found = {candidate.law.name: candidate.law for candidate in candidates[machine.name]}
+    found = {}
+    for candidate in candidates[machine.name]:
+        found[candidate.law.name] = candidate.law
     ordered = tuple(found[name] for name in _order(boards))
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
 
@@ -188,7 +196,10 @@ def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
     else:
         chosen = []
         for law in map(law_or_template, listed_laws(laws)):
-            template = law if isinstance(law, Template) else law.template
+            if isinstance(law, Template):
+                template = law
+            else:
+                template = law.template
             if not template or all(PROPERTIES[name].holds(template) for name in properties):
                 chosen.append(law)
     if not chosen:
