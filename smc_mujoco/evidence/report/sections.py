@@ -224,8 +224,8 @@ def margins(work: Work) -> Section:
             lambda report, plant=plant, laws=laws: margin_search.margins(
                 plant, laws, plan.kinds, GAINS, plan.quick, work.threads, report
             ),
-            margin_search.save,
-            margin_search.load,
+            lambda found, path: write_json(path, [dataclasses.asdict(one) for one in found]),
+            lambda path: [Margin(**entry) for entry in read_json(path)],
         )
         parts += tables([margin_table(plant, found)])
     return Section("margins", "Margins", parts)

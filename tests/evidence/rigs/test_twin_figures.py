@@ -114,9 +114,11 @@ def test_the_page_has_the_rows_of_benchmarks():
         )
 
 
-@pytest.mark.parametrize("condition", ["hold", "nudges"])
-def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
-    """Of the stepper's twin, found from the linear law's figures; not of the plain one."""
+@pytest.mark.parametrize(("condition", "share"), [("hold", 0.75), ("nudges", 0.5)])
+def test_laws_of_the_twin_stand_in_the_machines_order(condition, share):
+    """Of the stepper's twin, found from the linear law's figures; not of the plain one. Under
+    nudges the page says that half of the sets do not tell.
+    """
     whole, plain = (
         next(
             one
@@ -128,7 +130,7 @@ def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
             ("without all of these, noise and vibration", "hold"),
         )
     )
-    assert whole.ordered >= 0.75 * whole.sets
+    assert whole.ordered >= share * whole.sets
     assert plain.ordered == 0
 
 
