@@ -3,10 +3,9 @@
 - zero: u = 0, or of a quadrotor its weight, so that it stays in the air. It must reach no target of
   any problem.
 - oracle: it is handed the state, and f and g of x'' = f + g u with the true parameters and with all
-  other forces in f (a scenario's model "true"). It must reach every target. With a = g limit - |f -
-  r''| the acceleration that is left,
-  it goes to its goal on the parabola de^2 = 2 share a |e|, and near it as a critically damped pole
-  of frequency w:
+  other forces in f (a scenario's model "true"). It must reach every target. With the acceleration
+  a = g limit - |f - r''| that is left, it goes to its goal on the parabola de^2 = 2 share a |e|,
+  and near it as a critically damped pole of frequency w:
 
     u = (r'' - f - 2 w (de + h)) / g,   h = w e / 2 where |e| <= 2 share a / w^2,
                                         sgn(e) (sqrt(2 share a |e|) - share a / w) elsewhere
@@ -34,10 +33,8 @@ from smc_mujoco.control.from_text import law
 from smc_mujoco.control.law import FREE_BODY, Law, law_function
 from smc_mujoco.simulation.scenario import Scenario
 
-FALL = {
-    "cart_pole": 9.81,
-    "furuta": 9.81 / 0.085,
-}  # plant -> fall, in m/s^2, or of a rotary arm 1/s^2: gravity over its length
+# plant -> fall, in m/s^2, or of a rotary arm 1/s^2: gravity over its length
+FALL = {"cart_pole": 9.81, "furuta": 9.81 / 0.085}
 
 
 @law_function(gains={"w": 20.0, "share": 0.5}, positive=("w", "share"), requires_model=True)
@@ -57,10 +54,8 @@ def oracle_pair(y, gains, memory):
     """Return u and the acceleration that a joint with an actuator is given, so that its partner
     stands, too.
     """
-    w, b = (
-        gains.w,
-        y.gq / y.g,
-    )  # the partner's acceleration is b times the joint's, and beside it that of its fall
+    w = gains.w
+    b = y.gq / y.g  # of the partner's acceleration, over the joint's; the rest is its fall
     a = -b * gains.fall
     k1 = w**4 / a
     k2 = 4.0 * w**3 / a
@@ -93,11 +88,11 @@ def oracle_of(plant: str, w: float, share: float) -> Law:
 
 
 def zero(plant: str) -> Law:
-    """Return the law for a plant that does nothing."""
+    """Return the law that does nothing on a plant."""
     return (hover() if plant == "quadrotor" else law("none")).named("zero")
 
 
-def reported(scenario: Scenario) -> Scenario:
+def informed(scenario: Scenario) -> Scenario:
     """Return a scenario that hands the truth to an oracle; the same one under any other law."""
     if not any(part.function in ORACLES for part in scenario.law.parts):
         return scenario
@@ -115,9 +110,9 @@ def scenarios(
     base = one._base(law)
     made = []
     for index in instances:
-        scenario = reported(one._place(base, one.instance(index, seed)))
+        scenario = informed(one._place(base, one.instance(index, seed)))
         if one._attacked:
-            scenario = reported(one._worst(scenario))
+            scenario = informed(one._worst(scenario))
         made.append(scenario)
     return made
 

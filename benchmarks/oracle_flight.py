@@ -33,18 +33,16 @@ from smc_mujoco.simulation.scenario import Scenario
 
 STEP = np.array([126.0, -420.0, 540.0, -315.0, 70.0])  # of s^5 .. s^9: from 0 to 1
 FILTER = 4.0  # of w, chosen: bandwidth of the filter of the other forces' change
-AHEAD = (
-    0.01  # s, chosen: rotors are told the speed that brings them to the wanted one after this time
-)
+# s, chosen: rotors are told the speed that brings them to the wanted one after this time
+AHEAD = 0.01
 ALONG = 1.5  # of w, chosen: bandwidth along the thrust, which waits for no attitude
 LEAST = 0.2  # of the weight, of the thrust: chosen
 PLACES = np.array(quadrotor.PLACES)
 SPINS = np.array(quadrotor.SPINS)
 ROTORS = 4
 OF_BODY = "a", "c", "fmax"
-TOLD = [
-    (name, 0.0) for name in (*(ROTOR.names or ()), *OF_BODY, "delay")
-]  # of the rotors; delay in periods
+# of the rotors; delay in periods
+TOLD = [(name, 0.0) for name in (*(ROTOR.names or ()), *OF_BODY, "delay")]
 
 
 @njit(error_model="numpy")
@@ -129,7 +127,7 @@ def _thrust(gains, j, W):
 
 
 @njit(error_model="numpy")
-def _turn(gains, speeds, reported, dt, first):
+def _turn(gains, speeds, commanded, dt, first):
     """Advance the speeds of the rotors to when this sample's command comes.
 
     Return their thrusts and rates, (2, 4).
@@ -144,7 +142,7 @@ def _turn(gains, speeds, reported, dt, first):
             if first:
                 goal = speed_for(gains, 0.0) * (1.0 - gains.sag * lifted)
             else:
-                goal = reported[j]
+                goal = commanded[j]
             speeds[j] = spun(gains, speeds[j], goal, dt)[0]
     thrusts = np.zeros((2, ROTORS))
     for j in range(ROTORS):
@@ -152,12 +150,12 @@ def _turn(gains, speeds, reported, dt, first):
         if first:
             thrusts[1, j] = 0.0
         else:
-            thrusts[1, j] = slope * spun(gains, speeds[j], reported[j], 0.0)[1]
+            thrusts[1, j] = slope * spun(gains, speeds[j], commanded[j], 0.0)[1]
     return thrusts
 
 
 @njit(error_model="numpy")
-def _shares(y, gains, T, torque, speeds, reported, supply):
+def _shares(y, gains, T, torque, speeds, commanded, supply):
     """Return the wrench, (6,), of the rotors' commands for a thrust and a torque at the end of the
     period.
 
@@ -176,7 +174,7 @@ def _shares(y, gains, T, torque, speeds, reported, supply):
         rate = gains.rise if goal > speeds[j] else gains.fall
         speed = max(0.0, speeds[j] + (goal - speeds[j]) / -math.expm1(-rate * AHEAD)) / supply
         share = min(max((gains.linear + gains.square * speed) * speed, 0.0), gains.fmax)
-        reported[j], total = speed_for(gains, share) * supply, total + share
+        commanded[j], total = speed_for(gains, share) * supply, total + share
         for i in range(3):
             u[3 + i] += signs[i] * levers[i] * share
     u[0], u[1], u[2] = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, total)
@@ -200,9 +198,9 @@ def oracle_flight(y, gains, memory):
     m = y.M[0, 0]
     first = memory[0, 7] == 0.0
     speeds = memory[:, 5]
-    reported = memory[:, 6]
+    commanded = memory[:, 6]
     plan, now = _plan(y, gains, memory)
-    thrusts = _turn(gains, speeds, reported, y.dt, first)
+    thrusts = _turn(gains, speeds, commanded, y.dt, first)
     off = plan[:3] - now
     attitude = quaternion(y.x[3], y.x[4], y.x[5])
     T = thrusts[0].sum()
@@ -240,7 +238,7 @@ def oracle_flight(y, gains, memory):
     torque[2] = (torque[2] + lead * drag) / (1.0 + lead)  # rotors that speed up turn the body back
     T += m * rotate_inverse(attitude, jerk[0], jerk[1], jerk[2])[2] * AHEAD
     u = _shares(
-        y, gains, max(T, least), torque, speeds, reported, 1.0 - gains.sag * thrusts[0].sum()
+        y, gains, max(T, least), torque, speeds, commanded, 1.0 - gains.sag * thrusts[0].sum()
     )
     return u, -off[0]
 

@@ -12,7 +12,7 @@ numbers: 2.432 Hz, and a damping ratio of 0.0261, while the pendulum's swings ar
 here they are the means of the first periods of three falls, which cover that range.
 
 The cable is modelled as a spring, and bristles that bend with the arm until they slip (LuGre
-without a Stribeck drop). That fits the step and the falls, and is no more than that: a pulse that
+without a Stribeck drop). That fits the step and the falls, but is not how it works: a pulse that
 was kept aside is missed by 0.10 to 0.13 rad rms. Other causes of the falls' small damping are tried
 beside it: no hysteresis, and an amplifier that brakes during falls. Residuals are in units that
 were chosen: the arm's is half of the pendulum's, whose residuals are larger in all fits.

@@ -9,8 +9,8 @@ a record was used is not written down with the figure but follows from the rig: 
 identified from no record here is "unfitted"; of others the records of `Rig.identified_from` are
 "fitted on", and all the rest are "held out".
 
-The records are not in the repository. `python benchmarks/machines.py FOLDER` computes the rows from
-them, and draws docs/rigs.svg.
+The records are not in the repository. `python benchmarks/machines.py FOLDER --write` computes the
+rows from them, and draws docs/rigs.svg.
 """
 
 import dataclasses
@@ -52,8 +52,8 @@ class TwinFigure:
         here.
       twin: the figure by the rig's own quantities, or the median of all runs where there are
         several seeds; inf if the twin falls.
-      low, high: the least and the largest over parameter sets; of runs from several seeds 5 and 95
-        %.
+      low, high: the least and the largest over parameter sets; of runs from several seeds their 5 %
+        and 95 % quantiles.
       runs: number of these runs.
       fit: of the whole signal, percent, see `Rig.fit`; NaN for a figure that is not of a signal.
       published: the figure by published numbers of the machine; NaN without any, inf if they let it

@@ -64,8 +64,8 @@ def law_time(scenario: Scenario) -> LawTime | None:
 
 
 def _measured(scenario: Scenario) -> np.ndarray:
-    """Return what the law measures last at each sample of a run, (samples, fields of a
-    Measurement).
+    """Return what the law measures in the last channel at each sample of a run, (samples, fields
+    of a Measurement).
     """
     short = dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST))
     seen = []

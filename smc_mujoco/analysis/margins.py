@@ -26,7 +26,7 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
-from smc_mujoco.common.constraints import Truth, constrained
+from smc_mujoco.common.constraints import Boolean, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
@@ -296,7 +296,7 @@ def margins(
     laws: str | Law | Template | Sequence[str | Law | Template] = sets.LAWS,
     kinds: str | Sequence[str] = KINDS,
     gains: str = "tuned",
-    quick: Truth = False,
+    quick: Boolean = False,
     threads: int | None = None,
     report: Report = lambda done, whole: None,
     condition: str | Condition = "nominal",

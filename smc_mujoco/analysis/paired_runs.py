@@ -58,7 +58,7 @@ class ByRow(NamedTuple):
     arrived: np.ndarray  # 1.0 for a run that has arrived, else 0.0
 
 
-def is_table(table: object) -> None:
+def check_table(table: object) -> None:
     """Raise ScenarioError for what has no columns."""
     if not has(table, "column"):
         raise ScenarioError(f"table is {shown(table)}: give a study's, as smc.Table.read(path)")

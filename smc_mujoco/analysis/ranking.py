@@ -51,7 +51,7 @@ lead would have been seen.
 A law with a run that failed, has no value, or has not arrived (`metrics.catalogue.arrived`) wins
 nothing. In every order the laws with fewer runs without a value come first.
 
-A law is among the best if no other is better, all its runs have arrived and have a value.
+A law is among the best if no other is better and all its runs have a value and have arrived.
 """
 
 import copy
@@ -170,8 +170,7 @@ class Comparison:
         if arrived:
             self.away |= self._cube(arrived, float) == 0.0
         q = np.log(np.maximum(self.floors, np.finfo(float).tiny))
-        # whether a law is below the floor: that it is at most, as the median of an even number is
-        # above it if only half of the values are at it
+        # the median of an even number is above q if only half of the values are at most q
         self.below = (middle(high) <= q) & (self.floors > 0.0) & (not shares)
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
         # d of the first law over the second by unit, then NaN; and without halves and trends

@@ -265,7 +265,7 @@ def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
 
 
 def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region]:
-    """Return regions where runs fail, chosen by the first half of the points and told by the
+    """Return regions where runs fail, chosen by the first half of the points, with rates from the
     second.
 
     A region has a bound on one side of an axis, on two of them, or two bounds on one axis, between
@@ -345,7 +345,7 @@ def improvement(
     space: Space, shares: np.ndarray, values: np.ndarray, failed: np.ndarray
 ) -> Improvement | None:
     """Return the half of an axis with the fewest failures and then the best median, chosen by half
-    of the points and told by the others.
+    of the points, with numbers from the others.
 
     None if the others do not show that more runs fail beyond it, or that the score is better within
     (H. B. Mann & D. R. Whitney's test).

@@ -85,7 +85,7 @@ class Problem:
 
     @functools.cached_property
     def _frozen(self) -> Mapping[str, Any]:
-        """The levels of each measure; {} before they are frozen."""
+        """The levels of each measure, and the oracle's numbers; {} before they are frozen."""
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
 
     @property

@@ -149,7 +149,7 @@ class OrNone(Constraint):
 
 MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
 
-Truth = Annotated[bool, Flag()]
+Boolean = Annotated[bool, Flag()]
 Finite = Annotated[float, Number()]
 Natural = Annotated[float, Number(low=0.0)]
 Positive = Annotated[float, Number(above=0.0)]
@@ -213,7 +213,7 @@ def suggesting(kind: type[T]) -> type[T]:
     def made(self: T, *args: Any, **fields: Any) -> None:
         for name in fields:
             if name not in names:
-                meant = getattr(kind, "meant", {}).get(name, name)
+                meant = getattr(kind, "synonyms", {}).get(name, name)
                 hint = str(unknown("field", meant, names)).partition(": ")[2]
                 raise TypeError(
                     f"{kind.__name__}() got an unexpected keyword argument {name!r}: {hint}"

@@ -9,8 +9,8 @@ import subprocess
 from collections.abc import Sequence
 from typing import Any
 
-# Where there is a shell, a command runs beside a reader of a pipe that only this process writes to.
-# It has all of its session killed when the pipe closes: when this process ends, however it does.
+# Where there is a shell, a command runs beside a reader of a pipe that only this process can write
+# to. The pipe closes when this process ends, however it ends; the reader then kills its session.
 GUARDED = """exec 3<&0 </dev/null; (read end <&3; kill -9 0) >/dev/null 2>&1 & exec "$@" 3<&-"""
 
 

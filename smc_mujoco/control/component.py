@@ -343,11 +343,11 @@ class Template:
         if warn:
             text = ", ".join(f"{name} = {gain_text(value)}" for name, value in values.items())
             for words in self.unmet(values):
-                reported = f"{self.kind} {self.name!r} asks for {words}, but {text}"
-                warnings.warn(reported, GainWarning, users_stacklevel())
+                message = f"{self.kind} {self.name!r} asks for {words}, but {text}"
+                warnings.warn(message, GainWarning, users_stacklevel())
             for words in _unmet(self.advice, values):
-                reported = f"{self.kind} {self.name!r} advises {words}, but {text}"
-                warnings.warn(reported, errors.ScenarioWarning, users_stacklevel())
+                message = f"{self.kind} {self.name!r} advises {words}, but {text}"
+                warnings.warn(message, errors.ScenarioWarning, users_stacklevel())
         component = Component(
             kind=self.kind,
             name=self.name,

@@ -129,7 +129,7 @@ def law_function(
       conditions: condition of the theorem, in words -> function of the gains, read by attribute,
         that tests it. A warning quotes the words, tuning stays within, and results of other gains
         are marked "outside its theorem".
-      advice: the same for conditions that are only told, in a warning.
+      advice: the same for conditions that only warn.
       plants: names of the plants that the law is for, or "a free body" for all that are one.
         Default: all.
       requires_model: whether the law needs the nominal model. A scenario then gives it by default.

@@ -89,7 +89,7 @@ class Gain:
 
 SLOPE = Gain(2.5, RATE, nonnegative=True)  # c of the surface s = de + c e
 ASSUMED_B = Gain(3.0, INPUT_GAIN, positive=True)  # of e'' = b u + d, for an observer
-# the plant e'' = a1 e + a2 de + b u; a scenario puts in its plant's
+# of e'' = a1 e + a2 de + b u; a scenario puts in the values of its plant
 LINEAR_PLANT = {
     "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
     "a2": Gain(math.inf, RATE, held=True, plant="a2"),
@@ -106,7 +106,8 @@ SUPER_TWISTING = {
     "k2": Gain(4.4, FORCE_RATE, positive=True),
     "c": SLOPE,
 }
-REACHED = {"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2}  # by super-twisting
+# on which super-twisting reaches s = 0
+REACHED = {"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2}
 
 
 def force_per(exponent: str) -> Formula:

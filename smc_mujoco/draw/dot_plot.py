@@ -15,8 +15,8 @@ from smc_mujoco.analysis.paired_runs import (
     SETTLES,
     Columns,
     by_row,
+    check_table,
     groups,
-    is_table,
     scenarios,
     sources,
     unit_of_x,
@@ -50,7 +50,7 @@ def plot(
     Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that
     share one of several sets of gains are one sample. There is a column of panels per metric and a
     row per plant. A hollow dot at the right edge, under "never" or "not arrived", is a law whose
-    median run fails, does not settle, or has not arrived. Sizes below 1e-9 are drawn at it.
+    median run fails, does not settle, or has not arrived. Sizes below 1e-9 are drawn as 1e-9.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -64,7 +64,7 @@ def plot(
         raise ScenarioError(
             f"table is {shown(table)}: smc.figure draws traces, and this draws the table of a study"
         )
-    is_table(table)
+    check_table(table)
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     names = items_of("metrics", metrics)

@@ -74,9 +74,9 @@ def figure(
     min x. Of a robot with several joints there are e and u of those with the largest errors. Joints
     without an actuator, and channels in another unit, have their own panels. Realistic mechanisms
     have panels of the actuator's force and of the reaction of friction and contacts, arms of their
-    tip. The end of a failed run and the instant at which a plant changes are marked. Words tell
-    which curves agree, and so hide each other. What lines and bands mean is also
-    the figure's `get_label()` and in its files, for a caption.
+    tip. The end of a failed run and the instant at which a plant changes are marked. Words say
+    which curves agree, and so hide each other. The figure's `get_label()` and its files have what
+    lines and bands mean, for a caption.
 
     Args:
       traces: one or several traces.
@@ -267,7 +267,7 @@ def _draw_over_time(
 ) -> None:
     """Draw panels over time with their labels in the cells of a column.
 
-    If `named`, changes are told above the first.
+    If `named`, changes are named above the first.
     """
     frames: list[Axes] = []
     axes: list[Axes] = []

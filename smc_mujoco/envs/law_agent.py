@@ -3,10 +3,10 @@
     act = smc.envs.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-MuJoCo's callback of `smc.run` measures and calls the law, on what the environment says, and the
-episode equals the trace of that run. With Coulomb friction it is that of
-integrator="implicitfast", as an environment's steps have no callback that would solve the friction
-exactly: they differ by 1e-4 or less.
+The callback of `smc.run` measures what the environment observes and calls the law, and the episode
+equals the trace of that run. With Coulomb friction the run is that of integrator="implicitfast",
+because an environment's steps have no callback that would solve the friction exactly. It differs
+from the exact one by 1e-4 or less.
 """
 
 import dataclasses

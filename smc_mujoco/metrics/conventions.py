@@ -65,7 +65,7 @@ SETTLING_BAND = 0.02  # of the scale
 LAST_PART = 0.2  # of the run's duration
 ARRIVAL_BAND = 0.1  # of the scale
 ARRIVAL_COUNTS = 5.0  # of what the sensor tells apart
-STRAIGHT = 1e-6  # of the steps of a reference: so little may they differ on a straight line
+STRAIGHT = 1e-6  # of the steps of a reference: by less they differ on a straight line
 ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
 # the law's; it follows from that of x, so that metres and radians do not mix
 UNIT_OF_S = "unit of s"

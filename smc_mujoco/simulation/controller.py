@@ -8,8 +8,8 @@ A sample may come late in its period, or be missed, see `Clock`. The log then re
 the sample before. At the first stage of a physics step, the command whose delay has passed goes to
 ctrl, through lags and rate limits. At every stage, disturbance(t) goes to xfrc_applied. Then a
 friction by a formula goes to ctrl; its steps have one stage. Dry friction on joints that move alone
-goes to qfrc_applied, at every stage of RK4. Each sample is logged with the mean forces since
-the last one.
+goes to qfrc_applied, at every stage of RK4. Each sample is logged with the mean forces since the
+last one.
 
 The controller counts its calls, because mjData.time does not tell the last stage of a step from the
 start of the next: RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
@@ -106,7 +106,7 @@ def control(address, sim, data):  # noqa: PLR0912
         failure = _apply_disturbances(
             address, sim, data, k * sim.period + (within + fraction) * sim.step, sample
         )
-    # an integrator of one stage
+    # bristles, whose integrator has one stage
     if sim.frictions != 0 and sim.exact_friction == 0 and failure == record.FINE:
         failure = _apply_friction(address, sim, data)
     if failure == record.FINE:
@@ -295,8 +295,8 @@ def _measure(address, sim, data, k, t):
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
-        if sim.reported != 0:
-            pointer(sim.reported)[i] = (
+        if sim.other_forces != 0:
+            pointer(sim.other_forces)[i] = (
                 _generalised_disturbance(data, channel) + state.reaction / sim.steps
             )
     return record.FINE
@@ -327,8 +327,9 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
     y = sim.joint.head if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
-    for i in range(n if sim.reported != 0 else 0):
-        last_u[i] += pointer(sim.reported)[i]  # what the model takes for the force on each joint
+    for i in range(n if sim.other_forces != 0 else 0):
+        # what the model takes for the force on each joint
+        last_u[i] += pointer(sim.other_forces)[i]
     if sim.feedforward.address != 0:
         if _call(sim.feedforward, 0, address + record.AT.instant, address + record.AT.motion) != 0:
             return record.RAISED
@@ -361,14 +362,14 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
                 sim.seen.i = i
                 return record.NOT_FINITE
             buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
-            if sim.reported != 0:
-                last_u[i] += pointer(sim.reported)[i]
+            if sim.other_forces != 0:
+                last_u[i] += pointer(sim.other_forces)[i]
     if sim.mixer != 0:
         _mix(sim, last_u, buffer)
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
         buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
-    for i in range(n if sim.reported != 0 else 0):
+    for i in range(n if sim.other_forces != 0 else 0):
         last_u[i] = log_at(sim.log, k * n + i).u
     return record.FINE
 
@@ -448,8 +449,8 @@ def _measure_channel(address, sim, k, t, i):
         return record.RAISED
     y.f = model.f - sim.drive_drag * v[i] * model.g
     y.g = sim.drive_gain * model.g
-    if sim.reported != 0:
-        y.f += pointer(sim.reported)[i] * model.g
+    if sim.other_forces != 0:
+        y.f += pointer(sim.other_forces)[i] * model.g
     if sim.motors != 0:  # u is the acceleration x''
         y.gq /= y.g
         y.fq -= y.gq * y.f

@@ -112,9 +112,8 @@ def mechanism(scenario: Scenario) -> Mechanism:
     if (shared := _mechanisms.get(key)) is None:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
-        if (
-            not scenario.plant.is_user_model
-        ):  # a user's file is read again, because it may have changed
+        # a user's file is read again, because it may have changed
+        if not scenario.plant.is_user_model:
             _recent.append(shared)
     return shared
 

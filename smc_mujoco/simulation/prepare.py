@@ -413,7 +413,7 @@ def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, 
     return motors | {
         "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
         "a": buffer.reserve(n),
-        "reported": buffer.reserve(n) if s.model == "true" else 0,
+        "other_forces": buffer.reserve(n) if s.model == "true" else 0,
         "width": width,
         "commands": buffer.reserve(2 * width),
         "states": buffer.put(states.view(float).tolist()),

@@ -90,7 +90,7 @@ DRIVE_STEPS = 4  # physics steps per control period: enough behind any drive, se
 MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
-MAX_LATENESS = 0.3  # stiffness times step over damping of bristles, chosen: rest errs by 20 % there
+MAX_LATENESS = 0.3  # stiffness times step over damping of bristles; chosen: joints rest 20 % off
 MAX_ANGLE = (
     3.0 * math.pi
 )  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
@@ -177,12 +177,12 @@ class Scenario:
 
     Warns:
       ScenarioWarning: a start or a reference that may be in degrees, a delay in ms, a mismatch in
-        percent; or a DCMotor that cannot hold a joint where it starts, though a force of u_max
-        could.
+        percent; LuGre bristles that are too stiff for the physics step; or a DCMotor that cannot
+        hold a joint where it starts, though a force of u_max could.
     """
 
-    # other names of fields -> ours, for the error that an unknown field raises
-    meant: ClassVar[Mapping[str, str]] = {
+    # other names of fields -> the field, for the error that an unknown field raises
+    synonyms: ClassVar[Mapping[str, str]] = {
         "controller": "law",
         "system": "plant",
         "dt": "control_period",
@@ -628,9 +628,8 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """
     given = plant.suggested.get("u_max", (None,))
     limits = [default_u_max(plant)] * len(given)
-    if (
-        plant.is_user_model and math.inf in plant.limits
-    ):  # the bound of one joint's motor is no other's
+    # the bound of one joint's motor is no other's
+    if plant.is_user_model and math.inf in plant.limits:
         given = plant.suggested.get("u_max", (None,) * plant.driven)
         limits = [U_MAX if limit == math.inf else limit for limit in plant.limits]
     bounds = []
@@ -942,7 +941,7 @@ def _doubts(s: Resolved) -> Iterator[str]:
     too weak, and bristles that are too stiff.
     """
     for part in s.friction:
-        # the default's are those of the named condition
+        # bristles of the default stiffness are those of the named condition
         if isinstance(part, LuGre) and part.stiffness > LuGre.stiffness:
             damping = part.damping
             if damping is None:

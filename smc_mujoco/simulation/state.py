@@ -83,15 +83,16 @@ CHANNEL = np.dtype(
 #   last_x, last_v: the last reading that was not lost; delayed: the command after its delay
 #   first, second: the states of the drives, see `DriveStep`
 #   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
-# middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage, see
-# `DriveStep`
-# friction, friction_rise: mean of dry friction in a step of RK4, and its rise to the last stage
-# low, high: bounds of that friction in the step; slides: whether a formula gives it at every stage
-# smooth, holding: the other forces for which these are right, and the share of their change that
-# friction takes up
+#   middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage,
+#     see `DriveStep`
+#   friction, friction_rise: mean of dry friction in a step of RK4, and its rise to the last stage
+#   low, high: bounds of that friction in the step
+#   slides: whether a formula gives it at every stage
+#   smooth, holding: the other forces for which these are right, and the share of their change that
+#     friction takes up
 #   held: s of a control period for which friction held the joint
-# stuck, stuck_at, speed: above 0 if a friction by a formula sticks, where its bristle is unbent,
-# and the speed at the step before
+#   stuck, stuck_at, speed: above 0 if a friction by a formula sticks, where its bristle is unbent,
+#     and the speed at the step before
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
 RUBBED = "friction", "friction_rise", "smooth", "holding", "held", "low", "high", "slides"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
@@ -215,9 +216,8 @@ SIMULATION = np.dtype(
         ("reference", FUNCTION),
         ("feedforward", FUNCTION),
         ("uses_model", "f8"),
-        # address of the other forces on the joints, (n,), which a law with the true model is told;
-        # 0: it is not
-        ("reported", "i8"),
+        # address of the other forces on the joints, (n,), for a law with the true model; else 0
+        ("other_forces", "i8"),
         # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`,
         # or `reference`
         ("laws", "i8"),

@@ -19,7 +19,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
-MIN_TIMES = 1.03  # a lead over a law beyond the floor that is told; chosen
+MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
 MEDIANS = (
@@ -90,7 +90,7 @@ class Block:
     worse: tuple[str, ...]  # laws that another is better than
     below: tuple[str, ...]  # laws below the floor, which are not ranked among themselves
     floor: str  # in words, such as "the sensor's 0.01 rad"; "" where it is not known
-    away: tuple[str, ...]  # laws with runs that have not arrived, which do not win
+    away: tuple[str, ...]  # laws with runs that failed or have not arrived, which do not win
     ahead: str | None  # the law that is better than every other, laws with default gains included
     # None for one law, for "settles", or if the law in front has runs without a value
     lead: Lead | None
@@ -124,9 +124,7 @@ class Block:
 
     @property
     def unranked(self) -> str:
-        """That several laws that no other is better than are below the floor; "" if they are
-        not.
-        """
+        """That several of the best laws are below the floor; "" if they are not."""
         low = [law for law in self.best if law in self.below]
         if len(low) < 2:
             return ""

@@ -12,7 +12,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
-from smc_mujoco.common.constraints import FilePath, Positive, Truth, Whole, constrained
+from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
@@ -211,7 +211,7 @@ def compare(
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = SEARCHES,
-    tune: Truth = True,
+    tune: Boolean = True,
     worst: "bool | Uncertainty" = False,
     *,
     out: Annotated[str | os.PathLike[str], FilePath()] = "compared",
@@ -221,8 +221,8 @@ def compare(
     gains: gain_sets.NameOfSet = "tuned",
     searches: Searches | None = None,
     budget: Budget = BUDGET,
-    quick: Truth = False,
-    defaults: Truth = False,
+    quick: Boolean = False,
+    defaults: Boolean = False,
     relevant: Relevant = RELEVANT,
     threads: int | None = None,
     progress: bool = True,

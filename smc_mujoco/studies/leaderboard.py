@@ -67,7 +67,7 @@ def leaderboard(
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
     for name in metrics:
         find("metric", name, {known: unit for known, unit in UNITS.items() if known != OBJECTIVE})
-    paired_runs.is_table(table)
+    paired_runs.check_table(table)
     boards = Boards()
     boards.failures = paired_runs.failures(table)
     groups = paired_runs.groups(table, by)

@@ -13,8 +13,8 @@ of noise, is an axis, too, so that it is not taken for the work of another. Inte
 over the sampled points.
 
 A region where runs fail has a bound on one or two axes, or two on one axis. Half of the runs choose
-it, and the other half, which are independent, give its rate. The axis to improve is chosen and told
-in the same way.
+it, and the other half, which are independent, give its rate. The axis to narrow is chosen, and its
+median found, in the same way.
 """
 
 import dataclasses

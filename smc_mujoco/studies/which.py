@@ -18,7 +18,7 @@ import numpy as np
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES
-from smc_mujoco.common.constraints import FilePath, Positive, Truth, Whole, constrained
+from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.control import gain_sets
@@ -75,7 +75,7 @@ class Advice(Tables):
 
     @property
     def _name(self) -> str:
-        """The first law's name, and that it settles nowhere if it does not."""
+        """The first law's name, or a sentence if no run of it settles in some condition."""
         if self.settles[self.law.name]:
             return self.law.name
         return f"none settles in every condition, nearest: {self.law.name}"
@@ -118,10 +118,10 @@ def which(
     duration: Positive | None = None,
     starts: Starts | None = None,
     out: Annotated[str | Path, FilePath()] = "which",
-    quick: Truth = False,
+    quick: Boolean = False,
     threads: int | None = None,
     progress: bool = False,
-    defaults: Truth = False,
+    defaults: Boolean = False,
     relevant: Relevant = RELEVANT,
     seed: DrawSeed = 0,
 ) -> Advice:

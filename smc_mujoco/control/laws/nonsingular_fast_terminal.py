@@ -15,7 +15,7 @@ reaching law.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.surfaces import nonsingular_fast_terminal as on
+from smc_mujoco.control.surfaces import nonsingular_fast_terminal as surface
 from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain
 
 
@@ -26,11 +26,11 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "rate": Gain(3.0, FORCE_PER_POSITION, nonnegative=True),
-        **on.nonsingular_fast_terminal.gains,
+        **surface.nonsingular_fast_terminal.gains,
     },
     memory=1,
     relative_degree=2,
-    conditions=on.nonsingular_fast_terminal.conditions,
+    conditions=surface.nonsingular_fast_terminal.conditions,
 )
 def nonsingular_fast_terminal(y, gains, memory):
     s = y.e + gains.a * power(y.e, gains.q) + gains.b * power(y.de, gains.p)

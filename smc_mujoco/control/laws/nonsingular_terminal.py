@@ -12,7 +12,7 @@ Automatica 38(12):2159, 2002.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.surfaces import nonsingular_terminal as on
+from smc_mujoco.control.surfaces import nonsingular_terminal as surface
 from smc_mujoco.control.units import FORCE, Gain
 
 
@@ -22,11 +22,11 @@ from smc_mujoco.control.units import FORCE, Gain
     accuracy={"s": lambda g: g.p, "e": lambda g: g.p},
     gains={
         "k": Gain(4.0, FORCE, positive=True),
-        **on.nonsingular_terminal.gains,
+        **surface.nonsingular_terminal.gains,
     },
     memory=1,
     relative_degree=2,
-    conditions=on.nonsingular_terminal.conditions,
+    conditions=surface.nonsingular_terminal.conditions,
 )
 def nonsingular_terminal(y, gains, memory):
     s = y.e + power(y.de, gains.p) / gains.B

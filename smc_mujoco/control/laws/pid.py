@@ -29,7 +29,7 @@ from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, TIME, 
     },
     memory=3,
     relative_degree=2,
-    # not a theorem: Routh's of x'' = u, which no plant of the suite is
+    # no theorem: it is Routh's condition for x'' = u, and no plant of the suite is that
     advice={"kp kd > ki or ki = 0": lambda g: g.kp * g.kd > g.ki or g.ki == 0.0},
     label="PID",
     short="PID",

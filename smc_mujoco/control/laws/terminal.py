@@ -13,7 +13,7 @@ terminal sliding-mode control of nonlinear systems", Automatica 49(6):1715, 2013
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.surfaces import terminal as on
+from smc_mujoco.control.surfaces import terminal as surface
 from smc_mujoco.control.units import FORCE, Gain
 
 
@@ -24,12 +24,12 @@ from smc_mujoco.control.units import FORCE, Gain
     admits={"d": lambda g: g.k},
     gains={
         "k": Gain(4.0, FORCE, positive=True),
-        **on.terminal.gains,
+        **surface.terminal.gains,
         "bound": Gain(20.0, FORCE, positive=True),
     },
     memory=1,
     relative_degree=2,
-    conditions=on.terminal.conditions,
+    conditions=surface.terminal.conditions,
     short="TE",
 )
 def terminal(y, gains, memory):

@@ -11,7 +11,7 @@ IEEE Trans. Circuits Syst. I 49(2):261, 2002.
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
-from smc_mujoco.control.surfaces import terminal as on
+from smc_mujoco.control.surfaces import terminal
 from smc_mujoco.control.units import RATE, Gain, Unit
 
 
@@ -19,11 +19,11 @@ from smc_mujoco.control.units import RATE, Gain, Unit
     gains={
         "a": Gain(1.0, RATE, positive=True),
         "b": Gain(1.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),
-        "p": on.terminal.gains["p"],
-        "bound": on.terminal.gains["bound"],
+        "p": terminal.terminal.gains["p"],
+        "bound": terminal.terminal.gains["bound"],
     },
     memory=1,
-    conditions=on.terminal.conditions,
+    conditions=terminal.terminal.conditions,
 )
 def fast_terminal(y, gains, memory):
     s = y.de + gains.a * y.e + gains.b * power(y.e, gains.p)

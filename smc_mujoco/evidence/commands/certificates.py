@@ -59,7 +59,7 @@ def certify(
     terminal = Terminal(json)
     options.check_files(out)
     if check:
-        asked = ("plant", "law", "disturbance", "slope", "condition", "gains", "worst")
+        asked = ("plant", "law", "disturbance", "condition", "gains")
         options.only_for(ctx, asked, False, "a new certificate: leave it out beside --check")
         made = Certificate.load(check)
         made.check()

@@ -22,7 +22,7 @@ def rig(
             metavar="RIG",
             help=(
                 "A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint. "
-                "None: lists the rigs."
+                "Without one: lists the rigs."
             ),
         ),
     ] = None,
@@ -30,7 +30,7 @@ def rig(
         list[Path] | None,
         typer.Argument(
             metavar="FILE",
-            help=("Records: CSV or npz files of columns; with --fit also traces."),
+            help="Records: CSV or npz files of columns; with --fit also traces.",
         ),
     ] = None,
     columns: options.Columns = None,
@@ -91,7 +91,7 @@ def rig(
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in
     rad and time in s. The first line of a CSV file has the names of the columns.
 
-    Without a rig: the rigs that there are.
+    Without a rig it lists the rigs.
 
     Example: smc-mujoco rig
 

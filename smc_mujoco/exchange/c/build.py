@@ -83,8 +83,9 @@ def compiler() -> list[str]:
 def compiled(
     rest: Sequence[str], target: Path, name: str, timeout: float
 ) -> subprocess.CompletedProcess[str]:
-    """Compile a shared library of files and flags, within a time, s. `name`: of what it is, in
-    words.
+    """Compile a shared library within a time, s, from the files and flags in `rest`.
+
+    `name` says in words what it is, for errors.
     """
     command = compiler()
     line = [*command, *LIBRARY_FLAGS, *rest, "-o", str(target), "-lm"]

@@ -84,9 +84,9 @@ def law_to_fmu(
       joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
-    Inputs are x, v unless an estimator replaces it, the reference r and dr, and whatever else the law
-    reads, such as ddr. Outputs are u and s. All gains are tunable parameters. Many joints have
-    x[1], x[2], M[1,1] and so on.
+    Inputs are x, v unless an estimator replaces it, the reference r and dr, and all that the law
+    reads besides, such as ddr. Outputs are u and s. All gains are tunable parameters. Many joints
+    have x[1], x[2], M[1,1] and so on.
 
     Raises:
       ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Bound, Number, Truth, constrain
+from smc_mujoco.common.constraints import Boolean, Bound, Number, constrain
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -63,7 +63,7 @@ class Channel:
         0.
     """
 
-    motor: Truth = False
+    motor: Boolean = False
     partner: str | None = None
     x0: Place | None = None
     partner_x0: Place | None = None

@@ -169,7 +169,7 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
 
 def found(name: str, sha256: str) -> Source:
     """Return the source of a file that a record names without its folder: where this process has
-    read it, else in the present folder or in one within it.
+    read it, else in the current folder or in one within it.
     """
     places = [Path(name), *sorted(Path().glob(f"*/{glob.escape(name)}"))]
     if sha256 in _known:

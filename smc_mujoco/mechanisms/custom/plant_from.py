@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
 GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of limits and contacts that give way by more
-# the solver's pass without softness, which a stuck joint does not creep after: the most iterations,
-# and their tolerance
+# MuJoCo's noslip pass, which keeps stuck joints from creeping: the most iterations, and tolerance
 NOSLIP = 100, 1e-12
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"

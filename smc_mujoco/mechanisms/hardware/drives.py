@@ -219,7 +219,7 @@ class DCMotor(Actuator):
         return not (self.cogging or self.ripple)
 
     def torque(self, step: float, rk4: bool) -> "Torque":
-        """Return what MuJoCo computes of an even motor in a physics step, s."""
+        """Return how MuJoCo computes the torque of an even motor in a physics step, s."""
         gain = self.constant / self.resistance
         share, voltage = self._share(step, rk4)
         return Torque(gain, share * gain * self.constant, voltage, self.constant * self.current)
@@ -266,7 +266,9 @@ class DCMotor(Actuator):
 
 
 class Torque(NamedTuple):
-    """The force of MuJoCo's actuator on a joint at a control; the default is that of a force."""
+    """How MuJoCo's actuator turns its control into a force on a joint. By default the control is
+    the force.
+    """
 
     gain: float = 1.0
     drag: float = 0.0  # N m s/rad (N s/m)

@@ -11,7 +11,7 @@ from collections.abc import Hashable, Iterator
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Truth
+from smc_mujoco.common.constraints import Boolean
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
@@ -153,10 +153,11 @@ class LuGre(Friction):
         they are stable and resolved even at h = 1 ms. They bend by 0.1 mrad under 0.1 N m.
       damping: N m s/rad (N s/m), 0 or more. It should be several times stiffness h, because
         MuJoCo bends bristles a step late: they oscillate and joints rest at wrong places. A
-        scenario warns of stiffer ones than the default. None: 0.2 sqrt(stiffness inertia), with
-        each joint's inertia at the plant's default parameters: 2.2 for the pendulum. This is a
-        fifth of the paper's rule, chosen because implicitfast counts damping h as inertia, 0.4 % of
-        the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
+        scenario warns of such bristles if they are stiffer than the default. None: 0.2
+        sqrt(stiffness inertia), with each joint's inertia at the plant's default parameters: 2.2
+        for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast counts
+        damping h as inertia, 0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles
+        oscillate too long.
       driven: whether only joints with an actuator have it, such as the arm that a cable with
         hysteresis bends.
     """
@@ -169,7 +170,7 @@ class LuGre(Friction):
     stribeck: Positive
     stiffness: Positive = 1e3
     damping: Natural | None = None
-    driven: Truth = False
+    driven: Boolean = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
