@@ -457,8 +457,8 @@ def judged(known: Sequence[dict]) -> Iterator[str]:
             stand = sum(one["low"] > 1.0 if leads else one["high"] < most[does] for one in its)
             against = sum(one["high"] < 1.0 if leads else one["low"] > most[does] for one in its)
             counts += len(its), stand, against
-            reported = f"{kind} {does} in {score}, {axis} {lowest:g} to {highest:g}"
-            yield f"{plant}: {reported}: {stand} of {len(its)} stand, {against} contradicted"
+            what = f"{kind} {does} in {score}, {axis} {lowest:g} to {highest:g}"
+            yield f"{plant}: {what}: {stand} of {len(its)} stand, {against} contradicted"
     yield f"in all: {counts[1]} of {counts[0]} stand, {counts[2]} contradicted"
 
 

@@ -86,14 +86,14 @@ def of_record(rig: Rig, name: str, law: str, file: Path, published: str) -> Iter
     else:
         beside = (control.predictions([record])[0], control.fits([record])[0])
     for variant, sets in variants.items():
-        reported = [(one.predictions([record])[0], one.fits([record])[0]) for one in sets]
-        for column, (figure, measured) in enumerate(reported[0][0][1].items()):
+        of_sets = [(one.predictions([record])[0], one.fits([record])[0]) for one in sets]
+        for column, (figure, measured) in enumerate(of_sets[0][0][1].items()):
             values = []
-            for (made, _, _), fits in reported:
+            for (made, _, _), fits in of_sets:
                 values.append(
                     math.inf if math.isinf(list(fits.values())[column]) else size(made[figure])
                 )
-            fit = float(list(reported[0][1].values())[column])
+            fit = float(list(of_sets[0][1].values())[column])
             public = math.nan
             if beside is not None and not variant:
                 fell = math.isinf(list(beside[1].values())[column])
@@ -131,10 +131,10 @@ def of_emps() -> Iterator[TwinFigure]:
         "with the reference a tick early": [*values[1:], values[-1]],
     }
     for variant, other in variants.items():
-        reported = programs.tracking(
+        predicted = programs.tracking(
             rig, None if other is None else TimeSeries(program.times, other)
         )
-        for (figure, machine), twin in zip(EMPS_RECORD.items(), reported, strict=True):
+        for (figure, machine), twin in zip(EMPS_RECORD.items(), predicted, strict=True):
             yield TwinFigure(
                 rig="emps",
                 record="program of 24.8 s",
@@ -178,10 +178,10 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
         published=size(arm(public)),
         **common,
     )
-    reported = np.transpose([programs.falls(one) for one in sets])
+    predicted = np.transpose([programs.falls(one) for one in sets])
     published = programs.falls(public)
     for (figure, (unit, machine)), twins, of_public in zip(
-        FALLS.items(), reported.tolist(), published, strict=True
+        FALLS.items(), predicted.tolist(), published, strict=True
     ):
         yield TwinFigure(
             record="ten free falls",
@@ -248,7 +248,7 @@ def described(row: TwinFigure) -> dict[str, object]:
     """Return a row as JSON data, without fields that have their default; None stands for NaN, and
     "falls" for inf.
     """
-    reported = {}
+    data = {}
     for field in dataclasses.fields(row):
         value = getattr(row, field.name)
         if value is field.default or value == field.default:
@@ -257,8 +257,8 @@ def described(row: TwinFigure) -> dict[str, object]:
             value = None
         elif isinstance(value, float):
             value = "falls" if math.isinf(value) else float(f"{value:.4g}")
-        reported[field.name] = value
-    return reported
+        data[field.name] = value
+    return data
 
 
 def main() -> None:
@@ -291,12 +291,12 @@ def main() -> None:
     }
     for row in rows:
         if isinstance(row, TwinFigure):
-            reported = (
+            numbers = (
                 f"{row.machine:9.4g} {row.twin:9.4g} ({row.low:.4g} to {row.high:.4g}) "
                 f"{row.published:9.4g}"
             )
             print(
-                f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {reported} {row.use} "
+                f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {numbers} {row.use} "
                 f"{row.variant}"
             )
         else:

@@ -175,7 +175,7 @@ def identified(step, back, weight=1.0, kept=None, rigid=False, motor=0.0):
     return *split(found.x), 2.0 * found.cost
 
 
-def reported(label, found, step, back):
+def report(label, found, step, back):
     """Print quantities and what they reach."""
     q, speeds, cost = found
     ahead, after = (np.sqrt(np.mean(one**2, axis=1)) for one in errors(q, speeds, step, back))
@@ -216,7 +216,7 @@ def main():
         np.genfromtxt(sys.argv[1] if sys.argv[1:] else EXCERPT, delimiter=",", skip_header=1)
     )
     best = identified(step, back)
-    reported("identified", best, step, back)
+    report("identified", best, step, back)
     count = step.shape[1] + back.shape[1]
     blocks = np.array_split(np.arange(count), BLOCKS)
     without = []
@@ -230,12 +230,12 @@ def main():
         + ", ".join(f"{name} {e:.2g}" for name, e in zip(NAMES, spread, strict=True))
     )
     for values in drawn(best[0], covariance):
-        reported("drawn from these errors", (values, best[1], np.nan), step, back)
-    reported("the way back at a third of the weight", identified(step, back, 1 / 3), step, back)
-    reported("the way back at three times the weight", identified(step, back, 3.0), step, back)
-    reported("amplifier on in falls", identified(step, back, motor=1.0), step, back)
-    reported("no hysteresis", identified(step, back, rigid=True), step, back)
-    reported(
+        report("drawn from these errors", (values, best[1], np.nan), step, back)
+    report("the way back at a third of the weight", identified(step, back, 1 / 3), step, back)
+    report("the way back at three times the weight", identified(step, back, 3.0), step, back)
+    report("amplifier on in falls", identified(step, back, motor=1.0), step, back)
+    report("no hysteresis", identified(step, back, rigid=True), step, back)
+    report(
         "no hysteresis, amplifier on in falls",
         identified(step, back, rigid=True, motor=1.0),
         step,

@@ -65,16 +65,16 @@ def row(name: str, n: int) -> str:
         ours.append(its[..., 0])
         held.append((its[..., 1] <= true + 1e-9) & (true <= its[..., 2] + 1e-9))
         saltelli.append(known(scores, n))
-    reported = f"{name}, {n} points: "
+    line = f"{name}, {n} points: "
     for who, found in (("", np.array(ours)), ("Saltelli's ", np.array(saltelli))):
         errors = np.sqrt(np.square(found - true).mean(axis=(0, 2)))
         sums = found.sum(2)
-        reported += (
+        line += (
             f"{who}errors {errors[0]:.3f} {errors[1]:.3f}, sums {sums[:, 0].max():.2f} "
             f"{sums[:, 1].min():.2f}; "
         )
     share = [np.array(held)[:, i, true[i] > TOLD].mean() for i in (0, 1)]
-    return f"{reported}held {share[0]:.2f} {share[1]:.2f}"
+    return f"{line}held {share[0]:.2f} {share[1]:.2f}"
 
 
 if __name__ == "__main__":

@@ -323,10 +323,8 @@ def predicted(rig, condition, seeds, changes=None):
             for seed in range(seeds):
                 fields = {"x0": start(seed), "seed": seed} | CONDITIONS[condition]
                 scenarios.append(twin.scenario(law, **fields))
-        reported = [figures(logged(trace)) for trace in smc.run(scenarios)]
-        found[name] = {
-            law.name: reported[i * seeds : (i + 1) * seeds] for i, law in enumerate(laws)
-        }
+        of_runs = [figures(logged(trace)) for trace in smc.run(scenarios)]
+        found[name] = {law.name: of_runs[i * seeds : (i + 1) * seeds] for i, law in enumerate(laws)}
     return found
 
 

@@ -95,11 +95,11 @@ def main() -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
         1 if sys.platform == "darwin" else 1024
     )
-    reported = (
+    summary = (
         f"{len(table)} runs of 10 s, {threads} threads: study {studied:.1f} s, plain "
         f"mj_step {simulated:.1f} s"
     )
-    console.print(reported, highlight=False)
+    console.print(summary, highlight=False)
     for what, value, most, unit in (
         ("ratio", studied / simulated, MOST, ""),
         ("peak", peak / 1e9, MEMORY / 1e9, " GB"),

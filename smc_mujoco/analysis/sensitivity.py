@@ -294,14 +294,14 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
             inside = _within(cuts, shares[:half])[chooses]
             gains[cuts] = _gain(inside, failed[:half][chooses], price)
         cuts = max(gains, key=gains.__getitem__)
-        reported = _within(cuts, shares) & left
-        reported[:half] = False
-        if gains[cuts] <= 0.0 or not _more_fail(failed[half:], reported[half:], left[half:]):
+        tested = _within(cuts, shares) & left
+        tested[:half] = False
+        if gains[cuts] <= 0.0 or not _more_fail(failed[half:], tested[half:], left[half:]):
             break
         left &= ~_within(cuts, shares)
         rest = left.copy()
         rest[:half] = False
-        found.append(Region(cuts, _rate(failed[reported]), _rate(failed[rest])))
+        found.append(Region(cuts, _rate(failed[tested]), _rate(failed[rest])))
     return found
 
 
@@ -366,19 +366,19 @@ def improvement(
     if not halves:
         return None
     best = min(halves, key=rank)
-    reported = values[half:]
+    scores = values[half:]
     fails = failed[half:]
     within = _within([best], shares[half:])
-    if not 0 < within.sum() < len(reported):
+    if not 0 < within.sum() < len(scores):
         return None
-    if not _more_fail(fails, ~within, np.ones(len(reported), bool)):
-        better = mannwhitneyu(reported[within], reported[~within], alternative="less").pvalue
+    if not _more_fail(fails, ~within, np.ones(len(scores), bool)):
+        better = mannwhitneyu(scores[within], scores[~within], alternative="less").pvalue
         if better > 1 - LEVEL or fails[within].mean() > fails.mean():
             return None
     return Improvement(
         best,
-        float(np.median(reported[within])),
-        float(np.median(reported)),
+        float(np.median(scores[within])),
+        float(np.median(scores)),
         float(fails[within].mean()),
         float(fails.mean()),
     )

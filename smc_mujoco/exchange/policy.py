@@ -105,8 +105,8 @@ class Controller(Policy):
     def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
         """Return u and s."""
         answer = self.act.compute(y.t, np.array([y.x, y.v]), np.array([y.r, y.dr, y.ddr]))  # pyright: ignore[reportFunctionMemberAccess]
-        u, reported = answer if isinstance(answer, tuple) else (answer, {})
-        return float(np.asarray(u, float).item()), float(reported.get("s", 0.0))
+        u, info = answer if isinstance(answer, tuple) else (answer, {})
+        return float(np.asarray(u, float).item()), float(info.get("s", 0.0))
 
 
 @dataclasses.dataclass(frozen=True)

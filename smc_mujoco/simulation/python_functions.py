@@ -262,7 +262,7 @@ class PythonFunction:
         self.call = C_FUNCTION(call)
         self.address: int = ctypes.cast(self.call, ctypes.c_void_p).value or 0
 
-    def reported(self, channel: int) -> str:
+    def message(self, channel: int) -> str:
         """Return what was raised in words, with the channel if the function was called for one."""
         if isinstance(self.error, Failure) and self.error.channel is not None:
             self.error.channel = channel

@@ -522,7 +522,7 @@ class ScenarioBatch:
         """
         for function in self.packed[i].python:
             if function.error is not None:
-                return function.reported(int(self.records["seen"]["i"][i]))
+                return function.message(int(self.records["seen"]["i"][i]))
         return ""
 
     def law_failure(self, i: int) -> str:
@@ -554,7 +554,7 @@ class ScenarioBatch:
             places = (y, 0, memory.ctypes.data, outputs.ctypes.data)
             function.call(*map(python_functions.pointer, places))
             if function.error is not None:
-                return function.reported(channel)
+                return function.message(channel)
         if record["failure"] == state.LAW_RAISED:
             return ""
         u, sliding = commands[:, channel % width].tolist()

@@ -304,9 +304,11 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     if arms:
         below = arm.room(traces, width / len(traces) / scale)
         words = arm.key(traces)
-    told = [track.reported for track in tracks]
+    grid_states = [track.grid_states for track in tracks]
     title = frames.title
-    caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
+    caption = Caption(
+        traces, names, colours, title, above, scale, scales, grid_states, row, below, words
+    )
     charts = Charts(traces, names, colours, (width, low), scale)
     with Stage(tracks, above, caption.room, frames.camera, caption.apart, scale) as stage:
         caption.place(stage.boxes)

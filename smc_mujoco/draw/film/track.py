@@ -38,7 +38,7 @@ class MachineTrack:
     """The part of a trace in a film whose frames end at edges[1:], s; an arm has neither arrows nor
     states.
 
-    `framing` and `reported` are its arrows and states at the times `grid`, s, of the whole run,
+    `framing` and `grid_states` are its arrows and states at the times `grid`, s, of the whole run,
     which set the place of all.
     """
 
@@ -62,11 +62,11 @@ class MachineTrack:
         self.drawn = drawn(trace, edges, sizes, colour)
         self.framing = drawn(trace, grid, sizes, colour)
         self.states = [None] * len(times)
-        self.reported = []
+        self.grid_states = []
         if not arms:
             hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
             self.states = states.timeline(trace, times, hold)
-            self.reported = states.timeline(trace, grid, hold)
+            self.grid_states = states.timeline(trace, grid, hold)
         self.motion = motion(trace, np.union1d(grid, times))
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)

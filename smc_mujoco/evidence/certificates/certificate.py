@@ -160,7 +160,7 @@ class Certificate:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What each theorem proves, or which of its conditions fail, and what none is about."""
-        reported = []
+        sentences = []
         for part in self.data["parts"]:
             theorem = part["theorem"]
             rows = []
@@ -171,17 +171,17 @@ class Certificate:
             if theorem == "level sets":  # the region is proven also where the start lies outside
                 fails = ""
             if fails:
-                reported.append(f"not proven by {theorem}: {fails}")
+                sentences.append(f"not proven by {theorem}: {fails}")
             else:
-                reported.append(f"proven by {theorem}: {THEOREMS[theorem]}")
+                sentences.append(f"proven by {theorem}: {THEOREMS[theorem]}")
         if self.data["disturbance"]:
             unit = EFFORT[self.data["unit"]]
             under = f"|d| <= {self.data['disturbance']:g} {unit}"
             what = "d is any force with"
             if self.theorems == ("saturated PD",):
                 what = "nothing is proven under"
-            reported.append(f"{what} {under}")
-        return *reported, NOT_ABOUT
+            sentences.append(f"{what} {under}")
+        return *sentences, NOT_ABOUT
 
     def _widest(self, part: Mapping[str, Any]) -> float:
         """Return the largest x up to which all states at rest lie in the level sets."""

@@ -89,7 +89,7 @@ def fields(doc):
     """
     plant = doc["plant"]
     law = doc["law"]
-    reported = [
+    parts = [
         ("the certificate", doc),
         ("plant", plant),
         ("law", law),
@@ -97,12 +97,12 @@ def fields(doc):
         (law["name"], law["gains"]),
     ]
     for part in doc["parts"]:
-        reported.append((part["theorem"], part))
+        parts.append((part["theorem"], part))
         for condition in part["conditions"]:
             more = condition.keys() - {"name", "margin"}
             known = not more or condition["name"] == "restoring"
             need(known and more in (set(), {"boxes"}, {"at"}), "a condition")
-    for name, given in reported:
+    for name, given in parts:
         known = set(FIELDS[name].split())
         need(known - MAY_LACK <= given.keys() <= known, f"the fields of {name}")
     need(type(plant["n"]) is int, "the number of channels")
@@ -122,18 +122,18 @@ def margins(part, derived):
     A margin is derived as (its value, the size of the terms that it sums). Its sign is that of the
     value derived, or of the one told where it was checked elsewhere.
     """
-    reported = {}
+    stated = {}
     for condition in part["conditions"]:
-        reported[condition["name"]] = condition["margin"]
-    same = len(reported) == len(part["conditions"]) and list(reported) == list(derived)
+        stated[condition["name"]] = condition["margin"]
+    same = len(stated) == len(part["conditions"]) and list(stated) == list(derived)
     need(same, f"the conditions of {part['theorem']}")
     kept = []
     for name, margin in derived.items():
-        value, terms = margin or (arb(reported[name]), 0)
-        equal(reported[name], value, f"the margin of {name}", terms)
+        value, terms = margin or (arb(stated[name]), 0)
+        equal(stated[name], value, f"the margin of {name}", terms)
         zero = bool(value == 0)
         kept.append(bool(value > 0) or (zero and name != "reaching"))
-        need((reported[name] >= 0) is (kept[-1] or zero), f"the sign of {name}")
+        need((stated[name] >= 0) is (kept[-1] or zero), f"the sign of {name}")
     need(part["holds"] is all(kept), "whether it holds")
 
 
@@ -266,18 +266,18 @@ def saturated(doc, part, e, f):
     return derived
 
 
-def restoring(reported, e, f):
+def restoring(condition, e, f):
     """Check that (1 - m) sigma(c x) >= phi(x) for x > 0, by boxes without a gap.
 
     Or that it is false at a place, with the margin m < 0 there.
     """
-    m = arb(reported["margin"])
+    m = arb(condition["margin"])
     c = f.c
-    if "at" in reported:
-        need(reported["at"] > 0 and m < 0, "the place where the law is too weak")
-        share = 1 - phi(e, arb(reported["at"])) / sigma(f, c * reported["at"])
+    if "at" in condition:
+        need(condition["at"] > 0 and m < 0, "the place where the law is too weak")
+        share = 1 - phi(e, arb(condition["at"])) / sigma(f, c * condition["at"])
         return equal(m, share, "the margin of restoring", 1)
-    boxes = reported["boxes"]
+    boxes = condition["boxes"]
     joined = all(box[1] == following[0] for box, following in pairwise(boxes))
     whole = joined and boxes[0][0] == 0 and boxes[-1][1] is None
     need(whole, "boxes from 0 to infinity, without a gap")

@@ -237,10 +237,10 @@ def _saturated(
         "x^4": -C / 4.0,
     }
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
-    for reported in _restoring(loop, terms):
-        if margins := judge("saturated PD", {"V": V, "conditions": [None, reported]}):
-            part = _part("saturated PD", margins | {"restoring": reported["margin"]}, V=V)
-            part["conditions"][1] = reported
+    for condition in _restoring(loop, terms):
+        if margins := judge("saturated PD", {"V": V, "conditions": [None, condition]}):
+            part = _part("saturated PD", margins | {"restoring": condition["margin"]}, V=V)
+            part["conditions"][1] = condition
             return part
     raise ScenarioError(
         "found no boxes that prove that the law is stronger than the plant: give other gains"
