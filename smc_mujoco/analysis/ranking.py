@@ -335,7 +335,7 @@ class Comparison:
 
     def step_change(self, block: int, law: str) -> tuple[float, float] | None:
         """Return the medians of a law's runs that were repeated at half the physics step, before
-        and after; None where they are not `apart`.
+        and after; None unless they `differ`.
         """
         a = self.laws.index(law)
         half = self.halves[a, block]

@@ -1,7 +1,8 @@
 """Computation of a study's runs, in batches.
 
 A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a
-killed study loses at most one. The results do not depend on the batch.
+killed study loses at most two: one is stored while the next one runs. The results do not depend on
+the batch.
 """
 
 import math

@@ -41,8 +41,9 @@ def run(
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
-    Each run is repeated at half the physics step, and from a start moved by 1e-9 of itself. A score
-    that changes by more than 5 % is marked (without RK4 2.5 % at half the step).
+    Each run is repeated at half the physics step, and from a start moved by 1e-9 of itself; at a
+    quarter of the step too if u chatters, and under RK4 too if there are contacts. A score that
+    changes by more than 5 % is marked (without RK4 2.5 % at half the step).
 
     Exported traces have every number to the last bit, and its unit.
 
