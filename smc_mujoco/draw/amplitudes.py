@@ -4,8 +4,8 @@ each label.
     amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}},
     "chattering.svg")
 
-Each run is repeated at half its physics step, and from a nudged start. Where that changes its cycle
-by more than 5 %, the dot is hollow.
+Each run is repeated, see `analysis.step_halving`. Where that changes its cycle by more than 5 %, the
+dot is hollow.
 """
 
 import math

@@ -288,9 +288,9 @@ class Scene:
       conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its
         labelled runs.
       film: the condition that is filmed; by default the first.
-      figure: "overview" (as `smc.figure`, a figure for each condition), "signals" (the same
-        of u alone) or "chattering" (amplitude over the actuator's lag, predicted and run,
-        all conditions in one).
+      figure: "overview" (as `smc.figure`, a figure for each condition), "signals" (the same of u
+        alone) or "chattering" (amplitude over the actuator's lag, predicted and run, all conditions
+        in one).
       answers: metrics of the driven channels that answer the scene's question, printed after the
         scores.
       answer: function of the `Outcome` of all runs that returns the text which answers the

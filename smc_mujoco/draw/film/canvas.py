@@ -1,9 +1,9 @@
 """Rendering of the scene with shadows on the floor.
 
-Shadows are flattened copies of what casts them. A directional light casts a point (x, y, z) along its
-direction w to the floor, at (x, y, z) - z w / w_z. As this is linear, a shape's shadow is the same
-shape under another matrix, with edges as smooth as all others. MuJoCo looks its own shadows up in a
-picture from the light: they have saw-tooth edges, and take as long to draw as all the rest.
+Shadows are flattened copies of what casts them. A directional light casts a point (x, y, z) along
+its direction w to the floor, at (x, y, z) - z w / w_z. As this is linear, a shape's shadow is the
+same shape under another matrix, with edges as smooth as all others. MuJoCo looks its own shadows up
+in a picture from the light: they have saw-tooth edges, and take as long to draw as all the rest.
 """
 
 from collections.abc import Callable

@@ -162,8 +162,8 @@ def equation(plant):
 
 def feedback(law, u_max):
     """Return sigma: its kind, largest value K (None: unbounded), slope a at 0 (None: it switches),
-    slope c of s; its `force` before the actuator; `room`, the force to spare and the size of
-    the terms that it sums.
+    slope c of s; its `force` before the actuator; `room`, the force to spare and the size of the
+    terms that it sums.
     """
     g = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None})
     name = law["name"]
