@@ -35,8 +35,7 @@ def perform(
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the
     folder `out`.
 
-    Runs are `repeated` at half the physics step, from a nudged start and so on: what then differs
-    is marked.
+    `repeated`: whether each run is repeated, see `analysis.step_halving`, and what differs marked.
     """
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)

@@ -4,8 +4,8 @@ each label.
     amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}},
     "chattering.svg")
 
-Each run is repeated, see `analysis.step_halving`. Where that changes its cycle by more than 5 %, the
-dot is hollow.
+Each run is repeated, see `analysis.step_halving`. Where that changes its cycle by more than 5 %,
+the dot is hollow.
 """
 
 import math
@@ -109,7 +109,7 @@ def amplitudes(
         dot = {"marker": "o", "lw": 0.0}
         handles.append(pages.entry("predicted", lw=style.points(1.5)))
         handles.append(pages.entry("run", **dot))
-        label = "run that half the step or a nudged start changes"
+        label = "run that differs when repeated"
         handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
         factor, unit = style.prefixed(ax.dataLim.ymax, f"{trace.scenario.plant.unit}/s")
         set_axes(ax, sorted(ticks), factor, unit)
