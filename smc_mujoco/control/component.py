@@ -526,8 +526,6 @@ def template_decorator(
         gain = find("gain that is nonnegative", name, checked)
         checked[name] = dataclasses.replace(gain, nonnegative=True)
     plants = tuple(plants)
-    if FREE_BODY in plants:  # whose gains are of no single axis
-        checked = {name: dataclasses.replace(gain, shared=True) for name, gain in checked.items()}
 
     def decorate(function: Callable) -> Template:
         if not callable(function):

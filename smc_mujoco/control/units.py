@@ -87,6 +87,11 @@ class Gain:
         return self.unit
 
 
+def shared(gains: Mapping[str, Gain]) -> dict[str, Gain]:
+    """Return the gains, each as one number for all joints of a law of many joints."""
+    return {name: dataclasses.replace(gain, shared=True) for name, gain in gains.items()}
+
+
 SLOPE = Gain(2.5, RATE, nonnegative=True)  # c of the surface s = de + c e
 ASSUMED_B = Gain(3.0, INPUT_GAIN, positive=True)  # of e'' = b u + d, for an observer
 # of e'' = a1 e + a2 de + b u; a scenario puts in the values of its plant

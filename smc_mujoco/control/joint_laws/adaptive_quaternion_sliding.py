@@ -36,7 +36,7 @@ import numpy as np
 from smc_mujoco.control.attitude import STEERING, shorter, slide, steer, wrench
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
+from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit, shared
 
 RATE3 = Unit(time=-3)
 
@@ -46,25 +46,27 @@ RATE3 = Unit(time=-3)
     family="adaptive",
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        "c": Gain(3.0, RATE, positive=True),
-        "cz": Gain(2.0, RATE, positive=True),
-        "Kx": Gain(4.0, ACCELERATION, positive=True),
-        "Kz": Gain(3.0, ACCELERATION, positive=True),
-        "rhox": Gain(0.9, Unit(position=-1, time=1), positive=True),
-        "Gx": Gain(0.1, Unit(time=-2), nonnegative=True),
-        "mux": Gain(0.01, Unit(position=1, time=-3), nonnegative=True, held=True),
-        "epsx": Gain(0.001, Unit(), nonnegative=True, held=True),
-        "Kx_up": Gain(20.0, ACCELERATION, positive=True, held=True),
-        "lam": Gain(8.0, RATE, positive=True, turns=True),
-        "lamz": Gain(3.0, RATE, positive=True, turns=True),
-        "K": Gain(400.0, Unit(time=-2), positive=True, turns=True),
-        "rho": Gain(0.2, Unit(time=1), positive=True, turns=True),
-        "G": Gain(20.0, Unit(time=-2), nonnegative=True, turns=True),
-        "mu": Gain(0.01, RATE3, nonnegative=True, held=True, turns=True),
-        "eps": Gain(0.005, Unit(), nonnegative=True, held=True, turns=True),
-        "K_up": Gain(2000.0, Unit(time=-2), positive=True, held=True, turns=True),
-    },
+    gains=shared(
+        {
+            "c": Gain(3.0, RATE, positive=True),
+            "cz": Gain(2.0, RATE, positive=True),
+            "Kx": Gain(4.0, ACCELERATION, positive=True),
+            "Kz": Gain(3.0, ACCELERATION, positive=True),
+            "rhox": Gain(0.9, Unit(position=-1, time=1), positive=True),
+            "Gx": Gain(0.1, Unit(time=-2), nonnegative=True),
+            "mux": Gain(0.01, Unit(position=1, time=-3), nonnegative=True, held=True),
+            "epsx": Gain(0.001, Unit(), nonnegative=True, held=True),
+            "Kx_up": Gain(20.0, ACCELERATION, positive=True, held=True),
+            "lam": Gain(8.0, RATE, positive=True, turns=True),
+            "lamz": Gain(3.0, RATE, positive=True, turns=True),
+            "K": Gain(400.0, Unit(time=-2), positive=True, turns=True),
+            "rho": Gain(0.2, Unit(time=1), positive=True, turns=True),
+            "G": Gain(20.0, Unit(time=-2), nonnegative=True, turns=True),
+            "mu": Gain(0.01, RATE3, nonnegative=True, held=True, turns=True),
+            "eps": Gain(0.005, Unit(), nonnegative=True, held=True, turns=True),
+            "K_up": Gain(2000.0, Unit(time=-2), positive=True, held=True, turns=True),
+        }
+    ),
     conditions={
         "Kx_up > Kx, or it does not adapt": lambda g: g.Kx_up > g.Kx,
         "Kx_up > Kz, or it does not adapt": lambda g: g.Kx_up > g.Kz,

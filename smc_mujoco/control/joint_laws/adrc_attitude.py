@@ -28,7 +28,7 @@ from smc_mujoco.control.attitude import FEEDBACK, LAG, STEERING, shorter, steer,
 from smc_mujoco.control.joint_law import inner
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.laws.extended_state import corrections, observe
-from smc_mujoco.control.units import RATE, Gain
+from smc_mujoco.control.units import RATE, Gain, shared
 
 LEAST = 0.2  # chosen: of |q0|
 
@@ -47,12 +47,14 @@ class Axis(NamedTuple):
     continuous=True,
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        **FEEDBACK,
-        "wc": Gain(4.0, RATE, positive=True, turns=True),
-        "wo": Gain(40.0, RATE, positive=True, turns=True),
-        "lag": LAG,
-    },
+    gains=shared(
+        {
+            **FEEDBACK,
+            "wc": Gain(4.0, RATE, positive=True, turns=True),
+            "wo": Gain(40.0, RATE, positive=True, turns=True),
+            "lag": LAG,
+        }
+    ),
     accuracy={"s": 0, "e": 0},
     label="ADRC attitude",
     short="AA",

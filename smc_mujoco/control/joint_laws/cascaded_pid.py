@@ -42,7 +42,7 @@ from numba import njit
 
 from smc_mujoco.control.attitude import of_thrust, shorter, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.control.units import RATE, RATE2, SPEED, Gain, Unit
+from smc_mujoco.control.units import RATE, RATE2, SPEED, Gain, Unit, shared
 from smc_mujoco.mechanisms.rotation import quaternion, relative
 
 LEAST = 20_000 / 42_700  # of the weight, that the thrust carries at least
@@ -70,30 +70,32 @@ def _gains(turns, **values):
     continuous=True,
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        **_gains(False, P=(2.0, RATE), Pz=(2.0, RATE), Iz=(0.5, RATE2)),
-        **_gains(
-            False, Pv=(4.280, RATE), Iv=(0.1712, RATE2), Pvz=(5.740, RATE), Ivz=(3.444, RATE2)
-        ),
-        **_gains(
-            True,
-            Pa=(6.0, RATE),
-            Ia=(3.0, RATE2),
-            Paz=(6.0, RATE),
-            Iaz=(1.0, RATE2),
-            Daz=(0.35, Unit()),
-        ),
-        **_gains(
-            True,
-            Pr=(103.0, RATE),
-            Ir=(206.0, RATE2),
-            Dr=(1.030, Unit()),
-            Prz=(12.65, RATE),
-            Irz=(1.760, RATE2),
-        ),
-        "speed": Gain(1.0, SPEED, positive=True, held=True),
-        "tilt": Gain(20.0 * DEGREES, Unit(), positive=True, held=True, turns=True),
-    },
+    gains=shared(
+        {
+            **_gains(False, P=(2.0, RATE), Pz=(2.0, RATE), Iz=(0.5, RATE2)),
+            **_gains(
+                False, Pv=(4.280, RATE), Iv=(0.1712, RATE2), Pvz=(5.740, RATE), Ivz=(3.444, RATE2)
+            ),
+            **_gains(
+                True,
+                Pa=(6.0, RATE),
+                Ia=(3.0, RATE2),
+                Paz=(6.0, RATE),
+                Iaz=(1.0, RATE2),
+                Daz=(0.35, Unit()),
+            ),
+            **_gains(
+                True,
+                Pr=(103.0, RATE),
+                Ir=(206.0, RATE2),
+                Dr=(1.030, Unit()),
+                Prz=(12.65, RATE),
+                Irz=(1.760, RATE2),
+            ),
+            "speed": Gain(1.0, SPEED, positive=True, held=True),
+            "tilt": Gain(20.0 * DEGREES, Unit(), positive=True, held=True, turns=True),
+        }
+    ),
     accuracy={"s": 0, "e": 0},
     label="Firmware's PIDs",
     short="FP",

@@ -23,7 +23,7 @@ import numpy as np
 
 from smc_mujoco.control.attitude import STEERING, steer, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.control.units import RATE, Gain, Unit
+from smc_mujoco.control.units import RATE, Gain, Unit, shared
 
 
 @law_function(
@@ -32,12 +32,14 @@ from smc_mujoco.control.units import RATE, Gain, Unit
     continuous=True,
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        "kx": Gain(7.0, Unit(time=-2), positive=True),
-        "kv": Gain(4.0, RATE, positive=True),
-        "kR": Gain(421.7, Unit(time=-2), positive=True, turns=True),
-        "kW": Gain(69.27, RATE, positive=True, turns=True),
-    },
+    gains=shared(
+        {
+            "kx": Gain(7.0, Unit(time=-2), positive=True),
+            "kv": Gain(4.0, RATE, positive=True),
+            "kR": Gain(421.7, Unit(time=-2), positive=True, turns=True),
+            "kW": Gain(69.27, RATE, positive=True, turns=True),
+        }
+    ),
     accuracy={"s": 0, "e": 0},
     label="Geometric",
     memory=STEERING,

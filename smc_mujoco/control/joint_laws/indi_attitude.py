@@ -30,7 +30,7 @@ from numba import njit
 
 from smc_mujoco.control.attitude import FEEDBACK, LAG, STEERING, shorter, steer, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.control.units import RATE, TIME, Gain, Unit
+from smc_mujoco.control.units import RATE, TIME, Gain, Unit, shared
 
 
 @njit
@@ -55,14 +55,16 @@ def _low_pass(x, i, cutoff, dt, states):
     continuous=True,
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        **FEEDBACK,
-        "kq": Gain(120.0, Unit(time=-2), positive=True, turns=True),
-        "kw": Gain(24.0, RATE, positive=True, turns=True),
-        "cutoff": Gain(8.0, RATE, positive=True, held=True, turns=True),
-        "lag": LAG,
-        "spin": Gain(0.0, TIME, nonnegative=True, held=True, turns=True),
-    },
+    gains=shared(
+        {
+            **FEEDBACK,
+            "kq": Gain(120.0, Unit(time=-2), positive=True, turns=True),
+            "kw": Gain(24.0, RATE, positive=True, turns=True),
+            "cutoff": Gain(8.0, RATE, positive=True, held=True, turns=True),
+            "lag": LAG,
+            "spin": Gain(0.0, TIME, nonnegative=True, held=True, turns=True),
+        }
+    ),
     accuracy={"s": 0, "e": 0},
     label="INDI attitude",
     short="IN",

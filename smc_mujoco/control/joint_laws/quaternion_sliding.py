@@ -22,7 +22,7 @@ import numpy as np
 from smc_mujoco.control.attitude import SLIDING, STEERING, shorter, slide, steer, wrench
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.control.units import Gain, Unit, shared
 
 
 @law_function(
@@ -30,11 +30,13 @@ from smc_mujoco.control.units import Gain, Unit
     family="smooth sliding mode",
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        **SLIDING,
-        "K": Gain(400.0, Unit(time=-2), positive=True, turns=True),
-        "rho": Gain(0.25, Unit(time=1), positive=True, turns=True),
-    },
+    gains=shared(
+        {
+            **SLIDING,
+            "K": Gain(400.0, Unit(time=-2), positive=True, turns=True),
+            "rho": Gain(0.25, Unit(time=1), positive=True, turns=True),
+        }
+    ),
     accuracy={"s": 0, "e": 0},
     label="Quaternion sliding",
     memory=STEERING,

@@ -25,7 +25,7 @@ import numpy as np
 
 from smc_mujoco.control.attitude import SLIDING, STEERING, shorter, slide, steer, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function, power
-from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.control.units import Gain, Unit, shared
 
 
 @law_function(
@@ -33,12 +33,14 @@ from smc_mujoco.control.units import Gain, Unit
     family="super-twisting",
     requires_model=True,
     plants=(FREE_BODY,),
-    gains={
-        **SLIDING,
-        "k1": Gain(22.6, Unit(time=-1.5), positive=True, turns=True),
-        "k2": Gain(50.0, Unit(time=-3), nonnegative=True, turns=True),
-        "z_max": Gain(math.inf, Unit(time=-2), nonnegative=True, held=True, turns=True),
-    },
+    gains=shared(
+        {
+            **SLIDING,
+            "k1": Gain(22.6, Unit(time=-1.5), positive=True, turns=True),
+            "k2": Gain(50.0, Unit(time=-3), nonnegative=True, turns=True),
+            "z_max": Gain(math.inf, Unit(time=-2), nonnegative=True, held=True, turns=True),
+        }
+    ),
     accuracy={"s": 0, "e": 0},
     label="Super-twisting attitude",
     memory=STEERING + 1,  # and z
