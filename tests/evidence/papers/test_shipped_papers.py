@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.mutants import survivors
+from helpers.broken_laws import survivors
 
 import smc_mujoco as smc
 from smc_mujoco.control.component import Template
