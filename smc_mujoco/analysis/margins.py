@@ -19,6 +19,7 @@ All searches advance together, a batch of runs per round.
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
@@ -27,7 +28,7 @@ import numpy as np
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.constraints import Boolean, constrained
-from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
@@ -128,9 +129,12 @@ class Kind:
 
     def scenarios(self, base: Scenario, level: float) -> list[Scenario]:
         """Return the scenarios that tell whether a level is tolerated."""
-        scenarios = [self.put(base, level)]
-        if self.signed:
-            scenarios.append(self.put(base, -level))
+        levels = [level, -level] if self.signed else [level]
+        scenarios = []
+        with warnings.catch_warnings():  # a level is no slip of a unit
+            warnings.filterwarnings("ignore", "the true .* times the nominal", ScenarioWarning)
+            for value in levels:
+                scenarios.append(self.put(base, value))
         return scenarios
 
     def search(self, base: Scenario, resolution: float) -> Search:

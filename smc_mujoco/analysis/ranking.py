@@ -42,7 +42,7 @@ grouped into boards. Both are corrected by S. Holm's method (Scandinavian Journa
 
 Below the floor. A law is below q in a block if its high values are at most q in more than half of
 its units. Two laws below q are not ranked: neither is better, and they have no least visible lead.
-If only one is, its lead is at least the median of the rival's low values over q.
+If only one is, and is better, its lead is at least the median of the rival's low values over q.
 
 No winner. Two laws are level only if there are 12 units or more and the interval of their ratio, at
 the pairs' level, lies within 10 %. Otherwise one cannot tell, and `least_visible_lead` says which
@@ -305,7 +305,9 @@ class Comparison:
         below = bool(self.below[a, block] and not self.below[b, block])
         if below:
             low = 0.0
-            high = math.exp(math.log(self.floors[block]) - np.nanmedian(self.low[b, block]))
+            high = 1.0
+            if self.better[block, a, b]:
+                high = math.exp(math.log(self.floors[block]) - np.nanmedian(self.low[b, block]))
             value = high
         return Effect(
             value=float(np.clip(value, low, high)),
@@ -328,7 +330,7 @@ class Comparison:
             return math.nan
         lead = least_visible_lead(self.leads[at], self.limits.first, self.relevant)
         charged = _difference(self.plain[at], self.leads[at])
-        known = charged[np.isfinite(charged)]
+        known = charged[~np.isnan(charged)]
         if known.size:
             return 1.0 - (1.0 - lead) * math.exp(-max(float(np.median(known)), 0.0))
         return lead

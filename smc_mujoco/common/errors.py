@@ -7,6 +7,7 @@ import inspect
 import itertools
 import math
 import numbers
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
@@ -86,18 +87,33 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     if names:
         hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}"
     if isinstance(name, str) and (near := _nearest(name, names)):
-        hint = f"did you mean {near!r}?"
+        hint = f"did you mean {' or '.join(map(repr, near))}?"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
 
-def _nearest(name: str, names: list[str]) -> str:
-    """Return the name that is nearest in spelling, else the first that contains it."""
+def _nearest(name: str, names: list[str]) -> list[str]:
+    """Return the names that an abbreviation may mean, else the nearest in spelling, else the first
+    that contains it.
+    """
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
+    if name.isupper():
+        abbreviated = [known for known in names if _abbreviates(wanted, known.split("_"))]
+        if abbreviated:
+            return abbreviated
     close = difflib.get_close_matches(wanted, list(plain), n=1)
     if not close and wanted:
         close = [known for known in plain if wanted in known]
-    return plain[close[0]] if close else ""
+    return [plain[close[0]]] if close else []
+
+
+def _abbreviates(short: str, words: list[str]) -> bool:
+    """Return whether `short` is a usual abbreviation of a name's words, as sta, stc and stsmc of
+    super_twisting.
+    """
+    initials = "".join(word[:1] for word in words)
+    ending = "smc?" if len(words) == 1 else "(a|c|sm|smc)?"
+    return re.fullmatch(re.escape(initials) + ending, short) is not None
 
 
 def one_line(text: str, length: int = 200) -> str:

@@ -96,7 +96,7 @@ MAX_ANGLE = (
 )  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
 LONG_TIME = 1.0  # s; chosen: an input delay or a control period that is as long may be in ms
-LARGE_FACTOR = 15.0  # chosen: a mismatch that is as large may be in percent
+LARGE_FACTORS = 15.0, 1000.0  # chosen: a mismatch between them may be in percent
 MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 
 Out = TypeVar("Out")
@@ -931,7 +931,8 @@ def _doubtful_units(s: Resolved) -> Iterator[str]:
         if (seconds := getattr(s, what)) >= LONG_TIME:
             yield f"{what} is {seconds:g} s: if it is {seconds:g} ms, give {seconds / 1e3:g}"
     for name, factor in s.mismatch.items():
-        if factor >= LARGE_FACTOR and name not in s.plant.added:
+        low, high = LARGE_FACTORS
+        if low <= factor <= high and name not in s.plant.added:
             fact = f"the true {name} of {s.plant.name} is {factor:g} times the nominal one"
             yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
 

@@ -28,7 +28,8 @@ MEDIANS = (
 )
 MARKS = (
     "Marked: no law is better, every run has arrived, and the samples are enough to see a lead. "
-    "Arrived: the error ends within 10 % of the start, or 5 times what the sensor tells apart. "
+    "Arrived: the error stays within 10 % of the start in the last fifth of the run, or within 5 "
+    "times what the sensor tells apart. "
     "'detects 24 %': a lead of 24 % between the law and the one in front would have been seen in "
     f"{100 * POWER:g} % of such comparisons. 'by the step': the medians at the physics step and at "
     f"half of it, which differ by more than {APART}; {RANGE}."

@@ -285,6 +285,7 @@ def test_a_failed_run_is_the_worst():
     assert smc.run(worst.scenario).failure
 
 
+@pytest.mark.filterwarnings("ignore:input_delay is")
 def test_bad_values_get_a_sentence(refused):
     for make in (
         smc.Uncertainty,

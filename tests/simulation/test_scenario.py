@@ -80,6 +80,7 @@ def test_anything_that_is_a_number_is_taken_as_a_float(number):
         assert type(value[0] if isinstance(value, tuple) else value) is float
 
 
+@pytest.mark.filterwarnings("ignore:control_period is")
 def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
     for period, step, steps in (
         (1e-3, 1e-3, 1),
@@ -95,6 +96,7 @@ def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
         assert made.steps == steps
 
 
+@pytest.mark.filterwarnings("ignore:control_period is")
 def test_a_run_lasts_the_whole_periods_that_fit():
     for duration, period, samples in (
         (1.0, 1e-3, 1000),
@@ -339,6 +341,7 @@ def test_a_missed_condition_warns_once_where_it_was_written():
     assert again == law
 
 
+@pytest.mark.filterwarnings("ignore:(input_delay|control_period) is")
 def test_the_field_s_usual_words_are_understood(refused):
     for word, meant in (
         ("STA", "super_twisting_attitude"),

@@ -38,7 +38,7 @@ def conditions_by_default(default: str) -> Any:
     return typer.Option(
         "--condition",
         metavar="NAME|TEXT|FILE",
-        autocompletion=_completing("simulation.conditions", "NAMED"),
+        autocompletion=CONDITIONS,
         help="Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your own, "
         'as "worn gear: friction=Coulomb(0.05)", or a file with one on each line. May be '
         f"repeated. Default: {default}.",
@@ -60,6 +60,7 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
     return complete
 
 
+CONDITIONS = _completing("simulation.conditions", "NAMED")
 PLANTS = _completing("mechanisms.plant", "plants")
 LAWS = _completing("control.law", "known_laws")
 SCENES = _completing("studies.scene", "scenes")
@@ -76,7 +77,7 @@ Condition = Annotated[
     typer.Option(
         "--condition",
         metavar="NAME|TEXT",
-        autocompletion=_completing("simulation.conditions", "NAMED"),
+        autocompletion=CONDITIONS,
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: '
         'friction=Coulomb(0.05)".',
     ),

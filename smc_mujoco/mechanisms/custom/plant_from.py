@@ -51,6 +51,23 @@ WITHOUT_MODEL = "give a law without a model"
 DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
 
 
+def _touches(model: mujoco.MjModel) -> bool:
+    """Return whether two geoms may meet, by their bodies and masks, or a pair of the file."""
+    if model.npair:
+        return True
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT.value:
+        return False
+    first, second = np.triu_indices(model.ngeom, 1)
+    masks = model.geom_contype[first] & model.geom_conaffinity[second]
+    masks |= model.geom_contype[second] & model.geom_conaffinity[first]
+    body = model.body_weldid[model.geom_bodyid]
+    parent = model.body_weldid[model.body_parentid[body]]
+    a, b = body[first], body[second]
+    # the world is no parent here, as MuJoCo does not count it
+    kin = (a == b) | ((parent[first] == b) & (b > 0)) | ((parent[second] == a) & (a > 0))
+    return bool(np.any((masks != 0) & ~kin))
+
+
 @dataclasses.dataclass(frozen=True)
 class UserModel:
     """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
@@ -86,9 +103,7 @@ class UserModel:
                 part.solref_friction = HARD_SOLREF
                 part.solimp_friction = HARD_SOLIMP
                 hard = True
-        touches = any(geom.contype for geom in spec.geoms)
-        touches &= any(geom.conaffinity for geom in spec.geoms)
-        if hard and not (touches or spec.pairs or spec.option.noslip_iterations):
+        if hard and not (spec.option.noslip_iterations or _touches(spec.copy().compile())):
             spec.option.noslip_iterations, spec.option.noslip_tolerance = NOSLIP
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
@@ -219,8 +234,8 @@ def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
         if blow > GIVE:
             sentences.append(
                 f"the {what} of {label} give way by {1e3 * blow:.2g} mrad (mm) to a blow of 1 "
-                f"rad/s (m/s), and by about {1e3 * rest:.1g} to its weight: a smaller first number "
-                f"of {option} in the file makes them harder"
+                f"rad/s (m/s), and by about {1e3 * rest:.1g} to its weight, in the same unit: a "
+                f"smaller first number of {option} in the file makes them harder"
             )
 
     flags = mujoco.mjtDisableBit
