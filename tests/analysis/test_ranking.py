@@ -749,6 +749,21 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
             assert "detects" not in cells[law].below
 
 
+def test_a_lead_over_the_floor_is_printed_only_where_the_test_sees_it():
+    """Of twins about the floor one is below it and the other is not, by chance."""
+    low = np.where(np.arange(12) < 7, 0.9, 1.9)[None]
+    twins = Comparison({"a": low, "b": 2.8 - low}, 1.0)
+    assert twins.below.tolist() == [[True], [False]]
+    assert twins.effect(0, "a", "b").high == 1.0
+    apart = Comparison({"a": low, "b": 10.0 * low}, 1.0)
+    assert apart.effect(0, "a", "b").high == pytest.approx(1.0 / 9.0)
+
+
+def test_nothing_is_seen_of_a_law_that_arrives_at_one_step_and_not_at_half_of_it():
+    lost = Comparison({"a": A, "b": B}, halves={"a": INF * FLAT, "b": B})
+    assert lost.visible(0, "a", "b") == 1.0
+
+
 def test_a_law_is_below_the_floor_by_more_than_half_of_its_units_and_by_all_that_is_charged():
     q = 1.0
     for count, below in ((6, False), (7, True)):

@@ -659,6 +659,7 @@ DRY = {
     "light hinge": ('axis="0 1 0" frictionloss="3" damping=".01" stiffness="2"', "", ""),
     "slide": ('type="slide" axis="0 0 1" frictionloss="25"', "", ""),
     "arm": ('axis="0 1 0" frictionloss="9"', FOREARM.format('frictionloss=".8"'), ""),
+    "default masks": ('axis="0 1 0" frictionloss="9"', FOREARM.format('frictionloss=".8"'), ""),
     "geared": ('axis="0 1 0" frictionloss="9" armature=".2"', FOREARM.format(""), ""),
     "tendon": ('axis="0 1 0"', FOREARM.format('frictionloss=".8"'), ACROSS),
 }
@@ -674,6 +675,8 @@ def dry_arm(kind):
         more = '<equality><joint joint1="b" polycoef="0 1 0 0 0"/></equality>'
     text = f"""<mujoco><worldbody><body><joint name="a" {joint}/>{LINK.format(0.3, 0.5)}{carried}
       </body></worldbody>{more}<actuator>{motors}</actuator></mujoco>"""
+    if kind == "default masks":  # by which a link and its parent would meet, were they not kin
+        text = text.replace(' contype="0" conaffinity="0"', "")
     return text, smc.plant_from(text, ["a", "b"] if carried else ["a"])
 
 
