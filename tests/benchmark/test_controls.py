@@ -85,6 +85,7 @@ def test_the_oracle_of_flight_alone_knows_a_payload(name, reported):
     )
 
 
+@pytest.mark.slow
 def test_the_oracle_of_flight_leaves_no_error_behind_a_rotor_that_fades():
     """A fading rotor's torque is what its feedback alone, without an integral, would not take."""
     one = smc.problem("quadrotor/fading_rotor@2")

@@ -152,6 +152,7 @@ def mine(y, gains, memory):
     return u + 2e-3 * (y.f + y.fq) + 1e-4 * (y.g + 2.0 * y.gq) + 0.1 * y.limit + 0.01 * y.model, y.x
 
 
+@pytest.mark.slow
 @ROBOTS
 def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
     """Each torque from what the law may see of the states, each state from the one before by the

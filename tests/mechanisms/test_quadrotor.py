@@ -280,7 +280,7 @@ def test_a_gust_of_wind_is_a_raised_cosine():
     np.testing.assert_allclose(trace.d[:, 0], 0.02 * 3.0 * shape, atol=1e-12)
 
 
-@pytest.mark.parametrize("step", [5e-3, 1e-3])
+@pytest.mark.parametrize("step", [5e-3, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_turbulence_has_its_rms_and_its_correlation_whatever_the_step(step):
     """MIL-F-8785C's lengths and sizes at 3.05 m; 60 runs of 20 s, 8 correlation times each along x
     and y.
