@@ -234,11 +234,12 @@ class Machine:
         self.limit = scenario.limits[0]
         self.uses_model = float(resolved.model == "nominal")
 
-    def start(self) -> tuple[Any, ...]:
+    def start(self) -> tuple[Any, Any, Any, Any, Any, Any]:
         """Return addresses, gains, empty memories, and what the law knows, for a compiled loop."""
         functions = np.array([self.law.address, self.estimator.address])
-        memories = np.zeros(self.sizes[0]), np.zeros((2, self.sizes[1]))
-        return functions, self.gains, self.filter, *memories, self.known
+        memory = np.zeros(self.sizes[0])
+        past = np.zeros((2, self.sizes[1]))
+        return functions, self.gains, self.filter, memory, past, self.known
 
     def simulate(self, case: Case) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (q1, q2, q1', q2'), (5001, 4), and the motor's torque, N m, (5000,), of

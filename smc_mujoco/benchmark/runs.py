@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 VALUES = "failed", "accuracy", "itae", "settling", "calm"
 LEVELS = 5  # targets of a measure
-COLUMNS = list(VALUES)
+COLUMNS: list[str] = list(VALUES)
 for measure in MEASURES:
     for level in range(1, LEVELS + 1):
         COLUMNS.append(f"{measure}_{level}")

@@ -154,7 +154,7 @@ def probe(backend: str, code: str = PROBE) -> str | None:
     environment = {"MUJOCO_GL": backend} if backend else {}
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
-        done = process.timed(command, TIMEOUT, **environment)
+        done = process.timed(command, TIMEOUT, True, None, **environment)
     except process.TimedOut:
         return f"a trial did not end within {TIMEOUT:g} s"
     if done.returncode == 0:

@@ -11,6 +11,7 @@ the dot is hollow.
 import math
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -90,7 +91,7 @@ def amplitudes(
             predicted.append((lags, sizes))
             ax.plot(lags, sizes, color=colour, lw=style.points(2.0))
             for at, size, change in zip(lags, swings, step_halving(its, 0), strict=True):
-                look = {"color": colour, "mec": style.PAPER}
+                look: dict[str, Any] = {"color": colour, "mec": style.PAPER}
                 if change.marked:
                     look = {"color": style.PAPER, "mec": colour}
                 ax.plot(at, size, "o", ms=style.points(7.0), **look)
@@ -111,7 +112,9 @@ def amplitudes(
         handles.append(pages.entry("run", **dot))
         label = "run that differs when repeated"
         handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
-        factor, unit = style.prefixed(ax.dataLim.ymax, f"{trace.scenario.plant.unit}/s")
+        factor, unit = style.prefixed(
+            ax.dataLim.ymax, f"{next(iter(runs.values()))[0].scenario.plant.unit}/s"
+        )
         set_axes(ax, sorted(ticks), factor, unit)
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         return pages.write(page, pages.files(path))

@@ -3,6 +3,7 @@
 import itertools
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -98,7 +99,7 @@ def plot(
         tall = 0.5 + LINE_HEIGHT * rows
         space = pages.head_height(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(tall.sum()), fig)
-        axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
+        axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall.tolist())
         room = 72 * width / len(names) - style.points(50)  # beside the numbers of the axis
         text = style.points(pages.TEXT_SIZE)
         for plant, high, of_plant in zip(plants, tall, axes, strict=True):
@@ -136,7 +137,8 @@ def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, s
                 else:
                     sizes = np.array(interval[:3])
                     sizes[(sizes > 0.0) & (sizes < MIN_SIZE)] = MIN_SIZE
-                    interval = Interval(*sizes.tolist(), interval.n)
+                    median, low, high = sizes.tolist()
+                    interval = Interval(median, low, high, interval.n)
                 intervals[metric, *group.blocks[0], law] = interval
     return intervals
 
@@ -149,7 +151,7 @@ def _key(
     """
     known = sources(table)
     key: list[Handle] = []
-    line = {"lw": style.points(1.5)}
+    line: dict[str, Any] = {"lw": style.points(1.5)}
     gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])
     for (law, look), source in zip(looks.items(), gains, strict=True):
         label = style.law_name(law) + source
@@ -199,12 +201,13 @@ def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> No
     """Draw a median with its interval. An infinite median is at the right edge."""
     median, low, high = interval[:3]
     color = look["color"]
-    mark = {**look, "ms": style.points(6)}
+    mark: dict[str, Any] = {**look, "ms": style.points(6)}
     if np.isfinite(median):
         ax.plot(median, line, **mark)
     else:
         mark |= {"transform": ax.get_yaxis_transform(), "clip_on": False}
-        ax.plot(1.0, line, **mark | {"mfc": style.PAPER, "mec": color})
+        mark |= {"mfc": style.PAPER, "mec": color}
+        ax.plot(1.0, line, **mark)
     if np.isfinite(low) and np.isfinite(high):
         ax.plot([low, high], [line, line], color=color, lw=style.points(1.5))
     elif np.isfinite(low):  # up to the edge

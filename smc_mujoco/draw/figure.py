@@ -137,6 +137,7 @@ def _composed_page(
     early = [drawing.until(trace, runs.span[0]) for trace in traces]
     left: list[Panel] = []
     right: list[Panel] = []
+    worst: list[Panel] = []
     if "channels" in chosen:
         worst = drawing.worst_first(early)
         left += worst[:MAX_WORST]
@@ -185,7 +186,7 @@ def _composed_page(
     cells = _cells(page, list(parts), blocks)
     for k, panels in ((0, left), (1, right)):
         pitch = free / max(1.0, parts.get(columns[min(k, len(columns) - 1)], 0.0))
-        words = drawing.titles(panels, pitch * np.array(blocks[k]))
+        words = drawing.titles(panels, (pitch * np.array(blocks[k])).tolist())
         _draw_over_time(page, cells[k], list(zip(panels, words, strict=True)), runs, k == 0)
     _draw_beside(page, cells[2], beside, (groups[0], *portraits), runs)
     pages.set_head(

@@ -325,7 +325,7 @@ def cartesian_path(
     try:
         array = np.asarray(points, float)
     except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
-        array = np.empty(0)
+        array = np.asarray(math.nan)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ScenarioError(
             f"points are {shown(points)}: give positions (x, y, z) in m, one a time"

@@ -465,7 +465,7 @@ def test_a_law_whose_runs_have_not_arrived_has_no_dot_among_others(metric):
             assert not hollow
             assert not ax.get_title(loc="right")
             continue
-        assert [line.get_xdata()[0] for line in hollow] == [1.0, 1.0]
+        assert [np.asarray(line.get_xdata())[0] for line in hollow] == [1.0, 1.0]
         words = "never" if metric == "settling_time" else "not arrived"
         assert ax.get_title(loc="right") == words
     check(page)

@@ -403,7 +403,7 @@ def test_the_worst_joints_of_an_arm_come_first_with_their_controls_beside_them(m
     monkeypatch.setattr("smc_mujoco.draw.figure.MAX_WORST", 2)
     page = figure(traces, labels=["near", "far"])
     assert [ax.get_ylabel() for ax in page.axes][:2] == errors[:2]
-    assert "the 2 worst of 3 channels" in page.get_label()
+    assert "the 2 worst of 3 channels" in str(page.get_label())
 
 
 @pytest.mark.parametrize(

@@ -168,5 +168,5 @@ def test_bristles_too_stiff_for_the_step_are_told_and_those_of_the_step_told_are
         return
     with pytest.warns(smc.errors.ScenarioWarning, match="LuGre.*physics_step") as caught:
         smc.Scenario(**fields)
-    step = float(re.search(r"physics_step of ([0-9.e-]+) or", str(caught[0].message))[1])
+    (step,) = map(float, re.findall(r"physics_step of ([0-9.e-]+) or", str(caught[0].message)))
     smc.Scenario(**fields, physics_step=1e-3 / math.ceil(1e-3 / step))

@@ -201,8 +201,8 @@ class Caption:
         self,
         picture: np.ndarray,
         time: float,
-        failed: tuple[bool, ...],
-        states: tuple[State | None, ...] = (),
+        failed: Sequence[bool],
+        states: Sequence[State | None] = (),
         speed: float = 1.0,
         shown: float = 0.0,
     ) -> np.ndarray:

@@ -134,7 +134,7 @@ class Charts:
         wide = ax.get_window_extent().width  # px
         last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * ax.figure.dpi / 72) / wide
         stop = min(1.01 * self.window, self.end)
-        ticks = MaxNLocator(TIME_TICKS).tick_values(0.0, self.window)
+        ticks = np.asarray(MaxNLocator(TIME_TICKS).tick_values(0.0, self.window))
         ticks = ticks[(self.share(ticks) < last) & (ticks < stop)].tolist()
         ax.set_xticks([*ticks, self.end], [*(f"{tick:g}" for tick in ticks), f"{self.end:g} s"])
         for label in ax.get_xticklabels()[-1:]:

@@ -290,8 +290,6 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     scenario = traces[0].scenario
     scales = arrows.scales(traces)
     arms = all(trace.scenario.plant.tip for trace in traces)
-    if arms or scenario.plant.pose:
-        from smc_mujoco.draw.film import arm
     whole = end(traces)
     count = min(MAX_GRID, max(1, round(FPS * whole)))
     grid = np.linspace(0.0, whole, count + 1)  # also for a still
@@ -302,6 +300,8 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     below = None
     words = None
     if arms:
+        from smc_mujoco.draw.film import arm
+
         below = arm.room(traces, width / len(traces) / scale)
         words = arm.key(traces)
     grid_states = [track.grid_states for track in tracks]
@@ -314,7 +314,9 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
         caption.place(stage.boxes)
         over = None
         if arms or scenario.plant.pose:
-            over = arm.Overlay(traces, colours, stage, edges, caption.badges)
+            from smc_mujoco.draw.film.arm import Overlay
+
+            over = Overlay(traces, colours, stage, edges, caption.badges)
         for frame, time in enumerate(times.tolist()):
             picture = stage.render(posed(stage, tracks, over, frame, time))
             if over:

@@ -247,7 +247,7 @@ def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
         tell("joint limits", "solreflimit", *limits, pushed)
     touching = (model.geom_contype > 0) & np.any(model.geom_conaffinity)
     if not off & (flags.mjDSBL_CONTACT.value | flags.mjDSBL_CONSTRAINT.value):
-        gravity = np.linalg.norm(model.opt.gravity)
+        gravity = float(np.linalg.norm(model.opt.gravity))
         tell(
             "contacts", "solref", model.geom_solref[touching], model.geom_solimp[touching], gravity
         )
@@ -304,7 +304,7 @@ def _plant(
     fields = UserFields(mass, gravity)
     why_not = missing(model, joints, motors)
     dry = model.dof_frictionloss > 0.0
-    rubs = bool(np.any(dry)) and np.all(model.dof_solref[dry] == SOFT_SOLREF)
+    rubs = bool(np.any(dry) and np.all(model.dof_solref[dry] == SOFT_SOLREF))
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),

@@ -11,6 +11,7 @@ import re
 import shutil
 import warnings
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -714,7 +715,7 @@ def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
       <compiler angle="radian"/><actuator><motor joint="j"/></actuator></mujoco>"""
     with pytest.warns(smc.errors.ScenarioWarning, match="solreflimit") as caught:
         plant = smc.plant_from(text, ["j"])
-    reported = float(re.search(r"by ([0-9.]+) mrad", str(caught[0].message))[1])
+    (reported,) = map(float, re.findall(r"by ([0-9.]+) mrad", str(caught[0].message)))
     trace = smc.run(smc.Scenario(plant=plant, law="none", x0=39.9, v0=speed, duration=0.5))
     assert 1e-3 * reported * speed == pytest.approx(trace.x.max() - 40.0, rel=0.1)
     hard = text.replace(solref, ".004 1")
@@ -1145,7 +1146,8 @@ def test_no_record_of_a_model_knows_its_folder(arm, tmp_path, monkeypatch):
     assert str(tmp_path) not in str(records)
     monkeypatch.setattr(mjcf, "_known", {})  # as in another process
     monkeypatch.chdir(tmp_path / "anna")
-    assert serialise.restore(about).plant.build.source.path == str(Path("models/arm.xml").resolve())
+    build: Any = serialise.restore(about).plant.build
+    assert build.source.path == str(Path("models/arm.xml").resolve())
     monkeypatch.chdir(tmp_path / "others")
     monkeypatch.setattr(mjcf, "_known", {})
     with pytest.raises(smc.ScenarioError, match=r"arm.xml is not there: put it back, or run in"):
