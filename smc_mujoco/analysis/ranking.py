@@ -169,9 +169,7 @@ class Comparison:
         self.away = np.isinf(self.cells)  # runs that failed, have no value or have not arrived
         if arrived:
             self.away |= self._cube(arrived, float) == 0.0
-        q = np.log(np.maximum(self.floors, np.finfo(float).tiny))
-        # the median of an even number is above q if only half of the values are at most q
-        self.below = (middle(high) <= q) & (self.floors > 0.0) & (not shares)
+        self.below = np.zeros((count, blocks), bool)
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
         # d of the first law over the second by unit, then NaN; and without halves and trends
         self.leads = np.full((blocks, count, count, seeds), math.nan)
@@ -179,6 +177,12 @@ class Comparison:
         for k in range(blocks):
             for a in range(count):
                 self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
+                if self.floors[k] > 0.0 and not shares:
+                    first = first_of_kind(results[[a], k][:, None], ran[[k]])[0]
+                    own_units = linked(gains[a, k, first])
+                    # of an even number, the median is above q if only half are at most q
+                    centre = middle(_by_unit(high[a, k, first], own_units, seeds))
+                    self.below[a, k] = centre <= math.log(self.floors[k])
                 for b in range(a):
                     first = first_of_kind(results[[a, b], k][:, None], ran[[k]])[0]
                     units = linked(gains[a, k, first], gains[b, k, first])

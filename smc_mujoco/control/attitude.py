@@ -20,7 +20,7 @@ from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.units import ACCELERATION, RATE, RATE2, TIME, Gain, Unit
 from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, rotate_inverse, turned
 
-compiled = njit(error_model="numpy")  # a division by 0 gives inf or NaN, as in C
+as_in_c = njit(error_model="numpy")  # a division by 0 gives inf or NaN
 # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
 BANDWIDTH = 20.0
 # least thrust over weight: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
@@ -43,7 +43,7 @@ MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
 MIN_SINE = 1e-6
 
 
-@compiled
+@as_in_c
 def of_thrust(F, r):
     """Return the attitude whose third axis is along the force F, (3,), and whose first is nearest
     to the heading.
@@ -64,7 +64,7 @@ def of_thrust(F, r):
     return _of_axes(_cross(y, z), y, z)
 
 
-@compiled
+@as_in_c
 def rate_of(wanted, F, dF, r, dr):
     """Return the rate of the attitude `wanted` by `of_thrust`, in its axes, as F and r change by dF
     and dr a second.
@@ -87,7 +87,7 @@ def rate_of(wanted, F, dF, r, dr):
     return -_dot(y, dz), _dot(x, dz), -yaw
 
 
-@compiled
+@as_in_c
 def _ahead(z, heading):
     """Return the axis that is the heading for `of_thrust`, in those of the quaternion `heading`."""
     y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
@@ -96,17 +96,17 @@ def _ahead(z, heading):
     return (0.0, 0.0, -1.0)
 
 
-@compiled
+@as_in_c
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@compiled
+@as_in_c
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@as_in_c
 def _of_axes(x, y, z):
     """Return the quaternion of a rotation matrix with these columns, by the largest of its four
     numbers.
@@ -136,7 +136,7 @@ def _of_axes(x, y, z):
     return c / root, e / root, f / root, 0.25 * root
 
 
-@compiled
+@as_in_c
 def slide(y, c, K, rho):
     """Return s = e' + c e of the position, v = -c e' - K tanh(rho s), its stiffness and its
     damping, (3,) each.
@@ -149,7 +149,7 @@ def slide(y, c, K, rho):
     return s, -c * y.de[:3] - K * reached, c * slope, c + slope
 
 
-@compiled
+@as_in_c
 def steer(y, v, stiffness, damping, memory):
     """Return the force for the acceleration v of the position's error, and how far the body is off
     its attitude.
@@ -181,7 +181,7 @@ def steer(y, v, stiffness, damping, memory):
     return F, error, (y.v[3] - moving[0], y.v[4] - moving[1], y.v[5] - moving[2]), moving
 
 
-@compiled
+@as_in_c
 def shorter(error, turning):
     """Return 2 sgn(q0) qv of an error quaternion, and its rate at a relative angular velocity;
     sgn(0) = 1.
@@ -201,7 +201,7 @@ def shorter(error, turning):
     return angle, change
 
 
-@compiled
+@as_in_c
 def wrench(y, F, v, moving):
     """Return a law's command, (6,): the share of F along the body's third axis, and the torque for
     the acceleration v.

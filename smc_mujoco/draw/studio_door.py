@@ -1,8 +1,9 @@
-"""Who may use the page of `smc.view`: whoever has its address, which holds a secret word.
+"""The door of the page that `smc.view` opens: it lets in only those who know its address.
 
-A browser sends what any page in it asks for. So each request must name this machine as its host,
-come from no page of another origin, and begin with the secret word. Others get 403, before Studio
-reads them. So does an upload of a model: a model may include other files of this machine.
+The address holds a secret word. Any page that is open in a browser can send requests to this
+machine. So each request must begin with the secret word, name this machine as its host, and come
+from no page of another origin. Others get 403 before Studio reads them. Uploads of models get 403,
+too, since a model may include other files of this machine.
 """
 
 # pyright: reportMissingImports=false

@@ -107,8 +107,9 @@ def run(
       ScenarioError: not a Scenario, or threads below 1.
 
     MuJoCo's eight callbacks are global to the process. During a run no other callback is called,
-    and a run fails if other code sets one, or takes its control callback away. Ctrl-C is heard
-    within seconds; a compiled law of yours that never returns then computes on until Python ends.
+    and a run fails if other code sets one, or takes its control callback away. Ctrl-C ends
+    the call within seconds. A compiled law of yours that never returns cannot be stopped: it keeps
+    one core busy until Python ends.
     """
     shown_bar = Flag()("progress", progress)
     prepared = list(map(prepare, one_or_several(scenarios)))

@@ -769,6 +769,9 @@ def test_a_law_is_below_the_floor_by_more_than_half_of_its_units_and_by_all_that
     for count, below in ((6, False), (7, True)):
         values = np.where(np.arange(12) < count, 0.5, 2.0)[None]
         assert Comparison({"a": values, "b": 9.0 * B}, q).below[0, 0] == below
+    # seven runs of one set are one unit of six
+    sets = {"a": np.maximum(np.arange(12) - 6, 0)[None], "b": np.arange(12)[None]}
+    assert not Comparison({"a": values, "b": 9.0 * B}, q, sets=sets).below[0, 0]
     charged = {"halves": {"a": 3.0 * A, "b": B}}, {"trends": {"a": 1.3 * FLAT, "b": FLAT}}
     for options in charged:
         assert not Comparison({"a": 0.5 * A, "b": B}, q, **options).below[0, 0]
