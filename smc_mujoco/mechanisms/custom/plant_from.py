@@ -245,8 +245,8 @@ def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
         pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
         limits = model.jnt_solref[limited], model.jnt_solimp[limited]
         tell("joint limits", "solreflimit", *limits, pushed)
-    touching = (model.geom_contype > 0) & np.any(model.geom_conaffinity)
-    if not off & (flags.mjDSBL_CONTACT.value | flags.mjDSBL_CONSTRAINT.value):
+    if _touches(model) and not off & flags.mjDSBL_CONSTRAINT.value:
+        touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
         gravity = float(np.linalg.norm(model.opt.gravity))
         tell(
             "contacts", "solref", model.geom_solref[touching], model.geom_solimp[touching], gravity
