@@ -151,11 +151,10 @@ def _leading(outcomes: Sequence[Outcome]) -> Cell:
 
 
 def _few(laws: Sequence[str]) -> str:
-    """Return the names of three laws at most, and how many more there are."""
-    names = ", ".join(laws[:3])
+    """Return the names of laws, or of more than three their number: none of these stands out."""
     if len(laws) > 3:
-        return f"{names}, {len(laws) - 3} more"
-    return names
+        return f"{len(laws)} laws"
+    return ", ".join(laws)
 
 
 def comparison(compared: Compared) -> Section:

@@ -145,7 +145,7 @@ def leading(*cells) -> Any:
         ),
         (
             [block(itae="a b c d e", settles="a b c d e")],
-            Cell("a, b, c, 2 more", "unbeaten in 1 of 1"),
+            Cell("5 laws", "unbeaten in 1 of 1"),
         ),
         ([block(itae="a b", settles="b c")], Cell("b", "unbeaten in 1 of 1")),
         ([block(itae="")], Cell("none")),
