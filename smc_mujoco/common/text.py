@@ -1,7 +1,9 @@
 """Numbers and lists as text."""
 
+import dataclasses
 import math
 from collections.abc import Iterable
+from typing import Any
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -45,3 +47,16 @@ def every(count: int) -> str:
 def counted(count: int, noun: str) -> str:
     """Return "1 run" or "3 runs"."""
     return f"1 {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def stated(data: Any) -> dict[str, Any]:
+    """Return what the text of frozen data states: its fields, those by keyword alone last, and only
+    if they differ from their defaults.
+    """
+    fields = sorted(dataclasses.fields(data), key=lambda field: bool(field.kw_only))
+    values = {}
+    for field in fields:
+        value = getattr(data, field.name)
+        if field.init and not (field.kw_only and value == field.default):
+            values[field.name] = value
+    return values

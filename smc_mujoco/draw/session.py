@@ -279,12 +279,14 @@ def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
             lambda s, v: {"noise": dataclasses.replace(s.noise, position=v)},
         ),
     }
-    coulomb = [part.level for part in s.friction if isinstance(part, Coulomb)]
-    if len(coulomb) == len(s.friction) <= 1:
-        level = sum(coulomb)
+    rubs, *others = s.friction or (Coulomb(0.0),)
+    if isinstance(rubs, Coulomb) and not others:
         most = 0.5 * bound if math.isfinite(bound) else 1.0
         sliders["friction, N or N m"] = Slider(
-            level, 0.0, most, lambda s, v: {"friction": Coulomb(v) if v else None}
+            rubs.level,
+            0.0,
+            most,
+            lambda s, v: {"friction": dataclasses.replace(rubs, level=v) if v else None},
         )
     return sliders
 

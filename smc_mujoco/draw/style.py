@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, shown
-from smc_mujoco.common.text import capital
+from smc_mujoco.common.text import capital, stated
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
@@ -399,12 +399,12 @@ def _value(value: object) -> str:
         return str(value).replace("_", " ")
     kind = re.sub(CAMEL, lambda start: f" {start[1].lower()}", type(value).__name__)
     words = [kind]
-    fields = dataclasses.fields(value)
-    for field in fields:
-        part = getattr(value, field.name)
-        if part != field.default:
+    usual = {field.name: field.default for field in dataclasses.fields(value)}
+    fields = stated(value)
+    for name, part in fields.items():
+        if part != usual[name]:
             said = _value(part)
-            words.append(said if len(fields) == 1 else f"{field.name.replace('_', ' ')} {said}")
+            words.append(said if len(fields) == 1 else f"{name.replace('_', ' ')} {said}")
     return (" " if len(fields) == 1 else ", ").join(words)
 
 

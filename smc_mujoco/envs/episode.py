@@ -93,8 +93,8 @@ class Setting:
             raise ScenarioError(
                 "environments have no Stepper, whose queue the callback keeps: take another drive"
             )
-        if self.scenario.formula_friction is not None:
-            name = type(self.scenario.formula_friction).__name__
+        for formula in self.scenario.formula_frictions:
+            name = type(formula).__name__
             raise ScenarioError(
                 f"friction {name} is a formula, which environments lack: give Coulomb or LuGre"
             )

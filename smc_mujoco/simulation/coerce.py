@@ -5,6 +5,7 @@ one are converted already. It raises ScenarioError, one sentence with the field,
 cure, for what it cannot convert.
 """
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, all_joints, joint_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
@@ -38,6 +39,9 @@ ByChannel = (
     Mapping[str, T] | Sequence[T]
 )  # joint -> value, or values in the order of the driven channels
 Laws = Law | Template | str | ByChannel[Law | Template | str]
+EVERY = "*"  # in a mapping from joints to frictions
+SomeFriction = Friction | Sequence[Friction]
+Frictions = SomeFriction | Mapping[str, SomeFriction] | Sequence[SomeFriction | Mapping]
 
 
 def plant(name: str, value: object, s: Any) -> Plant:
@@ -280,19 +284,45 @@ def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
     return value
 
 
-def friction(
-    name: str, value: Friction | Sequence[Friction] | None, s: Any
-) -> tuple[Friction, ...]:
-    """Return frictions sorted by kind, from one, several or None.
+def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]:
+    """Return frictions sorted by kind, from one, several or None, or by joint.
 
-    Kinds must differ, and one at most has bristles.
+    Kinds must differ, and one at most has bristles on a joint.
     """
-    items = several(Friction, "smc.Coulomb(0.05)")(name, value, s)
-    _check_kinds_differ(name, items)
-    if len(bristles := [part for part in items if part.bristles]) > 1:
-        first, second = (type(part).__name__ for part in bristles[:2])
-        raise ScenarioError(f"{name} has {first} and {second}, which both model bristles: give one")
-    return tuple(sorted(items, key=lambda part: type(part).__name__))
+    items: list[Friction] = []
+    for item in as_tuple(value):
+        by_joint = item if isinstance(item, Mapping) else {None: item}
+        places: dict[Friction, list[str]] = {}
+        for joint, given in by_joint.items():
+            for part in several(Friction, "smc.Coulomb(0.05)")(name, given, s):
+                if joint is None:
+                    items.append(part)
+                else:
+                    places.setdefault(part, []).append(joint)
+        items += [dataclasses.replace(part, on=tuple(on)) for part, on in places.items()]
+    items = [_placed(name, part, s.plant) for part in items]
+    for part, other in itertools.combinations(items, 2):
+        kinds = type(part).__name__, type(other).__name__
+        if type(part) is type(other) and part.on == other.on:
+            raise ScenarioError(f"{name} has a {kinds[0]} twice: give one")
+        both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
+        if part.bristles and other.bristles and both:
+            raise ScenarioError(
+                f"{name} has {kinds[0]} and {kinds[1]}, which both model bristles: give one"
+            )
+    return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))
+
+
+def _placed(name: str, part: Friction, plant: Plant) -> Friction:
+    """Return a friction whose joints are those of the plant, in their order."""
+    if not part.on:
+        return part
+    joints = all_joints(plant)
+    for joint in part.on:
+        if joint not in (EVERY, *joints):
+            raise unknown(f"joint of {plant.name} in {name}", joint, joints)
+    on = [joint for joint in joints if joint in part.on or EVERY in part.on]
+    return dataclasses.replace(part, on=tuple(on))
 
 
 def actuator(

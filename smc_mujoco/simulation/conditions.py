@@ -11,16 +11,17 @@ nothing in it is run:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
 
-The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N
-is u_max / 60. The viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is
-that of a worn gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are
-those of an inexpensive encoder. On a free body, whose size may be any, a disturbance is the same
-share of the largest force as it is of u_max in the study. The pulse of "contact" is as strong as
-u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the
-suite's control period. Under "missed" one sample in ten does not run. Under "stepper" u is the
-wanted acceleration, so gains for a force do not suit it: tune under it. Its rates are those of the
-firmware of rig stepper_furuta; it is 30 times as strong as other drives, near that machine's ratio
-of torque to inertia, as one of their strength loses steps here.
+The levels of the suite are those of a machine of the study's size. Dry friction is of any size: a
+sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N in the study. The
+viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn
+gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
+inexpensive encoder. On a free body, whose size may be any, a disturbance is the same share of the
+largest force as it is of u_max in the study. The pulse of "contact" is as strong as u_max, so that
+it moves whatever can move. Under "jitter" samples are late by up to half of the suite's control
+period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration,
+so gains for a force do not suit it: tune under it. Its rates are those of the firmware of rig
+stepper_furuta; it is 30 times as strong as other drives, near that machine's ratio of torque to
+inertia, as one of their strength loses steps here.
 """
 
 import ast
@@ -39,6 +40,7 @@ from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.text import stated
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -47,12 +49,18 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.scenario import NOT_OF_FREE_BODIES, U_MAX, Scenario, default_u_max
+from smc_mujoco.simulation.scenario import (
+    NOT_OF_FREE_BODIES,
+    U_MAX,
+    Scenario,
+    default_u_max,
+    suggested_u_max,
+)
 from smc_mujoco.simulation.signals import (
     Clock,
     Constant,
@@ -81,6 +89,7 @@ CONSTANTS = {"inf": math.inf, "pi": math.pi}
 PLANTS = tuple(gain_sets.STUDY)  # the plants of the first paper
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 
+BOUNDS_PER_FRICTION = 60.0  # of u, on each driven joint
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
@@ -325,14 +334,17 @@ def _as_text(value: Any, defaults: bool = True) -> str:
         gains = ", ".join(f"{gain}={number!r}" for gain, number in value.gains.items())
         return f"{value.name}({gains})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
+        usual = {f.name: f.default for f in dataclasses.fields(value)}
         texts = []
-        for f in dataclasses.fields(value):
-            content = getattr(value, f.name)
-            if f.init and (defaults or content != f.default):
-                texts.append(f"{f.name}={_as_text(content, defaults)}")
+        for name, content in stated(value).items():
+            if defaults or content != usual[name]:
+                texts.append(f"{name}={_as_text(content, defaults)}")
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
         return f"({', '.join(_as_text(one, defaults) for one in value)},)"
+    if isinstance(value, Mapping):
+        items = [f"{key!r}: {_as_text(item, defaults)}" for key, item in value.items()]
+        return f"{{{', '.join(items)}}}"
     return repr(value)
 
 
@@ -428,6 +440,26 @@ def _disturbed(make: Callable[[float], Signal]) -> Recipe:
     return lambda plant, duration: {"disturbance": _sized(make(duration / 2), plant)}
 
 
+def _rubbing(make: Callable[[float], Friction | tuple[Friction, ...]]) -> Recipe:
+    """Return the friction that a function makes of a level, a sixtieth of the bound on each driven
+    joint.
+    """
+
+    def fields(plant: Plant, duration: float) -> Fields:
+        bounds = suggested_u_max(plant)
+        if not isinstance(bounds, tuple):
+            bounds = (bounds,) * plant.driven
+        made = []
+        for bound, limit in zip(bounds, plant.limits or bounds, strict=True):
+            least = min(bound, limit)
+            made.append(make((least if least < math.inf else U_MAX) / BOUNDS_PER_FRICTION))
+        if len(set(made)) == 1:
+            return {"friction": made[0]}
+        return {"friction": dict(zip(joint_names(plant), made, strict=False))}
+
+    return fields
+
+
 IDEAL: dict[str, Recipe] = {
     "nominal": {},
     "noise": {"noise": SENSOR_NOISE},
@@ -446,9 +478,9 @@ IDEAL: dict[str, Recipe] = {
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
 }
 REAL: dict[str, Recipe] = {
-    "friction": {"friction": (Coulomb(0.1), Viscous(0.05))},
-    "coulomb": {"friction": Coulomb(0.1)},
-    "lugre": {"friction": LuGre(coulomb=0.05, static=0.1, stribeck=0.05)},
+    "friction": _rubbing(lambda level: (Coulomb(level), Viscous(0.5 * level))),
+    "coulomb": _rubbing(Coulomb),
+    "lugre": _rubbing(lambda level: LuGre(0.5 * level, level, stribeck=0.05)),
     "lag_20ms": {"actuator": Lag(0.02)},
     "dc_motor": {"actuator": DCMotor()},
     "stepper": _stepper,

@@ -947,9 +947,16 @@ def _generalised_disturbance(data, channel):
 
 @njit(error_model="numpy", inline="always")
 def _evaluate_friction(address, sim, i):
-    """Write the friction by a formula of channel i into the record. Return 1 if it raised, or 0."""
+    """Write the friction by a formula of channel i into the record: 0 without one. Return 1 if it
+    raised, or 0.
+    """
     sim.seen.i = i
     function = function_at(sim.frictions, i)
+    if function.address == 0:
+        sim.friction_output.f = 0.0
+        sim.friction_output.low = 0.0
+        sim.friction_output.high = 0.0
+        return 0
     at = record.AT
     return _call(function, 0, address + at.friction_input, address + at.friction_output)
 
@@ -961,6 +968,8 @@ def _apply_friction(address, sim, data):
     outputs = sim.friction_output
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
+        if channel.friction_ctrl < 0:
+            continue
         state = state_at(sim.states, i)
         x = data.qpos[channel.qpos]
         v = data.qvel[channel.qvel]

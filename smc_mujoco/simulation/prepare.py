@@ -28,6 +28,7 @@ from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
@@ -148,8 +149,8 @@ def _compile(s: Resolved) -> None:
         cfunctions.compile_nominal(s.plant)
     for signal in signals:
         cfunctions.compile_signal(signal)
-    if s.formula_friction:
-        cfunctions.compile_friction(s.formula_friction)
+    for formula in s.formula_frictions:
+        cfunctions.compile_friction(formula)
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -485,22 +486,26 @@ def _native_nominal(s: Resolved) -> Native | None:
 
 
 def _frictions(prepared: Prepared, buffer: Functions) -> list[dict[str, int]]:
-    """Return the FUNCTIONs of a friction by a formula, one for each joint.
+    """Return the FUNCTIONs of frictions by a formula, one for each channel: all 0 without one.
 
     Their numbers go into the buffer.
     """
-    if (friction := prepared.scenario.formula_friction) is None:
+    s = prepared.scenario
+    if not s.formula_frictions:
         return []
-    compiled = buffer.friction(friction)
+    names = joint_names(s.plant)
+    functions: list[dict[str, int]] = []
+    for _ in names:
+        functions.append({"address": 0, "parameters": 0, "memory": 0})
     shared = prepared.mechanism
-    inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
-    functions = []
-    for i, a in enumerate(inertia):
-        functions.append(
-            {
+    inertia = with_values(shared.model, s).dof_M0[shared.channels["qvel"]]
+    for friction in s.formula_frictions:
+        compiled = buffer.friction(friction)
+        for place, joint in enumerate(friction.joint_names(s.plant)):
+            i = names.index(joint)
+            functions[i] = {
                 "address": compiled.address,
-                "parameters": buffer.put(friction.parameters(i)),
-                "memory": buffer.put(friction.bristle(i, a)),
+                "parameters": buffer.put(friction.parameters(place)),
+                "memory": buffer.put(friction.bristle(i, inertia[i])),
             }
-        )
     return functions

@@ -41,7 +41,6 @@ from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
     Friction,
     NominalDrive,
-    joint_inertia,
     joint_names,
     moves_alone,
 )
@@ -156,8 +155,10 @@ class Scenario:
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
         also behind a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
-      friction: on every joint, in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or
-        several of them.
+      friction: in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of
+        them, on the joints that an actuator drives, with their numbers in the unit of each. By
+        name, {"slide": Coulomb(0.1), "hinge": Viscous(1e-4)}, any joint has its own, and "*" is all
+        of them.
       contact: what the mechanism touches: a Contact that the plant offers, the kind of one, or
         "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
@@ -250,7 +251,7 @@ class Scenario:
             jump: Jump | None = None,
             seed: int = 0,
             integrator: str | None = None,
-            friction: Friction | Sequence[Friction] | None = None,
+            friction: coerce.Frictions | None = None,
             contact: Contact | str | None = None,
             mechanism: str = "equation",
             actuator: Actuator | Sequence[Actuator] | None = None,
@@ -370,7 +371,7 @@ class Scenario:
         dry = [part for part in self.friction if not isinstance(part, Viscous)]
         if not (dry or self.plant.rubs) or self.integrator not in (None, "RK4"):
             return False
-        by_formula = dry == [self.formula_friction] and not self.plant.rubs
+        by_formula = self.formula_frictions == tuple(dry) and not self.plant.rubs
         if not by_formula and not all(isinstance(part, Coulomb) for part in dry):
             return False
         if self.contact.kind != "none" or self.mechanism != "equation":
@@ -378,7 +379,7 @@ class Scenario:
         if any(isinstance(d, Push) for d in self.disturbance):
             return False
         for part in self.actuator:
-            even = isinstance(part, DCMotor) and part.even and self.formula_friction is not None
+            even = isinstance(part, DCMotor) and part.even and bool(self.formula_frictions)
             if not (part.in_callback or even):
                 return False
         return moves_alone(self.plant)
@@ -470,9 +471,9 @@ class Scenario:
         return math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
-    def formula_friction(self) -> Sliding | None:
-        """The friction by a formula, which the callback evaluates; None without one."""
-        return next((part for part in self.friction if isinstance(part, Sliding)), None)
+    def formula_frictions(self) -> tuple[Sliding, ...]:
+        """The frictions by a formula, which the callback evaluates; at most one on a joint."""
+        return tuple(part for part in self.friction if isinstance(part, Sliding))
 
     @property
     def torque(self) -> Torque:
@@ -946,7 +947,8 @@ def _doubts(s: Resolved) -> Iterator[str]:
         if isinstance(part, LuGre) and part.stiffness > LuGre.stiffness:
             damping = part.damping
             if damping is None:
-                damping = part.default_damping(joint_inertia(s.plant).min())
+                model = compiled(s.plant.spec())
+                damping = part.default_damping(model.dof_M0[part.dofs(model)].min())
             if part.stiffness * s.physics_step > MAX_LATENESS * damping:
                 yield (
                     f"LuGre's bristles of stiffness {part.stiffness:g} and damping {damping:.3g} "

@@ -16,9 +16,10 @@ from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.coerce import EVERY
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Clock, Jump, Noise, PerChannel, Signal
 
@@ -133,6 +134,8 @@ def _restored(data: Any) -> Any:
             values[name] = tuple(value)
         else:
             values[name] = value
+    if issubclass(kind, Friction) and "on" not in values:  # of an older version: on all joints
+        values["on"] = () if values.pop("driven", False) else (EVERY,)
     return kind(**values)
 
 

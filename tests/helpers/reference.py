@@ -6,6 +6,7 @@ microseconds.
 """
 
 import math
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import mujoco
@@ -16,6 +17,7 @@ from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled, torque
 from smc_mujoco.mechanisms.hardware.friction import dry_step
+from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
@@ -105,11 +107,17 @@ class Loop:
         # the mean force in a step of RK4, and its rise to the last stage
         self.middle, self.rise = np.zeros((2, n))
         inertia = self.model.dof_M0[self.channels["qvel"]]
-        formula = self.scenario.formula_friction
-        if formula is not None:
+        names = joint_names(scenario.plant)
+        self.formulas: list[Sliding | None] = [None] * n
+        self.bristles = [(0.0, 0.0)] * n
+        self.numbers: list[tuple] = [()] * n
+        for formula in self.scenario.formula_frictions:
             record = jit.named(formula.names)
-            self.bristles = [formula.bristle(i, inertia[i]) for i in range(n)]
-            self.numbers = [record(*(formula.parameters(i) or [0.0])) for i in range(n)]
+            for place, joint in enumerate(formula.joint_names(scenario.plant)):
+                i = names.index(joint)
+                self.formulas[i] = formula
+                self.bristles[i] = formula.bristle(i, inertia[i])
+                self.numbers[i] = record(*(formula.parameters(place) or [0.0]))
         self.stuck_at = [math.nan] * n  # positions of joints that stick, or NaN
         self.speed = [0.0] * n  # at the step before
         # of dry friction, see `apply_exact_friction`: None while a formula gives it at every stage
@@ -155,8 +163,8 @@ class Loop:
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.d = self.apply_disturbances(data, t)
-            if self.scenario.formula_friction and not self.scenario.exact_friction:
-                self.apply_friction(data, d, self.scenario.formula_friction)
+            if self.scenario.formula_frictions and not self.scenario.exact_friction:
+                self.apply_friction(data, d)
             if stage == 0 and within == 0:
                 x = data.qpos[self.channels["qpos"]]
                 v = data.qvel[self.channels["qvel"]]
@@ -378,12 +386,20 @@ class Loop:
         for body, push in zip(bodies, pushes, strict=True):
             data.xfrc_applied[body, :3] += evaluate(push, t)[0] * np.array([push.x, push.y, push.z])
 
-    def apply_friction(self, data: mujoco.MjData, d: np.ndarray, formula: Sliding) -> None:
+    def evaluate(self, i: int, v: float, motor: float, load: float) -> Sequence[float]:
+        """Return the friction by a formula of joint i and its bounds at rest, 0 without one."""
+        if (formula := self.formulas[i]) is None:
+            return 0.0, 0.0, 0.0
+        return evaluate_friction(formula, self.numbers[i], v, motor, load)
+
+    def apply_friction(self, data: mujoco.MjData, d: np.ndarray) -> None:
         """Give the joints their friction by a formula for a physics step; d are the disturbances,
         (n,).
         """
         at = self.channels
         for i, dof in enumerate(at["qvel"]):
+            if self.formulas[i] is None:
+                continue
             x = float(data.qpos[at["qpos"][i]])
             v = float(data.qvel[dof])
             if self.has_drive[i]:
@@ -392,7 +408,7 @@ class Loop:
                 motor = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             load += float(data.qfrc_constraint[dof] + d[i])
-            friction, low, high = evaluate_friction(formula, self.numbers[i], v, motor, load)
+            friction, low, high = self.evaluate(i, v, motor, load)
             stuck = not math.isnan(self.stuck_at[i])
             before = self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
@@ -415,7 +431,6 @@ class Loop:
         the step; d are the disturbances, (n,).
         """
         at = self.channels
-        formula = self.scenario.formula_friction
         for i, dof in enumerate(at["qvel"]):
             v = float(data.qvel[dof])
             if self.driven[i]:
@@ -432,7 +447,7 @@ class Loop:
                 self.rubbing[i] = self.begin_friction(data, i, smooth, drive, load)
             moments = self.rubbing[i]
             if moments is None:
-                force = -evaluate_friction(formula, self.numbers[i], v, drive, load)[0]
+                force = -self.evaluate(i, v, drive, load)[0]
             else:
                 mean, rise, smooth, holding, low, high = moments
                 force = min(max(mean - holding * (others + drive - smooth), low), high)
@@ -446,20 +461,19 @@ class Loop:
         """Return the moments of a joint's dry friction in a step, and its bounds; None if its
         formula acts at every stage.
         """
-        formula = self.scenario.formula_friction
         dof = self.channels["qvel"][i]
         h = self.scenario.physics_step
         mobility = float(data.qLDiagInv[dof])
         v = float(data.qvel[dof])
-        if formula is None:
+        if not self.scenario.formula_frictions:
             high = float(self.model.dof_frictionloss[dof])
             low = -high
             sliding = -math.copysign(high, v)
             starting = -math.copysign(high, smooth)
         else:
 
-            def force(v: float) -> list[float]:
-                return evaluate_friction(formula, self.numbers[i], v, drive, load)
+            def force(v: float) -> Sequence[float]:
+                return self.evaluate(i, v, drive, load)
 
             f, low, high = force(v)
             slow = abs(v) < STICKING_SPEED and (self.stuck[i] or abs(v) <= abs(self.speed[i]))

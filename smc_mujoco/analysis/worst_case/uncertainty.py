@@ -70,8 +70,8 @@ class Uncertainty:
       mass: lowest and highest factor on the plant's mass.
       parameters: name -> lowest and highest factor on other parameters of the plant, or what is
         added to one of `plant.added`: {"payload": (0.0, 2.0)}.
-      friction: lowest and highest dry friction, N or N m, beside the scenario's own;
-        `friction_scale` leaves it out.
+      friction: lowest and highest dry friction of the driven joints, N or N m, beside the
+        scenario's own; `friction_scale` leaves it out.
       friction_scale: lowest and highest factor on the friction of the scenario and on the dry
         friction of its plant.
       encoder: lowest and highest counts of a position encoder, see `smc.Encoder`; equal ratios are
@@ -563,9 +563,10 @@ def _with_start(scenario: Scenario, share: float, i: int) -> Scenario:
 
 
 def with_friction(scenario: Scenario, level: float) -> Scenario:
-    """Return the scenario with `level` added to its dry friction, N or N m."""
-    others = tuple(part for part in scenario.friction if not isinstance(part, Coulomb))
-    before = sum(part.level for part in scenario.friction if isinstance(part, Coulomb))
+    """Return the scenario with `level` added to the dry friction of driven joints, N or N m."""
+    plain = [part for part in scenario.friction if isinstance(part, Coulomb) and not part.on]
+    others = [part for part in scenario.friction if part not in plain]
+    before = sum(part.level for part in plain)
     return dataclasses.replace(scenario, friction=(*others, Coulomb(before + level)))
 
 

@@ -1,4 +1,4 @@
-"""Friction on every channel's joint: viscous, Coulomb, and LuGre, which sticks without creep.
+"""Friction in joints: viscous, Coulomb, and LuGre, which sticks without creep.
 
 MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor`
 actuator. Under RK4 the callback simulates dry friction on joints that move alone, see `dry_step`.
@@ -6,12 +6,11 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 
 import dataclasses
 import math
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Boolean
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
@@ -20,11 +19,6 @@ from smc_mujoco.mechanisms.hardware.part import (
     Friction,
     Natural,
     Positive,
-    dof_ids,
-    drive_ids,
-    drives,
-    joint_ids,
-    joints,
 )
 from smc_mujoco.mechanisms.plant import Field
 
@@ -47,7 +41,7 @@ class Viscous(Friction):
     b: Natural
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        yield Field("dof_damping", dof_ids(model), self.b, adds=True)
+        yield Field("dof_damping", self.dofs(model), self.b, adds=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +68,7 @@ class Coulomb(Friction):
     level: Natural
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        dofs = dof_ids(model)
+        dofs = self.dofs(model)
         yield Field("dof_frictionloss", dofs, self.level, adds=True)
         yield Field("dof_solref", dofs, HARD_SOLREF)
         yield Field("dof_solimp", dofs, HARD_SOLIMP)
@@ -158,8 +152,6 @@ class LuGre(Friction):
         for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast counts
         damping h as inertia, 0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles
         oscillate too long.
-      driven: whether only joints with an actuator have it, such as the arm that a cable with
-        hysteresis bends.
     """
 
     bristles = True
@@ -170,7 +162,6 @@ class LuGre(Friction):
     stribeck: Positive
     stiffness: Positive = 1e3
     damping: Natural | None = None
-    driven: Boolean = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -184,11 +175,8 @@ class LuGre(Friction):
         """Return the damping of bristles on joints of these inertias, kg m^2 (kg)."""
         return RELATIVE_DAMPING * np.sqrt(self.stiffness * inertia)
 
-    def structure(self) -> Hashable:
-        return type(self), self.driven
-
     def edit(self, spec: mujoco.MjSpec) -> None:
-        for joint in joints(spec)[: len(drives(spec)) if self.driven else None]:
+        for joint in self.joints(spec):
             name = PASSIVE + joint.name
             on_joint = mujoco.mjtTrn.mjTRN_JOINT
             spec.add_actuator(name=name, target=joint.name, trntype=on_joint).set_to_dcmotor(
@@ -205,12 +193,12 @@ class LuGre(Friction):
             )
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        count = len(drive_ids(model)) if self.driven else None
+        dofs = self.dofs(model)
         bristles = []
-        for joint in joint_ids(model)[:count]:
-            bristles.append(model.actuator(PASSIVE + model.joint(joint).name).id)
+        for joint in model.dof_jntid[dofs]:
+            bristles.append(model.actuator(PASSIVE + model.joint(int(joint)).name).id)
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
-        damping = self.default_damping(model.dof_M0[dof_ids(model)[:count]])
+        damping = self.default_damping(model.dof_M0[dofs])
         yield Field(
             "actuator_dynprm",
             (bristles, DAMPING),

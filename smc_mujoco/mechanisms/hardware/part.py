@@ -20,6 +20,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Number, constrain
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.text import stated
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 PASSIVE = "passive:"
@@ -67,12 +68,52 @@ class Part:
 
 @dataclasses.dataclass(frozen=True)
 class Friction(Part):
-    """Base of frictions, which resist a channel's joint beside the plant's own damping."""
+    """Base of frictions, which resist a joint's motion beside the plant's own damping.
+
+    Attributes:
+      on: names of the joints that it acts on, as a scenario's mapping from joints to frictions sets
+        them; without any, the joints that an actuator drives.
+    """
 
     # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most
     # one friction may.
     bristles: ClassVar[bool] = False
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
+
+    on: tuple[str, ...] = dataclasses.field(default=(), kw_only=True)
+
+    def __init_subclass__(cls) -> None:
+        cls.__repr__ = Friction.__repr__  # dataclasses keep it
+
+    def __repr__(self) -> str:
+        words = [f"{name}={value!r}" for name, value in stated(self).items()]
+        return f"{type(self).__name__}({', '.join(words)})"
+
+    def structure(self) -> tuple[Hashable, ...]:
+        return type(self), self.on
+
+    def reach(self, n: int, driven: int) -> int:
+        """Return on how many of n channels it acts without names, the driven ones first."""
+        del n
+        return driven
+
+    def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
+        """Return the joints that it acts on."""
+        if self.on:
+            return [spec.joint(name) for name in self.on]
+        channels = joints(spec)
+        return channels[: self.reach(len(channels), len(drives(spec)))]
+
+    def dofs(self, model: mujoco.MjModel) -> np.ndarray:
+        """Return the degrees of freedom that it acts on."""
+        if self.on:
+            return np.array([model.joint(name).dofadr[0] for name in self.on])
+        channels = dof_ids(model)
+        return channels[: self.reach(len(channels), len(drive_ids(model)))]
+
+    def joint_names(self, plant: Plant) -> tuple[str, ...]:
+        """Return the names of the plant's joints that it acts on."""
+        return self.on or joint_names(plant)[: self.reach(plant.n, plant.driven)]
 
     def scaled(self, factor: float) -> "Friction":
         """Return this friction with a factor on its force."""
@@ -197,10 +238,13 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
 
 
 @functools.lru_cache(maxsize=32)
-def joint_inertia(plant: Plant) -> np.ndarray:
-    """Return the inertia of each channel's joint at the default parameters, (n,) kg m^2 (kg)."""
+def all_joints(plant: Plant) -> tuple[str, ...]:
+    """Return the names of all hinges and slides of a plant, first those of its channels."""
     model = compiled(plant.spec())
-    return model.dof_M0[dof_ids(model)]
+    kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+    found = np.flatnonzero(np.isin(model.jnt_type, kinds))
+    others = [model.joint(int(joint)).name for joint in found]
+    return tuple(filter(None, dict.fromkeys((*joint_names(plant), *others))))
 
 
 @functools.lru_cache(maxsize=32)

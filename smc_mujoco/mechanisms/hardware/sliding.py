@@ -39,14 +39,15 @@ over each physics step.
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Annotated, Any
 
 import mujoco
 
 from smc_mujoco.common.constraints import Each, Number
-from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joints
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.text import counted
+from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joint_names
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
 STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
@@ -54,7 +55,7 @@ STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than 
 BRISTLE_FREQUENCY = 200.0
 MAX_EXPONENT = 700.0  # exp of more overflows
 
-PerJoint = float | Sequence[float]  # one number for all channels, or one for each
+PerJoint = float | Sequence[float]  # one number for all joints, or one for each
 NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETER))]
 PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
 
@@ -63,8 +64,8 @@ PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAM
 class Sliding(Friction):
     """Base of frictions by a formula.
 
-    A class states its numbers as fields. Each is one number for all channels, or a sequence with
-    one for each channel.
+    A class states its numbers as fields. Each is one number for all joints that it acts on, or a
+    sequence with one for each of them. With a number for each channel, it acts on all of them.
     """
 
     bristles = True  # of joints that do not move alone
@@ -72,7 +73,18 @@ class Sliding(Friction):
     @property
     def names(self) -> tuple[str, ...]:
         """The fields, which the formula reads as p."""
-        return tuple(field.name for field in dataclasses.fields(self))
+        return tuple(field.name for field in dataclasses.fields(self) if field.name != "on")
+
+    def _lengths(self) -> frozenset[int]:
+        """Return the lengths of the fields that are sequences."""
+        values = [getattr(self, name) for name in self.names]
+        return frozenset(len(value) for value in values if isinstance(value, tuple))
+
+    def reach(self, n: int, driven: int) -> int:
+        return n if n in self._lengths() else driven
+
+    def structure(self) -> tuple[Hashable, ...]:
+        return (*super().structure(), self._lengths())
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
@@ -86,18 +98,24 @@ class Sliding(Friction):
         raise NotImplementedError
 
     def check(self, plant: Plant) -> None:
-        """Raise ScenarioError if a field is a sequence and does not have one number for each
-        channel of the plant.
+        """Raise ScenarioError if it acts on a joint that is no channel of the plant, or a field is
+        a sequence and does not have one number for each joint.
         """
+        joints = self.joint_names(plant)
+        for joint in joints:
+            if joint not in (known := joint_names(plant)):
+                raise unknown(f"joint of {type(self).__name__} on {plant.name}", joint, known)
         for name in self.names:
             value = getattr(self, name)
-            if isinstance(value, tuple) and len(value) != plant.n:
-                what = f"{type(self).__name__}'s {name} is {shown(value)}"
-                cure = f"give one number, or {plant.n}"
-                raise ScenarioError(f"{what}, and {plant.name} has {plant.n} channels: {cure}")
+            if isinstance(value, tuple) and len(value) != len(joints):
+                raise ScenarioError(
+                    f"{type(self).__name__}'s {name} is {shown(value)}, and acts on "
+                    f"{counted(len(joints), 'joint')} of {plant.name}: give one number, or "
+                    f"{len(joints)}"
+                )
 
     def parameters(self, i: int) -> tuple[float, ...]:
-        """Return the numbers of channel i that `value` reads as p; NaN for None."""
+        """Return the numbers of its joint i that `value` reads as p; NaN for None."""
         return tuple(
             math.nan if (x := _of(getattr(self, name), i)) is None else x for name in self.names
         )
@@ -117,7 +135,7 @@ class Sliding(Friction):
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        for joint in joints(spec):
+        for joint in self.joints(spec):
             brake = spec.add_actuator(
                 name=PASSIVE + joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
             )
@@ -125,7 +143,7 @@ class Sliding(Friction):
 
 
 def _of(value: Any, i: int) -> Any:
-    """Return the value of channel i, from one value for all or a tuple with one for each."""
+    """Return the value of joint i, from one value for all or a tuple with one for each."""
     return value[i] if isinstance(value, tuple) else value
 
 

@@ -283,7 +283,12 @@ def scenarios():
         friction=Curious(a=(0.5, 0.01)),
         **common,
     )
+    # two formulas, each on joints of its own
+    by_joint = {"joint2": Curious(), "joint5": frictions[1], "joint6": frictions[1]}
+    yield smc.Scenario(plant="panda", law="computed_torque_sliding", friction=by_joint, **common)
     servo = smc.hardware.servo("mx64", "m5", command="voltage")
+    by_joint = {"p0/hinge": Curious(), "p3/hinge": servo.friction}
+    yield smc.Scenario(plant="pendulum_network", law="classical", friction=by_joint, **common)
     gust = {
         "disturbance": smc.signals.Gust(2.0, time=0.05, width=0.1),
         "duration": 0.2,

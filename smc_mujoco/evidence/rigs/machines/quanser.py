@@ -66,9 +66,7 @@ def rotary(q):
         "x0": (0.0, 0.1),
     }
     if level := getattr(q, "cable_friction", 0.0):  # the cable's bristles, without a Stribeck drop
-        fields["friction"] = LuGre(
-            level, level, 1.0, q.cable_stiffness, BRISTLE_DAMPING, driven=True
-        )
+        fields["friction"] = LuGre(level, level, 1.0, q.cable_stiffness, BRISTLE_DAMPING)
     return fields
 
 
