@@ -25,13 +25,12 @@ import numpy as np
 from smc_mujoco.common import guard, libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import no_room, scratch
-from smc_mujoco.mechanisms.custom import mjcf_trial
+from smc_mujoco.mechanisms.custom import mjcf_trial, urdf
 from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
-UNSEEN_GROUP = 3  # of geoms: pictures show groups 0 to 2
 DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
@@ -40,6 +39,12 @@ RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
 RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
+CURES = {  # words of MuJoCo's message on a file -> what to do
+    "Error opening file": "put that file there",
+    "ASCII": "save that file as a binary STL",
+    "mass and inertia": "give that body a mass and an inertia (<inertial>)",
+    "positive eigenvalues": "give that body three moments of inertia above 0",
+}
 
 _passed: set[str] = set()  # hashes of models that passed
 _known: dict[str, Path] = {}  # hash of a file that this process has read -> where it was
@@ -75,8 +80,8 @@ class Source:
                 spec = mujoco.MjSpec.from_string(
                     self.text, include=included or None, assets=dict(self.assets)
                 )
-            elif self.path.lower().endswith(".urdf"):
-                spec = _of_urdf(Path(self.path))
+            elif made := urdf.read(Path(self.path)):
+                spec = made.spec()
             else:
                 spec = mujoco.MjSpec.from_file(self.path)
         except ValueError as error:
@@ -105,35 +110,6 @@ class Source:
 
 def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return spec.compile()
-
-
-def _of_urdf(path: Path) -> mujoco.MjSpec:
-    """Return a URDF with its visual shapes, which MuJoCo leaves out; they replace the others in
-    pictures.
-    """
-    elements = _elements(path)
-    if not elements or elements[0].tag != "robot":
-        return mujoco.MjSpec.from_file(str(path))
-    robot = elements[0]
-    own = robot.find("mujoco")
-    if own is None:
-        own = ET.SubElement(robot, "mujoco")
-    compiler = own.find("compiler")
-    if compiler is None:
-        compiler = ET.SubElement(own, "compiler")
-    compiler.attrib = {"discardvisual": "false"} | compiler.attrib
-    compiler.set("meshdir", str(path.parent / compiler.get("meshdir", "")))
-    spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
-    for body in spec.bodies:
-        if any(_only_seen(geom) for geom in body.geoms):
-            for geom in body.geoms:
-                if not _only_seen(geom):
-                    geom.group = UNSEEN_GROUP
-    return spec
-
-
-def _only_seen(geom: mujoco.MjsGeom) -> bool:
-    return not geom.contype and not geom.conaffinity
 
 
 def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> Source:
@@ -291,8 +267,14 @@ def compile_isolated(source: Source, timeout: float) -> None:
         copies = {name: str(folder / str(i)) for i, (name, _) in enumerate(source.assets)}
         for name, content in source.assets:
             Path(copies[name]).write_bytes(content)
-        (folder / "text").write_text(source.text, encoding="utf-8", errors="surrogatepass")
-        order = {"path": source.path, "text": str(folder / "text"), "assets": copies}
+        path = source.path
+        text = source.text
+        if path and (made := urdf.read(Path(path))):
+            path = ""
+            text = made.text
+            copies = {name: str(file) for name, file in made.meshes.items()}
+        (folder / "text").write_text(text, encoding="utf-8", errors="surrogatepass")
+        order = {"path": path, "text": str(folder / "text"), "assets": copies}
         order |= {"library": str(libmujoco.path()), "plugins": [*map(str, libmujoco.plugins())]}
         try:
             guard.run_isolated(mjcf_trial.__name__, order, timeout)
@@ -329,7 +311,11 @@ def _complaint(source: Source, failed: guard.Failed, timeout: float) -> Scenario
 
 def broken(where: str, error: str) -> ScenarioError:
     """Return the error for MuJoCo's message about a model."""
-    return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): fix the file")
+    cure = next((CURES[words] for words in CURES if words in error), "fix the file")
+    for file in sorted(Path(where).parent.glob("*.xml")):
+        if any(part.get("file") == Path(where).name for part in _elements(file)):
+            cure = f"give {file.name}, which includes it"
+    return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): {cure}")
 
 
 def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
@@ -350,6 +336,8 @@ def digest(path: Path) -> str:
 
     If a name fits files in several folders, all of them are hashed.
     """
+    if made := urdf.read(path):
+        return _sha256(file.read_bytes() for file in (path, *made.meshes.values()))
     texts = [path]
     files = {path.resolve(): None}
     names = []

@@ -21,6 +21,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -30,7 +31,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
 from smc_mujoco.mechanisms.custom import channels as own
-from smc_mujoco.mechanisms.custom import mjcf
+from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
@@ -204,7 +205,9 @@ def plant_from(
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     made = _plant(source, own.coerce(channels), name, keyframe, tip)
-    for sentence in soft(source.label, source.compiled(source.read()), keyframe):
+    read = urdf.read(Path(source.path))
+    changed = read.notes(source.label) if read else ()
+    for sentence in (*changed, *soft(source.label, source.compiled(source.read()), keyframe)):
         warnings.warn(sentence, ScenarioWarning, users_stacklevel())
     return made
 

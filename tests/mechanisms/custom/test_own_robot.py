@@ -3,6 +3,7 @@ of a URDF.
 """
 
 import re
+import struct
 import warnings
 
 import mujoco
@@ -80,3 +81,118 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
     assert sorted(model.geom_group.tolist()) == [1, 1, 3]
     np.testing.assert_array_equal(model.body_mass, plain.body_mass)
     np.testing.assert_array_equal(model.body_inertia, plain.body_inertia)
+
+
+def tetrahedron(size):
+    """The bytes of a binary STL."""
+    corners = size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    content = b"\0" * 80 + struct.pack("<I", 4)
+    for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)):
+        content += struct.pack("<12fH", 0, 0, 0, *corners[list(face)].ravel(), 0)
+    return content
+
+
+MESH = '<{0}><geometry><mesh filename="{1}"/></geometry></{0}>'
+MESHES = {  # name in the URDF -> where the file lies, below the folder above the package
+    "package://arm_description/meshes/link.stl": "arm_description/meshes/link.stl",
+    "package://other/link.STL": "other/link.STL",
+    "../meshes/link.stl": "arm_description/meshes/link.stl",
+    "link.stl": "arm_description/urdf/link.stl",
+    "package://away/meshes/link.stl": "arm_description/urdf/link.stl",
+}
+
+
+def in_package(tmp_path, old="", new="", visual="", collision=""):
+    """The URDF above in a package, with two shapes on its last link and one text replaced."""
+    text = ARM.replace(old, new, 1) if old else ARM
+    shapes = MESH.format("visual", visual) * bool(visual)
+    shapes += MESH.format("collision", collision) * bool(collision)
+    file = tmp_path / "arm_description" / "urdf" / "arm.urdf"
+    file.parent.mkdir(parents=True)
+    before, after = text.rsplit("</link>", 1)
+    file.write_text(f"{before}{shapes}</link>{after}")
+    return file
+
+
+def read(file):
+    """The model of a plant, and what was said of the file."""
+    with warnings.catch_warnings(record=True) as reported:
+        warnings.simplefilter("always")
+        plant = smc.plant_from(file, {"j1": {"motor": True}, "j2": {"motor": True}})
+    sentences = [str(warning.message) for warning in reported]
+    return plant.load(), [text for text in sentences if "give way" not in text]
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_is_found_where_its_name_says_and_counts(tmp_path, name):
+    file = in_package(tmp_path, collision=name)
+    file.write_text('\n<?xml version="1.0"?>' + file.read_text())
+    mesh = tmp_path / MESHES[name]
+    mesh.parent.mkdir(parents=True, exist_ok=True)
+    mesh.write_bytes(tetrahedron(0.1))
+    model, said = read(file)
+    assert (model.nmesh, said) == (1, [])
+    plant = smc.plant_from(file, {"j1": {"motor": True}})
+    mesh.write_bytes(tetrahedron(0.2))
+    with pytest.raises(smc.ScenarioError, match=r"has changed: call smc.plant_from again"):
+        plant.spec()
+
+
+def test_files_of_one_name_in_two_folders_are_two_meshes(tmp_path):
+    names = "package://arm_description/seen/link.stl", "package://arm_description/solid/link.stl"
+    file = in_package(tmp_path, visual=names[0], collision=names[1])
+    for folder, size in (("seen", 0.3), ("solid", 0.1)):
+        (tmp_path / "arm_description" / folder).mkdir()
+        mesh = tmp_path / "arm_description" / folder / "link.stl"
+        mesh.write_bytes(tetrahedron(size))
+    model, _ = read(file)
+    solid = model.geom_dataid[(model.geom_contype > 0) & (model.geom_dataid >= 0)]
+    assert np.ptp(model.mesh_vert[model.mesh_vertadr[solid[0]] :][:4], axis=0).max() < 0.2
+
+
+INERTIA = 'ixx="0.01" iyy="0.01" izz="0.001"'
+INERTIAL = re.findall("<inertial>.*?</inertial>", ARM, re.DOTALL)[1]
+CHANGED = {  # what differs from the URDF, and the words of the one sentence on it
+    "dae": ({"visual": "package://a/m.dae", "collision": "no.stl"}, "'package://a/m.dae', 'no.stl'"),
+    "inertia": ({"old": INERTIA, "new": 'ixx="0.01" iyy="0.01" izz="0.05"'}, "gives 'l2'"),
+    "negative": ({"old": INERTIA, "new": 'ixx="-0.01" iyy="0.01" izz="0.01"'}, "gives 'l2'"),
+    "bare": ({"old": INERTIAL, "new": "<collision><geometry><sphere radius='.1'/></geometry></collision>"}, "gives 'l2' no"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CHANGED)
+def test_what_is_changed_in_a_urdf_is_said_once_by_its_link(tmp_path, kind):
+    fields, words = CHANGED[kind]
+    model, said = read(in_package(tmp_path, **fields))
+    (sentence,) = said
+    assert words in sentence
+    small, middle, large = sorted(model.body_inertia[2])
+    assert 0.0 < large <= small + middle
+
+
+@pytest.mark.parametrize("kind", [INERTIA, INERTIAL], ids=["point", "massless"])
+def test_a_link_that_moves_without_inertia_is_refused_by_name_and_the_cure_works(tmp_path, kind):
+    file = in_package(tmp_path, kind, 'ixx="0" iyy="0" izz="0"' * (kind == INERTIA))
+    with pytest.raises(smc.ScenarioError, match=r"'l2'.*give that body a mass and an inertia"):
+        read(file)
+    file.write_text(ARM)
+    assert read(file)[1] == []
+
+
+def test_a_rounded_inertia_is_mended_in_silence_and_keeps_its_axes(tmp_path):
+    model, said = read(in_package(tmp_path, INERTIA, 'ixx="0.001" iyy="0.009" izz="0.0100001"'))
+    assert said == []
+    np.testing.assert_allclose(np.sort(model.body_inertia[2]), [0.001, 0.009, 0.01], rtol=2e-4)
+
+
+def test_a_joint_that_mimics_another_follows_it(tmp_path):
+    file = in_package(tmp_path, '<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="j2" multiplier="-2" offset=".1"/>')  # fmt: skip
+    plant = smc.plant_from(file, {"j2": {"motor": True}})
+    data = mujoco.MjData(model := plant.load())
+    data.joint("j1").qpos, data.joint("j2").qpos = 0.1, 0.0
+    model.opt.gravity[:] = 0.0
+    data.qfrc_applied[model.joint("j2").dofadr] = 2.0
+    mujoco.mj_step(model, data, nstep=int(0.2 / model.opt.timestep))
+    follower, leader = data.joint("j1").qpos[0], data.joint("j2").qpos[0]
+    assert abs(leader) > 0.02
+    assert follower == pytest.approx(0.1 - 2.0 * leader, abs=2e-2)

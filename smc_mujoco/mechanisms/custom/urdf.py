@@ -1,0 +1,148 @@
+"""URDFs as they lie in robots' repositories: with meshes of a package, meshes that MuJoCo cannot
+read or that are missing, impossible inertias, and joints that mimic others.
+"""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+READABLE = (".stl", ".obj", ".msh")
+UNSEEN_GROUP = 3  # of geoms: pictures show groups 0 to 2
+ROUNDED = 1e-3  # share of an inertia, chosen: by less its digits may be wrong
+LEAST = 1e-13  # kg m^2: MuJoCo refuses less
+ENOUGH = 1.0 + 1e-9  # times what an inertia lacks, so that rounding does not undo it
+
+
+class Urdf(NamedTuple):
+    """A URDF that MuJoCo can read."""
+
+    text: str
+    meshes: dict[str, Path]  # name in the text -> file
+    mimics: dict[str, tuple[str, float, float]]  # joint -> the one it follows, offset, multiplier
+    lost: list[str]  # names of meshes without a file that MuJoCo can read
+    raised: list[str]  # links with an inertia that no body has
+
+    def spec(self) -> mujoco.MjSpec:
+        """Return it with its visual shapes, which replace the others in pictures."""
+        assets = {name: file.read_bytes() for name, file in self.meshes.items()}
+        spec = mujoco.MjSpec.from_string(self.text, assets=assets)
+        for body in spec.bodies:
+            if not all(geom.contype for geom in body.geoms):
+                for geom in body.geoms:
+                    if geom.contype:
+                        geom.group = UNSEEN_GROUP
+        there = {joint.name for joint in spec.joints}
+        for joint, (leader, offset, multiplier) in self.mimics.items():
+            if {joint, leader} <= there:
+                gear = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joint, name2=leader)
+                gear.data[:5] = offset, multiplier, 0.0, 0.0, 0.0
+        return spec
+
+    def notes(self, label: str) -> list[str]:
+        """Return a sentence on each kind of change to the file."""
+        guessed = []
+        moves = {}
+        for body in self.spec().bodies:
+            moves[body.name] = bool(body.joints) or moves.get(body.parent and body.parent.name)
+            solid = any(geom.contype for geom in body.geoms)
+            if moves[body.name] and solid and not body.explicitinertial:
+                guessed.append(body.name)
+        sentences = {
+            f"{label} is read without its shapes {_listed(self.lost)}, which are missing or none "
+            f"of {', '.join(READABLE)}: put such files there, or do without": self.lost,
+            f"no body has the inertia that {label} gives {_listed(self.raised)}, one moment of "
+            "which exceeds the sum of the others: all three are raised by the difference, so "
+            "correct them": self.raised,
+            f"{label} gives {_listed(guessed)} no <inertial>, and MuJoCo takes that of their "
+            "shapes with the density of water: give one to each": guessed,
+        }
+        return [sentence for sentence, names in sentences.items() if names]
+
+
+def read(file: Path) -> Urdf | None:
+    """Return what a file says in a form that MuJoCo can read, or None where it is no URDF."""
+    try:
+        # with neither namespaces nor their prefixes, as MuJoCo reads it
+        text = file.read_bytes().strip().replace(b"xmlns=", b"ns=")
+        robot = ET.fromstring(re.sub(rb"(</?\w+):", rb"\1_", text))
+        return _mended(robot, file) if robot.tag == "robot" else None
+    except (OSError, ValueError, ET.ParseError):  # MuJoCo says what is wrong
+        return None
+
+
+def _mended(robot: ET.Element, file: Path) -> Urdf:
+    own = robot.find("mujoco")
+    if own is None:
+        own = ET.SubElement(robot, "mujoco")
+    compiler = own.find("compiler")
+    if compiler is None:
+        compiler = ET.SubElement(own, "compiler")
+    folder = file.parent / compiler.attrib.pop("meshdir", "")
+    compiler.attrib = {"discardvisual": "false"} | compiler.attrib | {"strippath": "false"}
+    read = Urdf("", {}, {}, [], [])
+    stems: dict[str, Path] = {}
+    for link in robot.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            name = mesh.get("filename", "")
+            found = _found(name, folder, file.parent)
+            if found is None:
+                link.remove(shape)
+                read.lost.append(name)
+                continue
+            stem = found.stem  # MuJoCo takes files with the same one for one mesh
+            while stems.setdefault(stem, found) != found:
+                stem += "_"
+            mesh.set("filename", stem + found.suffix.lower())
+            read.meshes[mesh.get("filename", "")] = found
+        inertia = link.find("inertial/inertia")
+        if inertia is not None and _raised(inertia):
+            read.raised.append(link.get("name", ""))
+    for joint in robot.iter("joint"):
+        leader = joint.find("mimic")
+        if leader is not None:
+            numbers = float(leader.get("offset", 0.0)), float(leader.get("multiplier", 1.0))
+            read.mimics[joint.get("name", "")] = leader.get("joint", ""), *numbers
+    return read._replace(text=ET.tostring(robot, encoding="unicode"))
+
+
+def _found(name: str, meshdir: Path, folder: Path) -> Path | None:
+    """Return the file that a mesh's name means, if MuJoCo can read it. A package is a folder above
+    the URDF, or beside one above.
+    """
+    _, package, rest = name.rpartition("://")
+    places = [meshdir / rest, meshdir / Path(rest).name, folder / rest]
+    for above in (folder, *folder.parents) if package else ():
+        places += [above / rest, above / rest.partition("/")[2]]
+    for place in places:
+        if place.suffix.lower() in READABLE and place.is_file():
+            return place.resolve()
+    return None
+
+
+def _raised(inertia: ET.Element) -> bool:
+    """Raise an inertia that no body has by what it lacks. Return whether that is more than
+    rounding.
+    """
+    axes = ("xx", "xy", "xz", "yy", "yz", "zz")
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(f"i{axis}", 0.0)) for axis in axes)
+    small, middle, large = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    lacking = max(large - middle - small, LEAST - small) + (ENOUGH - 1.0) * large
+    if large > 0.0 and lacking > 0.0:  # where all are 0, MuJoCo says what is wrong
+        for key, moment in {"ixx": xx, "iyy": yy, "izz": zz}.items():
+            inertia.set(key, repr(float(moment + lacking)))
+    return bool(large > 0.0 and large - middle - small > ROUNDED * large)
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Return the first three names, and how many more there are."""
+    names = list(dict.fromkeys(names))
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(map(repr, names[:3])) + more
