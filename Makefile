@@ -12,7 +12,7 @@ LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-h
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
 
-promised: check test docs lowest ## all that a change must pass; the workflows run the same targets, each in a job
+promised: check test docs lowest demo ## all that a change must pass; the workflows run the same targets, each in a job
 
 demo: setup ## the inverted pendulum under the paper's four laws: scores, traces, a figure, a film
 	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
@@ -59,8 +59,7 @@ lowest: ## the quick tests under the oldest versions that pyproject.toml allows,
 	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all]" --group test
 	.cache/lowest/bin/python -m pytest --quick
 
-entered: setup ## the one entry that differs from the commit BASE, in a suite
-	@git fetch --quiet --depth=1 origin "$$BASE"
+entered: setup ## the one entry that the last commit or merge brings, in a suite
 	$(BIN)/python .github/entered.py
 
 tagged: ## whether TAG, such as v0.1.0, is the tag of this version

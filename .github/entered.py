@@ -1,6 +1,5 @@
-"""Run the one entry that a pull request changes: `BASE=COMMIT make entered`, for the workflow."""
+"""Run the one entry that a pull request changes: `make entered`, for the workflow."""
 
-import os
 import re
 import shutil
 import subprocess
@@ -10,11 +9,13 @@ from pathlib import Path
 FOLDER = re.compile(r"entries/[a-z][a-z0-9_]{0,40}")
 
 
-def changed(base: str) -> str:
-    """Return the one folder of entries that differs from a commit, if nothing else does."""
-    if not re.fullmatch(r"[0-9a-f]{40}", base):
-        sys.exit(f"BASE is {base!r}: give a commit of 40 hex digits")
-    command = ["git", "diff", "--name-only", "-z", base, "HEAD"]
+def changed() -> str:
+    """Return the one folder of entries that the last commit brings, if it brings nothing else.
+
+    In a workflow that is the merge of the pull request into main, as main stands by then. Its first
+    parent is main.
+    """
+    command = ["git", "diff", "--name-only", "-z", "HEAD^1", "HEAD"]
     paths = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split("\0")
     folders = {"/".join(path.split("/")[:2]) for path in paths if path}
     if len(folders) != 1 or not FOLDER.fullmatch(*folders):
@@ -28,7 +29,7 @@ def changed(base: str) -> str:
 def main() -> None:
     """Run it, and pack its result."""
     program = str(Path(sys.executable).with_name("smc-mujoco"))
-    folder = changed(os.environ.pop("BASE", ""))
+    folder = changed()
     code = subprocess.run(
         [program, "enter", folder, "--results", "results"], check=False
     ).returncode
