@@ -345,12 +345,7 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
         if group.driven:
             driven.append(group)
     T = scenario.duration
-    # a free body may rest anywhere
-    if scenario.plant.pose:
-        rest = scenario.plant.rest
-    else:
-        rest = np.zeros(scenario.plant.n)
-    off = np.abs(np.subtract(scenario.resolved.x0, rest))
+    off = np.abs(np.subtract(scenario.resolved.x0, scenario.plant.origin))
     start = max((float(off[i]) for group in driven for i in group.channels), default=0.0)  # X0
     least = eps * start
     seen = max(least, *(resolution(scenario, group) for group in driven))

@@ -4,6 +4,7 @@ as_plant("duffing")
 as_plant("arm.xml:shoulder,elbow")
 as_plant("cart.urdf:slider(motor,partner=pole,u_max=20,x0=0.5)")
 as_plant("drone.xml:body@hover")
+as_plant("robot.xml:knee(motor)@home+held")
 """
 
 import dataclasses
@@ -55,8 +56,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
 
     A comma or a plus sign is between the joints: plants are separated by commas on the command
     line. Fields of a `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2). The law of
-    a channel and its reference are those of the scenario. The keyframe of the start is last, after
-    @.
+    a channel and its reference are those of the scenario. The keyframe of the start follows after
+    @. What other joints do is last, as +held.
     """
     if not (model := MODEL.fullmatch(text)):
         if set(text) & set(":./\\"):
@@ -66,8 +67,12 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
                 "give FILE.xml:joint"
             )
         return plant(text, **values)
+    from smc_mujoco.mechanisms.custom.others import OTHERS
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 
+    rest, _, others = text.rpartition("+")
+    if others.strip() in OTHERS:
+        return from_text(rest, folder, **{"others": others.strip()} | values)
     path = model["path"]
     joints = list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
     channels = dict(map(_channel, joints))

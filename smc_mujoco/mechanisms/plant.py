@@ -269,14 +269,13 @@ class Plant:
         return getattr(self.build, "argument", self.name)
 
     @property
-    def unscaled(self) -> str:
-        """Why tuning cannot derive its scales from the plant, or ""."""
-        if self.mixed and not self.pose:
-            return "its channels have two units: choose a plant whose channels have one"
-        return (
-            f"it has no nominal model, which tuning takes its scales from: {self.unmodelled}"
-            * bool(self.unmodelled)
-        )
+    def origin(self) -> tuple[float, ...]:
+        """Positions from which starts are measured, (n,): the default goal of a user's model or of
+        a free body, else 0.
+        """
+        if self.rest and (self.is_user_model or self.pose):
+            return self.rest
+        return (0.0,) * self.n
 
     def spec(self) -> mujoco.MjSpec:
         """Return the mechanism as an editable MjSpec, with default parameters."""

@@ -228,7 +228,7 @@ def suggested_reference(plant: Plant) -> Signal:
     """Return the reference that the plant's channels suggest; a channel that suggests none gets the
     plant's rest.
     """
-    at_rest = [Constant(x) for x in plant.rest] or [REST]
+    at_rest = [Constant(x) for x in plant.rest[: plant.driven]] or [REST]
     suggested = plant.suggested.get("reference", (None,) * len(at_rest))
     signals = []
     for rest, signal in zip(itertools.cycle(at_rest), suggested, strict=False):

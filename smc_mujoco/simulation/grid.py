@@ -7,6 +7,8 @@ conditions the same start. Seed 0 is x0 itself. Seed s starts channel i from
 
     x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
 
+On a user's model x0 counts from the default goal.
+
 A free body may rest anywhere, so that x0 is no scale. It starts at x_i = x0_i + (spread + by) z_i,
 in m and rad, also from seed 0.
 
@@ -65,18 +67,19 @@ class Starts:
     by: float = 0.0
 
     def largest(self, scenario: Scenario) -> float:
-        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0,
-        rad or m.
+        """Return the largest |x| of any channel at the middle of the starts, from the goal of a
+        user's model, or `by` if all are 0, rad or m.
 
         Of a free body it is the largest distance from rest along an axis, m, from which a run may
         start.
         """
-        middle = scenario.resolved.x0 if self.x0 is None else self.x0
         plant = scenario.plant
         if plant.pose:
+            middle = scenario.resolved.x0 if self.x0 is None else self.x0
             far = max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False))
             return far + self.spread + self.by
-        return max(abs(x) for x in middle) or self.by
+        middle = self.place(scenario, 0).resolved.x0
+        return max(abs(x - r) for x, r in zip(middle, plant.origin, strict=True)) or self.by
 
     def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
         """Raise ScenarioError if both the starts and the fields of a condition set x0."""
@@ -89,6 +92,10 @@ class Starts:
         """Return a scenario with a seed, from the start that belongs to the seed."""
         if self.x0 is not None:
             scenario = dataclasses.replace(scenario, x0=self.x0)
+        elif not self.by and _at_goal(scenario):
+            from smc_mujoco.mechanisms.custom.scales import beside_goal
+
+            scenario = dataclasses.replace(scenario, x0=beside_goal(scenario.plant))
         if seed == 0 and not scenario.plant.pose:
             return dataclasses.replace(scenario, seed=0)
         kind = scenario.contact.kind
@@ -96,15 +103,24 @@ class Starts:
         if kind != "none":
             z = [-abs(factor) for factor in z]
         x0 = []
-        for x, factor in zip(scenario.resolved.x0, z, strict=True):
+        for x, r, factor in zip(scenario.resolved.x0, scenario.plant.origin, z, strict=True):
             if scenario.plant.pose:
                 x0.append(x + (self.spread + self.by) * factor)
             else:
-                away = self.by if x >= 0.0 else -self.by
-                x0.append(x * (1.0 + self.spread * factor) + away * factor)
+                away = self.by if x >= r else -self.by
+                x0.append(r + (x - r) * (1.0 + self.spread * factor) + away * factor)
         if kind == "bobs":
             x0.sort()
         return dataclasses.replace(scenario, seed=seed, x0=x0)
+
+
+def _at_goal(scenario: Scenario) -> bool:
+    """Return whether a run of a user's joints starts where it should end, because nobody said
+    where.
+    """
+    plant = scenario.plant
+    joints = plant.is_user_model and not plant.pose
+    return joints and scenario.x0 is None and plant.x0 == plant.origin
 
 
 @constrained
@@ -115,7 +131,8 @@ def starts(
 
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default:
-        the plant's x0.
+        the plant's x0. Where that is the goal of your own model, its driven joints start beside it
+        without `by`: by 0.3 rad (m), or 0.6 of the way to a limit of their range.
       spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more; of a
         free body in m and rad.
       by: a distance that is added to it, rad or m, 0 or more; for a plant that rests at 0.

@@ -132,9 +132,10 @@ class Scenario:
         clock's jitter. Where 1 ms holds, a drive whose force changes within a control period may
         lower it, to a quarter of that period or half of the drive's time constant, whichever is
         longer.
-      u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest
-        motor of your own model. A motor's own limit holds too: see `limits`. If u is a voltage, the
-        bound is in V; its default is the motor's.
+      u_max: bound on |u|, N or N m; may be infinite. Default: 6; of your own model the limit of the
+        strongest motor, or what a joint without a limit needs: twice its load, (60/s^2 M + 8/s D)
+        times its way, and 1.5 times its dry friction. A motor's own limit holds too: see `limits`.
+        If u is a voltage, the bound is in V; its default is the motor's.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the
         plant's x0; v0 = 0.
       reference: r(t), the same for every channel, or one for each driven channel. Default: the
@@ -627,12 +628,11 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """Return what the plant's channels suggest, or the default bound; one number if all channels
     have the same.
     """
-    given = plant.suggested.get("u_max", (None,))
+    given = plant.suggested.get("u_max", (None,) * plant.driven)
     limits = [default_u_max(plant)] * len(given)
     # the bound of one joint's motor is no other's
-    if plant.is_user_model and math.inf in plant.limits:
-        given = plant.suggested.get("u_max", (None,) * plant.driven)
-        limits = [U_MAX if limit == math.inf else limit for limit in plant.limits]
+    if _unbounded(plant):
+        limits = _limits(plant)
     bounds = []
     for limit, bound in zip(limits, given, strict=True):
         bounds.append(limit if bound is None else bound)
@@ -641,9 +641,29 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
 
 def default_u_max(plant: Plant) -> float:
     """Return the bound on |u| where none is given, N or N m: the limit of the plant's strongest
-    motor, else 6.
+    motor, else 6, or what a user's joint needs.
     """
-    return max((limit for limit in plant.limits if limit < math.inf), default=U_MAX)
+    return max(_limits(plant), default=U_MAX)
+
+
+def _limits(plant: Plant) -> list[float]:
+    """Return the limits of the plant's motors; where a user's model has none, what a joint
+    needs.
+    """
+    if not _unbounded(plant):
+        return [limit for limit in plant.limits if limit < math.inf]
+    from smc_mujoco.mechanisms.custom.scales import needs
+
+    limits = plant.limits or (math.inf,) * plant.driven
+    return [
+        n if limit == math.inf else limit for n, limit in zip(needs(plant), limits, strict=True)
+    ]
+
+
+def _unbounded(plant: Plant) -> bool:
+    """Return whether nothing bounds the force on some joint of a user's model."""
+    bounded = plant.limits and math.inf not in plant.limits
+    return plant.is_user_model and not plant.pose and not bounded
 
 
 def check(s: Resolved) -> None:
@@ -1005,5 +1025,5 @@ def _made_up_bound(s: Scenario) -> str:
         example = f"smc.Channel({example}) for each"
     return (
         f"nothing bounds the force on {what} {joints} of {s.plant.name}, so that |u| <= {bounds} "
-        f"is taken: give u_max, what your motor gives, such as {example}"
+        f"is taken, by its load and inertia: give u_max, what your motor gives, such as {example}"
     )

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.studies.worst_case import WorstCase
 
-NOT_TUNED, UNTUNABLE = "not tuned: ", "tuning is not possible here: "  # at the start of a remark
+NOT_TUNED = "not tuned: "  # at the start of a remark
 Laws = Sequence[Component | Template]  # those without given gains are templates
 
 
@@ -102,14 +102,12 @@ def _without_search(plant: Plant, law: Component | Template, gains: str) -> Cand
     library = plants_known().get(plant.name)
     of_library = library is not None and library.parameters == plant.parameters
     ours = of_library and catalogue().get(law.name) is law
-    if ours and not plant.unscaled and gain_sets.in_set(plant, law.name, gains):
+    if ours and gain_sets.in_set(plant, law.name, gains):
         count = 1
         if gains != "study":
             count = len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(gain_sets.law(plant, law.name, gains), sets)
-    if plant.unscaled:
-        return _default(law, f"{UNTUNABLE}{plant.unscaled.partition(':')[0]}")
     return None
 
 

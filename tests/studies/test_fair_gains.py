@@ -8,7 +8,6 @@ import types
 from pathlib import Path
 
 import mujoco
-import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
@@ -129,14 +128,3 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     # also with another seed of the comparison run i has the gains of search i
     for first in (0, 1_000_000):
         assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]
-
-
-def test_a_plant_on_which_no_law_can_be_tuned_is_refused_before_any_search(tmp_path):
-    laws = {"overhead_crane": [smc.law("hierarchical").template, smc.law("pid").template]}
-    crane = trial(tmp_path, [smc.plant("overhead_crane")])
-    with pytest.raises(smc.ScenarioError, match=r"tuning is not possible here: .* defaults=True"):
-        crane.gains(laws, False)
-    assert not list(tmp_path.iterdir())
-    for found in crane.gains(laws, True)["overhead_crane"]:
-        assert found.law.source.kind == "default"
-        assert found.remark.startswith("tuning is not possible here: ")

@@ -153,8 +153,10 @@ class Objective:
             case = self.starts.place(
                 dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_SEARCH * number + i
             )
-            if not any(case.resolved.x0):
-                where = f"starts at 0 under {condition.name!r}, where a law has nothing to do"
+            if case.resolved.x0 == case.plant.origin:
+                where = (
+                    f"starts at its goal under {condition.name!r}, where a law has nothing to do"
+                )
                 raise ScenarioError(f"{case.plant.name} {where}: {START_CURE}")
             cases.append(case)
         return cases
@@ -182,7 +184,12 @@ class Objective:
     def terms_of_sums(
         self, case: Scenario, itae: float, start: float, tv: float
     ) -> tuple[float, float]:
-        """Return the terms of a run with this ITAE, sum |x0| and TV."""
+        """Return the terms of a run with this ITAE, sum |x0| and TV; x0 of a user's model counts
+        from its goal.
+        """
+        if any(case.plant.origin):
+            off = np.subtract(case.resolved.x0, case.plant.origin)
+            start = float(np.abs(off).sum())
         if self.u_max is None:
             bound = float(np.max(case.resolved.u_max))
         else:

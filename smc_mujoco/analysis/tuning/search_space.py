@@ -15,8 +15,10 @@ is an estimate of g. Then k / b is searched as far as a force, for the b of each
 declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
 Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest
-|x0| of all joints, also of free ones, which must have one unit: on a cart with a pole, in m and
-rad, no distance says how far the pole may lean.
+|x0| of all joints, also of free ones, in m and in rad alike.
+
+A user's model has no such g in general. There X is the largest distance from the goal, g is that of
+MuJoCo at the start (see `mechanisms.custom.scales`), and F at most 100 times what the joint needs.
 
 A free body has these scales twice, as its forces and torques differ: of its position, with X the
 largest distance from rest at the start, and of its attitude, with X = 1 rad, since it tilts to move
@@ -106,8 +108,6 @@ def scales(
       reach: X, rad or m; by default max |x0| of the plant.
       per_u: force per unit of u, N m/V or N/V; None: u is an acceleration.
     """
-    if plant.unscaled:
-        raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
     if plant.pose and plant.by_mujoco:
         M = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M
         limits = plant.limits
@@ -115,13 +115,21 @@ def scales(
         of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, 1.0)
         own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
         return own | {name + OF_TURNS: value for name, value in of_turns.items()}
-    zeros = np.zeros(plant.n)
-    g = min(abs(plant.nominal(zeros, zeros, i, plant.values({}))[1]) for i in range(plant.driven))
-    g = 1.0 if per_u is None else g * per_u
     if reach is None:
-        X = max(abs(x) for x in plant.x0)
+        X = max(abs(x - r) for x, r in zip(plant.x0, plant.origin, strict=True))
     else:
         X = reach
+    if plant.is_user_model and per_u is not None:
+        from smc_mujoco.mechanisms.custom import scales as at_start
+
+        # a bound far beyond what the joint needs is no scale
+        u_max = min(u_max, at_start.MOST * max(at_start.needs(plant)) / per_u)
+        g = min(at_start.mobility(plant, u_max * per_u, X))
+    else:
+        zeros = np.zeros(plant.n)
+        values = plant.values({})
+        g = min(abs(plant.nominal(zeros, zeros, i, values)[1]) for i in range(plant.driven))
+    g = 1.0 if per_u is None else g * per_u
     if not X > 0.0:
         raise ScenarioError(
             f"{plant.name} starts at 0, where a law has nothing to do: {START_CURE}"

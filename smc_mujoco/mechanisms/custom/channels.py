@@ -24,7 +24,7 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, PLACES, POSE, exerted
-from smc_mujoco.mechanisms.plant import Range
+from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
 from smc_mujoco.mechanisms.rotation import rotation_vector
 
 FREE = mujoco.mjtJoint.mjJNT_FREE
@@ -50,12 +50,12 @@ class Channel:
 
     Attributes:
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps
-        their forcerange, and the joint's actuatorfrcrange. Without it, the joint needs exactly one
-        actuator: a motor.
+        their forcerange, a motor's ctrlrange, and the joint's actuatorfrcrange. Without it, the
+        joint needs exactly one actuator: a motor.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
         is measured and scored as a separate channel, after the driven ones. The law of this channel
-        reads it in y.q, y.dq, y.fq and y.gq. If it has an actuator, that stays at ctrl = 0: a motor
-        then does nothing, a servo holds its position.
+        reads it in y.q, y.dq, y.fq and y.gq. If it has an actuator, a motor stays at 0, and a servo
+        holds its start.
       x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of
         the keyframe, or of the model.
       law, u_max, reference: defaults for this channel, of scenarios that leave them out; values as
@@ -195,20 +195,15 @@ def starts(
 ) -> tuple[dict[str, float], list[Range]]:
     """Return joint -> x0, rad or m, and the ranges of those joints whose x0 the user chose.
 
-    x0 is that of the channel, else of the keyframe, else of the model. The model's own x0 may be
-    outside its range.
+    x0 is that of the channel, else the goal.
     """
-    if keyframe is None:
-        qpos = model.qpos0
-    else:
-        qpos = model.key_qpos[model.key(keyframe).id]
     chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
     chosen |= {
         c.partner: c.partner_x0
         for _, c in channels
         if c.partner is not None and c.partner_x0 is not None
     }
-    x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | chosen
+    x0 = dict(zip(joints, goals(model, joints, keyframe)[0], strict=True)) | chosen
     return x0, [row for row in ranges(model, joints) if keyframe is not None or row[0] in chosen]
 
 
@@ -422,18 +417,20 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
 
 
 def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
-    """Return the least and the largest force that the forceranges of a joint's actuators allow
-    together, N m or N.
+    """Return the least and the largest force that a joint's actuators allow together by their
+    forceranges, and motors by their ctrlranges, N m or N.
 
-    They give no bound if one has no forcerange, or if they push only one way: the ideal motor
-    pushes both ways.
+    They give no bound if one has none, or if they push only one way: the ideal motor pushes both
+    ways.
     """
-    if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
-        return -math.inf, math.inf
     low = 0.0
     high = 0.0
     for i in actuators:
-        ends = sorted(model.actuator_gear[i, 0] * model.actuator_forcerange[i])
+        ends = -math.inf, math.inf
+        if not _no_motor(model, i):
+            ends = _of_actuator(model, i)
+        elif model.actuator_forcelimited[i]:
+            ends = sorted(model.actuator_gear[i, 0] * model.actuator_forcerange[i])
         low += float(ends[0])
         high += float(ends[1])
     if low < 0.0 < high:
@@ -452,18 +449,43 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
         else:
             actuator.name = f"{PASSIVE}smc:{i}"  # no joint has this name
     for motor in motors:  # named after joints: names of actuators may be missing
-        made = spec.add_actuator(
-            name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
-        )
-        made.set_to_motor()
+        made = add_motor(spec, f"u:{motor.joint}", motor.joint)
         limit = motor.limit if math.isfinite(motor.limit) else 0.0
-        made.gear = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        made.ctrllimited = False
         made.forcelimited = limit > 0.0
-        made.ctrlrange = (0.0, 0.0)
         made.forcerange = (-limit, limit)
-        made.armature = 0.0
-        made.damping = (0.0, 0.0, 0.0)
-        made.delay = 0.0
-        made.nsample = 0
-        made.group = MOTOR_GROUP
+
+
+def add_motor(spec: mujoco.MjSpec, name: str, joint: str) -> mujoco.MjsActuator:
+    """Add a motor of gear 1 without bounds to a joint, whatever the model's defaults are."""
+    made = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    made.set_to_motor()
+    made.gear = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    made.ctrllimited = False
+    made.forcelimited = False
+    made.ctrlrange = (0.0, 0.0)
+    made.forcerange = (0.0, 0.0)
+    made.armature = 0.0
+    made.damping = (0.0, 0.0, 0.0)
+    made.delay = 0.0
+    made.nsample = 0
+    made.group = MOTOR_GROUP
+    return made
+
+
+def goals(
+    model: mujoco.MjModel, joints: Sequence[str], keyframe: str | None
+) -> tuple[tuple[float, ...], list[str]]:
+    """Return where the joints end by default, rad or m: in the keyframe, else as the model is
+    drawn, else in the middle of the range, and the joints of which that is so.
+    """
+    if keyframe is None:
+        qpos = model.qpos0
+    else:
+        qpos = model.key_qpos[model.key(keyframe).id]
+    rest = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints}
+    outside = []
+    for joint, low, high in ranges(model, joints):
+        if keyframe is None and not low - MAX_EXCESS <= rest[joint] <= high + MAX_EXCESS:
+            rest[joint] = 0.5 * (low + high)
+            outside.append(joint)
+    return tuple(rest.values()), outside

@@ -8,9 +8,9 @@ the rest.
 A channel's command u is the force on its joint, N m or N. Its motor gets gear 1. |u| is bounded by
 the scenario's u_max and by what the motor's ranges and the joint's actuatorfrcrange allow in both
 directions; a law reads the bound in y.limit. The model's sensors are replaced by a position and a
-velocity sensor per channel. Other actuators stay at ctrl = 0, and joints without a channel move as
-the model says. Integrator, step and initial state are the scenario's. Disturbances act on the
-joints themselves. Dry friction of the file's joints and tendons is as hard as `Coulomb`, unless the
+velocity sensor per channel. Joints without a channel move as the model says, with servos that hold
+the start, or as `others` says. A channel's default goal is its place in the keyframe or the model.
+Integrator, step and initial state are the scenario's. Disturbances act on the joints themselves. Dry friction of the file's joints and tendons is as hard as `Coulomb`, unless the
 file gives its solreffriction. The parameters are m in kg, the mass of all that moves, which scales
 all masses and inertias, and grav in m/s^2.
 """
@@ -22,19 +22,22 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.constraints import Timeout, constrained
+from smc_mujoco.common.constraints import OneOf, Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
+from smc_mujoco.mechanisms.custom import others as rest_of
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
+from smc_mujoco.mechanisms.custom.others import OTHERS
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue, check_ranges
 
@@ -80,14 +83,21 @@ class UserModel:
     tip: str = ""
     # indices of the actuators of a free joint, which is then the only channel
     thrusters: tuple[int, ...] = ()
+    others: str = ""  # one of others.OTHERS, or "" if not given
 
-    def __call__(self, n: int) -> mujoco.MjSpec:
-        """Return the model with a motor and two sensors per channel."""
+    def edited(self) -> mujoco.MjSpec:
+        """Return the model without sensors, and with its other joints as wanted."""
         spec = self.source.read()
         # tuples may name sensors and motors that are deleted
         while named := [*spec.tuples, *spec.sensors]:
             # MuJoCo 4 also deletes the tuples that name it, so list them again
             spec.delete(named[0])
+        rest_of.edit(spec, self.source, self.channels, self.keyframe, self.others)
+        return spec
+
+    def __call__(self, n: int) -> mujoco.MjSpec:
+        """Return the model with a motor and two sensors per channel."""
+        spec = self.edited()
         if self.thrusters:
             own.add_pose(spec, self.channels[0][0], self.thrusters)
         else:
@@ -122,8 +132,12 @@ class UserModel:
             path = os.path.relpath(self.source.path)
         else:
             path = "FILE.xml"
-        joints = "+".join(own.as_text(joint, channel) for joint, channel in self.channels)
-        return f"{path}:{joints}{'' if self.keyframe is None else '@' + self.keyframe}"
+        text = "+".join(own.as_text(joint, channel) for joint, channel in self.channels)
+        if self.keyframe is not None:
+            text += f"@{self.keyframe}"
+        if self.others:
+            text += f"+{self.others}"
+        return f"{path}:{text}"
 
     def about(self) -> dict:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
@@ -135,6 +149,7 @@ class UserModel:
             "channels": channels,
         }
         data |= {"tip": self.tip} if self.tip else {}
+        data |= {"others": self.others} if self.others else {}
         if not self.source.path:
             assets = {}
             for name, content in self.source.assets:
@@ -172,6 +187,7 @@ def plant_from(
     assets: Mapping[str, bytes | str] | None = None,
     timeout: Timeout = 20.0,
     tip: str | None = None,
+    others: Annotated[str, OneOf(names=OTHERS)] | None = None,
 ) -> Plant:
     """Make a plant of an MJCF model.
 
@@ -183,11 +199,15 @@ def plant_from(
         that of its body.
       name: name of the plant, and title of its pictures; default: the file's, with the model's own
         name as the title.
-      keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0.
-        Runs start at rest, unless the scenario has a v0.
+      keyframe: name of the model's keyframe with the initial positions, which is the default goal;
+        default: the model's qpos0. Runs start at rest, unless the scenario has a v0, and those of
+        `grid`, `tune`, `compare` and `which` beside the goal, see `starts`.
       assets: name -> content of the files that a text names, bytes or text.
       tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many
         joints may read its Jacobian.
+      others: what other joints do. "file": as the model says; servos hold the start, or the
+        keyframe's ctrl. "held": a joint with a motor is held there too, by a stiff PD. "locked":
+        all are welded there. Default: "file", with a warning if that leaves motors at 0.
       timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:
@@ -204,11 +224,26 @@ def plant_from(
     # laws and gains refer to plants by name
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
-    made = _plant(source, own.coerce(channels), name, keyframe, tip)
+    pairs = own.coerce(channels)
+    made = _plant(source, pairs, name, keyframe, tip, others or "")
+    spec = source.read()
+    model = source.compiled(spec)
     read = urdf.read(Path(source.path))
-    changed = read.notes(source.label) if read else ()
-    for sentence in (*changed, *soft(source.label, source.compiled(source.read()), keyframe)):
-        warnings.warn(sentence, ScenarioWarning, users_stacklevel())
+    doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, model, keyframe)]
+    _, outside = ((), []) if made.pose else own.goals(model, own.joints_of(pairs), keyframe)
+    for joint in outside:
+        doubts.append(
+            f"{source.label} draws joint {joint!r} outside its range, so that the default goal is "
+            "the middle of it: give a keyframe or a reference for another one"
+        )
+    if others is None and (names := rest_of.limp(spec, pairs)):
+        doubts.append(
+            f"joints of {source.label} have motors that nothing commands, "
+            f"{joined(map(repr, names))}: give others='held' (+held after the joints in a text), "
+            "'locked', or 'file' if they should move freely"
+        )
+    for doubt in doubts:
+        warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return made
 
 
@@ -258,7 +293,12 @@ def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
 
 
 def _plant(
-    source: Source, pairs: Pairs, name: str | None, keyframe: str | None, tip: str | None
+    source: Source,
+    pairs: Pairs,
+    name: str | None,
+    keyframe: str | None,
+    tip: str | None,
+    others: str = "",
 ) -> Plant:
     """Return the plant of a model, see `plant_from`."""
     label = source.label
@@ -281,6 +321,19 @@ def _plant(
     if catalogue().taken(file):  # a plant of the library has this name
         file = label
     plant_name = file if name is None else name
+    special: dict[str, Any] = {}
+    if own.is_free(model, joints[0]):
+        x0 = own.pose_at_start(model, joints[0], keyframe)
+    else:
+        start, checked = own.starts(model, joints, pairs, keyframe)
+        check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
+        rest, _ = own.goals(model, joints, keyframe)
+        special = {"ranges": own.ranges(model, joints)}
+        if any(rest):
+            special |= {"rest": rest, "goal": rest[len(pairs) :]}
+        x0 = tuple(start.values())
+    if others in ("held", "locked"):
+        model = source.compiled(UserModel(source, keyframe, pairs, (), others=others).edited())
     motors = ()
     thrusters = ()
     if own.is_free(model, joints[0]):
@@ -290,18 +343,13 @@ def _plant(
         thrusters = tuple(own.thrusters(model, joints[0]))
         limits = own.reach_of(label, model, joints[0])
         units = ("m",) * 3 + ("rad",) * 3
-        x0 = own.pose_at_start(model, joints[0], keyframe)
-        special: dict[str, Any] = {"rest": x0, "pose": own.held_pose(label, model, joints[0])}
+        special = {"rest": x0, "pose": own.held_pose(label, model, joints[0])}
     else:
         motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
         limits = tuple(motor.limit for motor in motors)
         kinds = [mujoco.mjtJoint(model.joint(joint).type[0]) for joint in joints]
         units = tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
-        start, checked = own.starts(model, joints, pairs, keyframe)
-        check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
-        x0 = tuple(start.values())
-        special = {"ranges": own.ranges(model, joints)}
-    build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters)
+    build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters, others)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
@@ -393,4 +441,6 @@ def restored(data: Mapping, name: str) -> Plant:
         source = mjcf.source(data["text"], assets)
     else:
         source = mjcf.found(data["path"], data["sha256"])
-    return _plant(source, own.coerce(data["channels"]), name, data["keyframe"], data.get("tip"))
+    others = data.get("others", "")
+    pairs = own.coerce(data["channels"])
+    return _plant(source, pairs, name, data["keyframe"], data.get("tip"), others)

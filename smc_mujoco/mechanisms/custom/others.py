@@ -1,0 +1,182 @@
+"""What the joints of a user's model do that are no channels.
+
+By default, and as "file": a servo holds where the runs start, or the ctrl of the keyframe; the rest
+is as the model says. "held": other joints with a motor are held there too, by a PD of HELD rad/s.
+"locked": every other joint is welded at the start.
+"""
+
+import functools
+import math
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.mechanisms.custom import channels as own
+from smc_mujoco.mechanisms.custom.channels import ONE_JOINT, Pairs
+from smc_mujoco.mechanisms.custom.mjcf import Source
+
+OTHERS = ("file", "held", "locked")
+HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
+AFFINE = mujoco.mjtBias.mjBIAS_AFFINE
+
+
+def is_servo(actuator: mujoco.MjsActuator) -> bool:
+    """Return whether an actuator pulls to a position."""
+    return actuator.biastype == AFFINE and actuator.biasprm[1] < 0.0
+
+
+def target_of(actuator: mujoco.MjsActuator) -> str:
+    """Return the joint that an actuator drives alone, or ""."""
+    return actuator.target if actuator.trntype.value in ONE_JOINT else ""
+
+
+def limp(spec: mujoco.MjSpec, channels: Pairs) -> list[str]:
+    """Return the joints that are no channels and have motors, which nothing commands."""
+    mine = {"", *own.joints_of(channels)}
+    served = {target_of(actuator) for actuator in spec.actuators if is_servo(actuator)}
+    driven = dict.fromkeys(target_of(actuator) for actuator in spec.actuators)
+    return [joint for joint in driven if joint not in mine | served]
+
+
+@functools.lru_cache(maxsize=8)
+def at_start(
+    source: Source, channels: Pairs, keyframe: str | None
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Return the file's model, with a body for each of the file, and its state at the start."""
+    spec = source.read()
+    spec.compiler.fusestatic = False
+    model = source.compiled(spec)
+    data = mujoco.MjData(model)
+    if keyframe is not None:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    data.qvel[:] = 0.0
+    for joint, x in own.starts(model, own.joints_of(channels), channels, keyframe)[0].items():
+        if model.joint(joint).type[0] != own.FREE:
+            data.qpos[model.joint(joint).qposadr[0]] = x
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def edit(
+    spec: mujoco.MjSpec, source: Source, channels: Pairs, keyframe: str | None, others: str
+) -> None:
+    """Edit a model that `source` has just read."""
+    driven = {joint for joint, _ in channels}
+    servos = {}
+    for i, actuator in enumerate(spec.actuators):
+        if is_servo(actuator) and target_of(actuator) not in driven:
+            servos[i] = actuator
+    if not servos and others not in ("held", "locked"):
+        return
+    model, data = at_start(source, channels, keyframe)
+    for i, servo in servos.items():
+        goal = -servo.biasprm[1] * data.actuator_length[i]
+        if keyframe is not None and np.any(data.ctrl):
+            goal = servo.gainprm[0] * data.ctrl[model.actuator_ctrladr[i]]
+        servo.biasprm[0] += goal  # its ctrl stays at 0
+    if others == "held":
+        _hold(spec, model, data, limp(spec, channels))
+    if others == "locked":
+        _lock(spec, model, data, set(own.joints_of(channels)))
+
+
+def _hold(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joints: list[str]
+) -> None:
+    """Add a PD to joints: stiffness and damping by their inertia, and their load fed forward."""
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    for name in joints:
+        joint = model.joint(name)
+        if joint.type[0] not in own.UNIT_OF_JOINT:
+            continue
+        dof = joint.dofadr[0]
+        kp = inertia[dof, dof] * HELD**2
+        kd = 2.0 * inertia[dof, dof] * HELD
+        load = data.qfrc_bias[dof] - data.qfrc_passive[dof]
+        made = own.add_motor(spec, f"hold:{name}", name)
+        made.biastype = AFFINE
+        made.biasprm[:3] = kp * data.qpos[joint.qposadr[0]] + load, -kp, -kd
+
+
+def _lock(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joints: set[str]
+) -> None:
+    """Weld every body whose joints are no channels to its parent, by pose, where it starts."""
+    at = mujoco.MjData(model)
+    at.qpos[:] = data.qpos
+    for joint in map(model.joint, joints):  # so that the poses of their bodies stay the file's
+        if joint.type[0] != own.FREE:
+            at.qpos[joint.qposadr[0]] = model.qpos0[joint.qposadr[0]]
+    mujoco.mj_kinematics(model, at)
+    bodies = list(spec.bodies)  # in the order of the model; their ids are -1 before compilation
+    _exclude(spec, model, bodies)
+    for i, body in enumerate(bodies):
+        loose = [joint for joint in body.joints if joint.name not in joints]
+        if loose:
+            _place(body, model.body_parentid[i], i, at)
+        for joint in loose:
+            spec.delete(joint)
+        for joint in body.joints if loose else ():
+            number = model.joint(joint.name).id
+            to_body = at.xmat[i].reshape(3, 3).T
+            joint.axis = to_body @ at.xaxis[number]
+            joint.pos = to_body @ (at.xanchor[number] - at.xpos[i])
+    _delete_orphans(spec)
+
+
+def _place(body: mujoco.MjsBody, parent: int, i: int, at: mujoco.MjData) -> None:
+    """Give a body the pose in its parent that it has in `at`."""
+    back, turn = np.zeros(3), np.zeros(4)
+    pos, quat = np.zeros(3), np.zeros(4)
+    mujoco.mju_negPose(back, turn, at.xpos[parent], at.xquat[parent])
+    mujoco.mju_mulPose(pos, quat, back, turn, at.xpos[i], at.xquat[i])
+    if body.frame is not None:
+        body.set_frame(body.parent.add_frame())
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    body.pos = pos
+    body.quat = quat
+
+
+def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.MjsBody]) -> None:
+    """Exclude the pairs of bodies that may not touch now. Of a parent that becomes part of the
+    world MuJoCo would forget that.
+    """
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT.value:
+        return
+    for i, body in enumerate(bodies):
+        body.name = body.name or f"body:{i}"
+    known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
+    weld = model.body_weldid
+    above = weld[model.body_parentid[weld]]
+    for i in np.flatnonzero(model.body_geomnum):
+        for j in np.flatnonzero(model.body_geomnum[:i]):
+            near = weld[i] == weld[j] or weld[i] == above[j] or weld[j] == above[i]
+            pair = bodies[i].name, bodies[j].name
+            if near and weld[i] and weld[j] and frozenset(pair) not in known:
+                spec.add_exclude(bodyname1=pair[0], bodyname2=pair[1])
+
+
+def _delete_orphans(spec: mujoco.MjSpec) -> None:
+    """Delete all keyframes, and what names a joint that is gone."""
+    left = {"", *(joint.name for joint in spec.joints)}
+    kinds = mujoco.mjtEq
+    orphans = [*spec.keys]
+    gone = set()
+    for tendon in spec.tendons:
+        wraps = [wrap for wrap in tendon.path if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT]
+        if any(wrap.target is None for wrap in wraps):
+            orphans.append(tendon)
+            gone.add(tendon.name)
+    for actuator in spec.actuators:
+        by_tendon = actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON and actuator.target in gone
+        if by_tendon or target_of(actuator) not in left:
+            orphans.append(actuator)
+    for equality in spec.equalities:
+        names = {equality.name1, equality.name2}
+        if (equality.type == kinds.mjEQ_JOINT and not names <= left) or (
+            equality.type == kinds.mjEQ_TENDON and names & gone
+        ):
+            orphans.append(equality)
+    for orphan in reversed(orphans):  # a tendon after what names it
+        spec.delete(orphan)
