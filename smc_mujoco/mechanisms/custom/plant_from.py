@@ -10,9 +10,10 @@ the scenario's u_max and by what the motor's ranges and the joint's actuatorfrcr
 directions; a law reads the bound in y.limit. The model's sensors are replaced by a position and a
 velocity sensor per channel. Joints without a channel move as the model says, with servos that hold
 the start, or as `others` says. A channel's default goal is its place in the keyframe or the model.
-Integrator, step and initial state are the scenario's. Disturbances act on the joints themselves. Dry friction of the file's joints and tendons is as hard as `Coulomb`, unless the
-file gives its solreffriction. The parameters are m in kg, the mass of all that moves, which scales
-all masses and inertias, and grav in m/s^2.
+Integrator, step and initial state are the scenario's. Disturbances act on the joints themselves.
+Dry friction of the file's joints and tendons is as hard as `Coulomb`, unless the file gives its
+solreffriction. The parameters are m in kg, the mass of all that moves, which scales all masses and
+inertias, and grav in m/s^2.
 """
 
 import base64
@@ -321,17 +322,7 @@ def _plant(
     if catalogue().taken(file):  # a plant of the library has this name
         file = label
     plant_name = file if name is None else name
-    special: dict[str, Any] = {}
-    if own.is_free(model, joints[0]):
-        x0 = own.pose_at_start(model, joints[0], keyframe)
-    else:
-        start, checked = own.starts(model, joints, pairs, keyframe)
-        check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
-        rest, _ = own.goals(model, joints, keyframe)
-        special = {"ranges": own.ranges(model, joints)}
-        if any(rest):
-            special |= {"rest": rest, "goal": rest[len(pairs) :]}
-        x0 = tuple(start.values())
+    special = _places(plant_name, model, joints, pairs, keyframe)
     if others in ("held", "locked"):
         model = source.compiled(UserModel(source, keyframe, pairs, (), others=others).edited())
     motors = ()
@@ -343,7 +334,7 @@ def _plant(
         thrusters = tuple(own.thrusters(model, joints[0]))
         limits = own.reach_of(label, model, joints[0])
         units = ("m",) * 3 + ("rad",) * 3
-        special = {"rest": x0, "pose": own.held_pose(label, model, joints[0])}
+        special["pose"] = own.held_pose(label, model, joints[0])
     else:
         motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
         limits = tuple(motor.limit for motor in motors)
@@ -362,9 +353,8 @@ def _plant(
         mass="m",
         unit=units[0],
         mixed=units if len(set(units)) > 1 else (),
-        x0=x0,
-        n=len(x0),
-        sizes=(len(x0), len(x0)),
+        n=len(units),
+        sizes=(len(units), len(units)),
         build=build,
         fields=fields,
         nominal=without_model if why_not else NominalModel(build, fields),
@@ -380,6 +370,22 @@ def _plant(
         label=title if plant_name == file and title != UNNAMED else "",
         **special,
     )
+
+
+def _places(
+    plant: str, model: mujoco.MjModel, joints: list[str], pairs: Pairs, keyframe: str | None
+) -> dict[str, Any]:
+    """Return the plant's fields on where its channels start, end and may go."""
+    if own.is_free(model, joints[0]):
+        x0 = own.pose_at_start(model, joints[0], keyframe)
+        return {"x0": x0, "rest": x0}
+    start, checked = own.starts(model, joints, pairs, keyframe)
+    check_ranges(plant, checked, [start[joint] for joint, _, _ in checked])
+    rest, _ = own.goals(model, joints, keyframe)
+    fields = {"x0": tuple(start.values()), "ranges": own.ranges(model, joints)}
+    if any(rest):
+        fields |= {"rest": rest, "goal": rest[len(pairs) :]}
+    return fields
 
 
 def without_model(x, v, i, p):
