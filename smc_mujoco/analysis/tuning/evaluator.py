@@ -5,8 +5,8 @@
 
 A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator
 prepares them once, puts the gains of each candidate into the buffers that compiled code reads, and
-takes J from the logs. It has three engines: MuJoCo, in a Batch that lasts; the plant's `equation`,
-which may only find gains; and `run`, for laws that do not compile. J is that of
+takes J from the logs. It has three engines: MuJoCo, in a Batch that lasts; the fast one of
+`equation`, which may only find gains; and `run`, for laws that do not compile. J is that of
 `Objective.terms_of_run`.
 """
 
@@ -14,13 +14,11 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Callable, Hashable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved as halved_step
-from smc_mujoco.analysis.tuning import equation
 from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Evaluation, Objective
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component
@@ -79,12 +77,21 @@ class Evaluator:
             if any(item.why_not for item in prepared):
                 self.engine = PYTHON
                 self._run = None
-            elif by_equation and all(map(equation.fits, prepared)):
+            elif by_equation and (run := self._by_equation()):
                 self.engine = EQUATION
-                self._run = _Equations(prepared, self.names, self.threads)
+                self._run = run
             else:
                 self.engine = MUJOCO
                 self._run = _Batches(prepared, self.names, self.threads, constraints, slots)
+
+    def _by_equation(self) -> Any:
+        """Return the runs by the plant's equation, or None where it does not do for all of them."""
+        from smc_mujoco.analysis.engine.group import why_not
+        from smc_mujoco.analysis.tuning.equation import Equations
+
+        if any(map(why_not, self.cases)):
+            return None
+        return Equations(self.goal, self.cases, self.names, self.threads)
 
     def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
@@ -170,42 +177,6 @@ def _putter(
         values[rows] = np.reshape(gains, (-1, 1))
 
     return put
-
-
-class _Equations:
-    """The runs by the equation: as many candidates at once as there are threads, if memory
-    allows.
-    """
-
-    def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int):
-        self.cases = len(prepared)
-        self.slots = _that_fit(prepared, threads)
-        self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
-        self.put = [_putter(one.prepared, names, one.record[0], one.packed) for one in self.runs]
-        if threads > 1:
-            self.pool = ThreadPoolExecutor(threads)
-        else:
-            self.pool = None
-
-    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
-        made: list[Costs] = []
-        for some in _batched(candidates, self.slots):
-            runs = range(len(some) * self.cases)
-            mapped = self.pool.map if self.pool else map
-            made += mapped(functools.partial(self._one, some, terms), runs)
-        return made
-
-    def _one(self, candidates: Sequence[Gains], terms: Terms, i: int) -> Costs:
-        """Return the terms of run i of some candidates."""
-        one = self.runs[i]
-        one.restart()
-        self.put[i](candidates[i // self.cases])
-        one.simulate()
-        record = one.record[0]
-        time = None
-        if record["failure"] != state.FINE:
-            time = float(record["failed_step"]) * one.scenario.physics_step
-        return terms(i % self.cases, time, one.log)
 
 
 class _Batches:

@@ -12,8 +12,8 @@ see `gain_sets`. A search has 64 evaluations for each gain:
    University, 2022; scipy's), which fits a quadratic model to the logarithm of J within a trust
    region. It ends when 2 n + 2 evaluations, with n gains, lower J by less than 0.1 %.
 
-Where a plant is nothing but its equation under RK4, the `equation` takes the place of MuJoCo, in a
-fifteenth of the time. J on record is MuJoCo's, from one evaluation of the best gains. If the two J
+Where a plant is nothing but its equation under RK4, the fast engine takes the place of MuJoCo, in a
+thirtieth of the time. J on record is MuJoCo's, from one evaluation of the best gains. If the two J
 differ by more than 1 %, the search is made again in MuJoCo. Elsewhere the first two stages are
 cheap: they use Euler's method in place of RK4, or one step of another integrator a control period,
 and leave out limits and contacts that are the plant's own. Descents run as a scenario does.

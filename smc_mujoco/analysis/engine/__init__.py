@@ -1,0 +1,8 @@
+"""Runs of a plant's equation without MuJoCo, compiled for the processor or for a CUDA device.
+
+A search, a map and a share of failures need thousands of runs of one law on one plant. So `loop`
+writes the run of such a group out as one function: sensors, noise, estimator, law, delay,
+disturbances and the plant's equation under RK4 in a single loop, compiled together with the law.
+Scores are summed on the way. `form` tells what a group is, and what this engine cannot run;
+`targets` compiles it. Its numbers find gains and fill maps: those on record are MuJoCo's.
+"""

@@ -1,0 +1,93 @@
+"""The loop of a form on the processor, in threads."""
+
+# pyright: reportCallIssue=false
+import functools
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
+from smc_mujoco.analysis.engine.loop import simulation
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import Key, compile_for, jit, pointer
+from smc_mujoco.simulation.state import address
+
+PIECE_STEPS = 5_000_000  # in a call of compiled code, about half a second, which Ctrl-C waits for
+
+
+@functools.lru_cache(maxsize=64)
+def compiled(form: Form) -> Any:
+    """Return the compiled runs of a form, (count, addresses of rows, tables, work, scores and
+    logs).
+    """
+    simulate = simulation(form, jit)
+    row_bytes = 8 * row_places(form).size
+    score_bytes = 8 * (SCORES + len(form.metrics))
+
+    def runs(count, rows, tables, work, scores, logs, log_bytes):
+        for i in range(count):
+            try:
+                simulate(
+                    pointer(rows + row_bytes * i),
+                    pointer(tables),
+                    pointer(work),
+                    pointer(scores + score_bytes * i),
+                    pointer(logs + log_bytes * i),
+                )
+            except Exception:  # its scores say that it failed
+                continue
+
+    made = njit(error_model="numpy", nogil=True)(runs)
+    try:
+        key = Key(__name__, fingerprint.now(runs))
+    except ScenarioError:  # a function that has no hash is compiled in every process
+        key = None
+    compile_for(made, (0,) * 7, key)
+    return made
+
+
+def run(
+    form: Form, rows: np.ndarray, tables: np.ndarray, threads: int, logs: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the scores of runs, (runs, SCORES + metrics), given their rows; NaN after a failure.
+
+    `logs` is (runs, K + 1, n, 6) and gets `form.LOGGED`, if the rows say `logging`.
+    """
+    made = compiled(form)
+    rows = np.ascontiguousarray(rows)
+    scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)
+    if logs is None:
+        logs = np.zeros((len(rows), 0))
+
+    def piece(part: slice) -> None:
+        work = np.zeros(work_places(form).size)
+        arrays = rows[part], tables, work, scores[part], logs[part]
+        made(len(rows[part]), *map(address, arrays), logs[part].strides[0])
+
+    parts = list(_pieces(form, rows, threads))
+    if threads == 1 or len(parts) == 1:
+        for part in parts:
+            piece(part)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            try:
+                list(pool.map(piece, parts))
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+    return scores
+
+
+def _pieces(form: Form, rows: np.ndarray, threads: int) -> Iterator[slice]:
+    """Yield the runs of a call: a share for each thread, of at most PIECE_STEPS."""
+    if not len(rows):
+        return
+    SAMPLES, STEPS = row_places(form).of("samples", "steps")
+    longest = np.max(rows[:, SAMPLES] * rows[:, STEPS]) * form.n
+    size = max(1, min(-(-len(rows) // threads), int(PIECE_STEPS // longest)))
+    for first in range(0, len(rows), size):
+        yield slice(first, first + size)

@@ -1,0 +1,114 @@
+"""What a group of runs is made of: the functions of its loop, and the places of its numbers."""
+
+import dataclasses
+import functools
+from typing import Any, NamedTuple
+
+LOGGED = ("x", "v", "u", "s", "d", "r")  # of a channel at a sample, in a log
+FAILURE, FAILED_STEP, SCORES = range(3)  # places in the scores of a run; metrics follow
+SETTINGS = ("samples", "steps", "step", "period", "delay", "jump_step", "seed", "uses_model")
+SETTINGS += ("sigma_x", "sigma_v", "jitter", "missed", "pause", "pause_samples", "pause_phase")
+SETTINGS += ("band", "early", "late", "logging")
+ACTIVE, STREAM, PARAMETERS = range(3)  # places in the numbers of a signal
+STATE = ("x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "d")
+MEASURED = ("seen_x", "seen_v", "seen_a")
+SAMPLED = ("sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r")
+
+
+class Part(NamedTuple):
+    """A function of the user's, with the names of its parameters and its memory in a channel."""
+
+    function: Any
+    names: tuple[str, ...]
+    memory: int = 0
+
+
+class Form(NamedTuple):
+    """What decides the code of a loop. Runs of one form differ in numbers alone."""
+
+    n: int  # channels, each with an actuator
+    laws: tuple[Part, ...]  # of all channels, or one for each
+    spread: bool  # whether each channel has gains of its own
+    nominal: Part
+    estimator: Part
+    surface: Part | None
+    references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
+    disturbances: tuple[type, ...]
+    feedforward: type | None
+    errors: tuple[type | None, ...]  # of position and velocity
+    noise: bool
+    true_model: bool
+    jump: bool
+    delay: bool
+    clock: bool
+    slots: int  # commands that are under way
+    metrics: tuple[str, ...]
+
+
+class Places:
+    """Indices of named numbers in one array."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self.at: dict[str, int] = {}
+
+    def take(self, name: str, count: int = 1) -> None:
+        """Give the next `count` numbers a name."""
+        self.at[name] = self.size
+        self.size += count
+
+    def of(self, *names: str) -> list[int]:
+        """Return the first index of each name."""
+        return [self.at[name] for name in names]
+
+
+@functools.cache
+def row_places(form: Form) -> Places:
+    """Return where the numbers of a run are in its row."""
+    places = Places()
+    for name in SETTINGS:
+        places.take(name)
+    for name in ("x0", "v0", "limits"):
+        places.take(name, form.n)
+    for name in ("known", "before", "after"):
+        places.take(name, len(form.nominal.names))
+    for i, law in enumerate(form.laws):
+        places.take(f"law {i}", len(law.names) * (form.n if form.spread else 1))
+    places.take("estimator", len(form.estimator.names))
+    places.take("surface", len(form.surface.names) if form.surface else 0)
+    for name, kind in signals(form).items():
+        places.take(name, PARAMETERS + len(parameters(kind)) + 2 * kind.series)
+    return places
+
+
+@functools.cache
+def work_places(form: Form) -> Places:
+    """Return where the state of a run is."""
+    places = Places()
+    for name in (*STATE, *MEASURED, *SAMPLED):
+        places.take(name, form.n)
+    places.take("buffer", form.slots * form.n)
+    places.take("law", max(law.memory for law in form.laws) * form.n)
+    places.take("estimator", form.estimator.memory * form.n)
+    places.take("surface", form.surface.memory * form.n if form.surface else 0)
+    for name, kind in signals(form).items():
+        places.take(name, 1 + kind.memory * form.n)
+    for name in form.metrics:
+        places.take(f"metric {name}", 4 * form.n)
+    return places
+
+
+def signals(form: Form) -> dict[str, Any]:
+    """Return the kinds of a form's signals, by the names of their places."""
+    found: dict[str, Any] = {"feedforward": form.feedforward}
+    for name in ("references", "disturbances", "errors"):
+        for i, kind in enumerate(getattr(form, name)):
+            found[f"{name} {i}"] = kind
+    return {name: kind for name, kind in found.items() if kind is not None}
+
+
+def parameters(kind: Any) -> tuple[str, ...]:
+    """Return the names of a signal's parameters."""
+    if kind.series:  # its points say it all
+        return ()
+    return tuple(field.name for field in dataclasses.fields(kind))

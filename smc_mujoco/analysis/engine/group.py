@@ -1,0 +1,233 @@
+"""Scenarios as groups of runs that one loop can make: their form, and their numbers in rows."""
+
+import math
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.analysis.engine.form import (
+    ACTIVE,
+    PARAMETERS,
+    STREAM,
+    Form,
+    Part,
+    parameters,
+    row_places,
+    signals,
+)
+from smc_mujoco.analysis.engine.scores import METRICS, RESTING
+from smc_mujoco.common.jit import AtAddress, Uncompiled
+from smc_mujoco.control.component import Component, gain_at
+from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND
+from smc_mujoco.simulation.prepare import known_values, pause_phase, references
+from smc_mujoco.simulation.scenario import Resolved, Scenario
+from smc_mujoco.simulation.signals import Constant, Push, Signal
+
+TRANSIENT = 0.25  # of the run, which rms_error leaves out
+
+
+def why_not(scenario: Scenario, metrics: Sequence[str] = ()) -> str:
+    """Return what this engine cannot do of a scenario, in one sentence; "" if it does all."""
+    s = scenario.resolved
+    plant = s.plant
+    parts = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
+    beyond = {
+        f"{plant.name} is more than one equation a joint": bool(
+            plant.by_mujoco or plant.unmodelled or plant.direct or plant.free
+        ),
+        "it has friction, contacts or another mechanism": not s.plain_equation,
+        "it has an actuator": bool(s.actuator),
+        "it has a sensor": s.sensor is not None,
+        f"its integrator is {s.integrator}": s.integrator != "RK4",
+        "a law of many joints": s.law.joint,
+        "a disturbance acts on a body": any(
+            d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
+        ),
+        "its law is not written in Python that compiles": any(
+            isinstance(part.function, AtAddress | Uncompiled) for part in parts
+        ),
+    }
+    moving = not all(isinstance(signal, Constant) for signal in s.references)
+    for name in metrics:
+        beyond[f"it does not sum up {name}"] = name not in METRICS
+        beyond[f"{name} of a reference that moves"] = name in RESTING and moving
+    return next((words for words, holds in beyond.items() if holds), "")
+
+
+def key(scenario: Scenario) -> Hashable:
+    """Return what is equal for scenarios that one loop can run together."""
+    s = scenario.resolved
+    return _parts(s), _fixed(s)
+
+
+def _part(c: Component) -> Part:
+    return Part(c.function, tuple(c.gains), c.memory)
+
+
+def _parts(s: Resolved) -> tuple:
+    laws = s.law.of_channels(s.plant.driven)
+    return (
+        tuple(map(_part, laws)),
+        Part(s.plant.nominal, tuple(s.plant.parameters)),
+        _part(s.velocity),
+        None if s.surface is None else _part(s.surface),
+    )
+
+
+def _fixed(s: Resolved) -> tuple:
+    return (
+        s.plant.n,
+        tuple(map(type, references(s))),
+        None if s.feedforward is None else type(s.feedforward),
+        tuple(None if error is None else type(error) for error in s.noise.errors),
+        s.model == "true",
+    )
+
+
+class Group:
+    """Runs of one form.
+
+    Args:
+      scenarios: of one `key`.
+      metrics: what is scored, names of `scores.METRICS`.
+    """
+
+    def __init__(self, scenarios: Sequence[Scenario], metrics: Sequence[str] = ()):
+        resolved = [scenario.resolved for scenario in scenarios]
+        first = resolved[0]
+        laws, nominal, estimator, surface = _parts(first)
+        n, kinds, feedforward, errors, true_model = _fixed(first)
+        clock = not all(s.clock.regular for s in resolved)
+        delay = max(s.delay_steps // s.steps for s in resolved)
+        self.form = Form(
+            n=n,
+            laws=laws,
+            spread=not all(s.law.uniform for s in resolved) and len(laws) == 1,
+            nominal=nominal,
+            estimator=estimator,
+            surface=surface,
+            references=kinds,
+            disturbances=_kinds(resolved),
+            feedforward=feedforward,
+            errors=errors,
+            noise=any(s.noise.position or s.noise.velocity for s in resolved),
+            true_model=true_model,
+            jump=any(s.jump for s in resolved),
+            delay=any(s.delay_steps for s in resolved),
+            clock=clock,
+            slots=delay + 1 + clock,
+            metrics=tuple(metrics),
+        )
+        self.scenarios = resolved
+        self.places = row_places(self.form)
+        self.rows = np.zeros((len(resolved), self.places.size))
+        self._points: list[np.ndarray] = []
+        self._starts: dict[int, int] = {}  # of series in the tables
+        for row, s in zip(self.rows, resolved, strict=True):
+            self._fill(row, s)
+        self.tables = np.concatenate([*self._points, np.zeros(1)])
+
+    def _put(self, row: np.ndarray, name: str, values: Any) -> None:
+        first = self.places.at[name]
+        row[first : first + np.size(values)] = values
+
+    def _fill(self, row: np.ndarray, s: Resolved) -> None:
+        pause, pause_samples = s.clock.pauses(s.control_period, s.physics_step)
+        start = max(
+            abs(x - signal.value(0.0, signal)[0]) if isinstance(signal, Constant) else math.nan
+            for x, signal in zip(s.x0, s.references, strict=True)
+        )
+        t = np.arange(s.samples + 1) * s.control_period
+        settings = {
+            "samples": s.samples,
+            "steps": s.steps,
+            "step": s.physics_step,
+            "period": s.control_period,
+            "delay": s.delay_steps,
+            "jump_step": s.jump_step,
+            "seed": s.seed,
+            "uses_model": s.model != "none",
+            "sigma_x": s.noise.position,
+            "sigma_v": s.noise.velocity,
+            "jitter": s.clock.jitter_steps(s.physics_step),
+            "missed": s.clock.missed,
+            "pause": pause,
+            "pause_samples": pause_samples,
+            "pause_phase": pause_phase(s),
+            "band": SETTLING_BAND * (start or 1.0),
+            "early": np.searchsorted(t, TRANSIENT * (1.0 - ROUNDING) * t[-1]),
+            "late": np.searchsorted(t, t[-1] - LAST_PART * (1 + ROUNDING) * t[-1]),
+            "x0": s.x0,
+            "v0": s.v0,
+            "limits": s.limits,
+            "known": known_values(s),
+            "estimator": list(s.velocity.gains.values()),
+            "surface": list(s.surface.gains.values()) if s.surface else [],
+        }
+        for name, step in (("before", 0), ("after", max(s.jump_step, 0))):
+            values = vars(s.plant.values(s.factors(step)))
+            settings[name] = [values[parameter] for parameter in s.plant.parameters]
+        for name, values in settings.items():
+            self._put(row, name, values)
+        self._fill_gains(row, s.law)
+        self._fill_signals(row, s)
+
+    def _fill_gains(self, row: np.ndarray, law: Component) -> None:
+        columns = self.form.n if self.form.spread else 1
+        for i, part in enumerate(law.of_channels(self.form.n)):
+            gains = [gain_at(value, j) for j in range(columns) for value in part.gains.values()]
+            self._put(row, f"law {i}", gains)
+
+    def gain_columns(self, name: str) -> list[int]:
+        """Return where a gain of the law is in a row: of every channel."""
+        found = []
+        for i, part in enumerate(self.form.laws):
+            size = len(part.names)
+            first = self.places.at[f"law {i}"] + part.names.index(name)
+            found += [first + size * j for j in range(self.form.n if self.form.spread else 1)]
+        return found
+
+    def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
+        named: dict[str, tuple[Signal | None, int]] = {"feedforward": (s.feedforward, 0)}
+        for i, signal in enumerate(references(s)):
+            named[f"references {i}"] = signal, 0
+        for i, signal in enumerate(s.noise.errors):
+            named[f"errors {i}"] = signal, 0
+        free = list(self.form.disturbances)
+        for i, signal in enumerate(s.disturbance):
+            place = free.index(type(signal))
+            free[place] = type(None)
+            named[f"disturbances {place}"] = signal, s.noise_stream(i)
+        for name, kind in signals(self.form).items():
+            signal, stream = named.get(name, (None, 0))
+            if signal is None:
+                continue
+            numbers = np.zeros(PARAMETERS + len(parameters(kind)) + 2 * kind.series)
+            numbers[ACTIVE] = 1.0
+            numbers[STREAM] = stream
+            values = list(signal.parameters().values())
+            if kind.series:
+                values += [self._table(signal.data), signal.data.shape[1]]
+            numbers[PARAMETERS:] = values
+            self._put(row, name, numbers)
+
+    def _table(self, data: np.ndarray) -> int:
+        """Return where the points of a series begin in the tables."""
+        if id(data) not in self._starts:
+            self._starts[id(data)] = sum(points.size for points in self._points)
+            self._points.append(data.ravel())
+        return self._starts[id(data)]
+
+
+def _kinds(scenarios: Sequence[Resolved]) -> tuple[type, ...]:
+    """Return kinds of disturbances that hold those of every scenario."""
+    counts: dict[type, int] = {}
+    for s in scenarios:
+        of_one = [type(d) for d in s.disturbance]
+        for kind in of_one:
+            counts[kind] = max(counts.get(kind, 0), of_one.count(kind))
+    kinds: list[type] = []
+    for kind, count in counts.items():
+        kinds += [kind] * count
+    return tuple(kinds)

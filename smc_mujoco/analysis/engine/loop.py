@@ -1,0 +1,599 @@
+"""The run of a form, written out as one loop that numba compiles for every target.
+
+The order of what happens in a step is that of the control callback, see `controller`. A run reads
+its numbers from `row`, the points of its series from `tables`, and keeps its state in `work`. The
+functions of a user come compiled: on the processor with checks, so that a law that writes beyond
+its memory raises.
+"""
+
+# pyright: reportCallIssue=false
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+from smc_mujoco.analysis.engine.form import (
+    ACTIVE,
+    FAILED_STEP,
+    FAILURE,
+    LOGGED,
+    PARAMETERS,
+    STREAM,
+    Form,
+    parameters,
+    row_places,
+    work_places,
+)
+from smc_mujoco.analysis.engine.scores import own, tallying
+from smc_mujoco.common.jit import named
+from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation import philox
+from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
+from smc_mujoco.simulation.signals import after_pauses
+from smc_mujoco.simulation.state import DIVERGED, FINE, NOT_FINITE, RAISED
+
+Compiler = Callable[[Any], Any]
+
+
+def simulation(form: Form, compile_user: Compiler) -> Any:
+    """Return the compiled run of a form, simulate(row, tables, work, scores, log).
+
+    All are pointers to numbers; `log` has the numbers `form.LOGGED` of every channel at every
+    sample, if the row says `logging`.
+    """
+    work_at = work_places(form)
+    disturb = _disturbing(form, compile_user)
+    sample = _sampling(form, compile_user)
+    advance = _advancing(form, disturb, compile_user)
+    record = _recording(form)
+    n = form.n
+    clock = form.clock
+    size = work_at.size
+    X, V, D, SAMPLE_X, SAMPLE_V, SAMPLE_D = work_at.of(
+        "x", "v", "d", "sample_x", "sample_v", "sample_d"
+    )
+    SAMPLES, STEPS, STEP, PERIOD, X0, V0 = row_places(form).of(
+        "samples", "steps", "step", "period", "x0", "v0"
+    )
+
+    @own
+    def simulate(row, tables, work, scores, log):
+        for j in range(size):
+            work[j] = 0.0
+        scores[FAILURE] = RAISED
+        samples = int(row[SAMPLES])
+        steps = int(row[STEPS])
+        for i in range(n):
+            work[X + i] = row[X0 + i]
+            work[V + i] = row[V0 + i]
+        for k in range(samples + 1):
+            for within in range(steps):
+                step = k * steps + within
+                scores[FAILED_STEP] = step
+                for i in range(n):
+                    if not (abs(work[X + i]) < MAX_STATE and abs(work[V + i]) < MAX_STATE):
+                        scores[FAILURE] = DIVERGED
+                        return
+                failure = sample(row, tables, work, k, within, step)
+                if failure != FINE:
+                    scores[FAILURE] = failure
+                    return
+                seen = k if within == 0 else -1
+                disturb(row, tables, work, k * row[PERIOD] + within * row[STEP], seen)
+                if within == 0:
+                    for i in range(n):
+                        work[SAMPLE_X + i] = work[X + i]
+                        work[SAMPLE_V + i] = work[V + i]
+                        work[SAMPLE_D + i] = work[D + i]
+                    if not clock or k == samples:
+                        record(row, work, scores, log, k)
+                if k == samples:
+                    break
+                advance(row, tables, work, k, within, step)
+            if clock and k < samples:  # a late sample has come
+                record(row, work, scores, log, k)
+        scores[FAILURE] = FINE
+
+    return simulate
+
+
+@functools.cache
+def reader(names: tuple[str, ...]) -> Callable:
+    """Return a compiled function (array, at) -> the numbers from an index on, by these names."""
+    values = [f"array[at + {i}]" for i in range(len(names))] or ["0.0"]
+    space = {"Parameters": named(names)}
+    exec(f"def parameters_at(array, at): return Parameters({', '.join(values)})", space)
+    return own(space["parameters_at"])
+
+
+@intrinsic
+def view(typingctx, numbers, first, count):
+    """Return an array (count,) of the numbers from an index on, behind a pointer."""
+    array = types.Array(types.float64, 1, "C")
+
+    def codegen(context, builder, signature, args):
+        made = cgutils.create_struct_proxy(array)(context, builder)
+        eight = context.get_constant(types.intp, 8)
+        made.data = builder.gep(args[0], [args[1]])
+        made.nitems = args[2]
+        made.itemsize = eight
+        made.shape = cgutils.pack_array(builder, [args[2]])
+        made.strides = cgutils.pack_array(builder, [eight])
+        made.meminfo = cgutils.get_null_value(made.meminfo.type)
+        made.parent = cgutils.get_null_value(made.parent.type)
+        return made._getvalue()
+
+    return array(numbers, types.intp, types.intp), codegen
+
+
+def _pair(found):
+    """Return an estimator's velocity and acceleration, NaN if it gives none."""
+    raise NotImplementedError
+
+
+@overload(_pair)
+def _pair_of(found):
+    if isinstance(found, types.BaseTuple):
+        return lambda found: (found[0], found[1])
+    return lambda found: (found, math.nan)
+
+
+def _signal(form: Form, name: str, kind: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, t, i) -> value, rate and acceleration of a
+    signal in channel i; of one that sees the loop, (row, work, t, e, de, s).
+    """
+    value = compile_user(kind.value)
+    values = reader(parameters(kind))
+    at = row_places(form).at[name]
+    table = at + PARAMETERS + len(parameters(kind))
+    kept = work_places(form).at[name] + 1
+    memory = kind.memory
+    seed = row_places(form).at["seed"]
+    rows = kind.rows
+
+    def random(row, tables, work, t, i):
+        state = view(work, kept + i * memory, memory)
+        numbers = values(row, at + PARAMETERS)
+        return value(t, numbers, state, row[seed], float(i), row[at + STREAM])
+
+    def series(row, tables, work, t, i):
+        first = int(row[table])
+        count = int(row[table + 1])
+        points = view(tables, first, rows * count).reshape((rows, count))
+        return value(t, values(row, at + PARAMETERS), points)
+
+    def seeing(row, work, t, e, de, s):
+        return value(t, values(row, at + PARAMETERS), view(work, kept, memory), e, de, s)
+
+    def plain(row, tables, work, t, i):
+        return value(t, values(row, at + PARAMETERS))
+
+    if kind.random:
+        return own(random)
+    if kind.sees:
+        return own(seeing)
+    return own(series if kind.series else plain)
+
+
+def _by_channel(functions: Sequence[Any]) -> Any:
+    """Return a compiled function that calls the function of channel i, or the last one."""
+    chosen = functions[-1]
+    for j in range(len(functions) - 2, -1, -1):
+        chosen = _either(j, functions[j], chosen)
+    return chosen
+
+
+def _either(j: int, function: Any, others: Any) -> Any:
+    @own
+    def choose(row, tables, work, y, i):
+        if i == j:
+            return function(row, tables, work, y, i)
+        return others(row, tables, work, y, i)
+
+    return choose
+
+
+@own
+def _absent(row, tables, work, t, i):
+    return 0.0, 0.0, 0.0
+
+
+def _lateness(form: Form) -> Any:
+    """Return a compiled function (row, k) -> by how many physics steps sample k is late; -1 if it
+    does not run.
+    """
+    if not form.clock:
+        return own(lambda row, k: 0)
+    SAMPLES, STEPS, SEED, JITTER, MISSED = row_places(form).of(
+        "samples", "steps", "seed", "jitter", "missed"
+    )
+    PAUSE, PAUSE_SAMPLES, PAUSE_PHASE = row_places(form).of("pause", "pause_samples", "pause_phase")
+
+    @own
+    def late(row, k):
+        if k == 0 or k == int(row[SAMPLES]):
+            return 0
+        if row[MISSED] != 0.0 and philox.uniform(row[SEED], 0, philox.MISSED, k) < row[MISSED]:
+            return -1
+        if row[PAUSE] != 0.0:
+            return after_pauses(
+                k,
+                int(row[STEPS]),
+                int(row[PAUSE]),
+                int(row[PAUSE_SAMPLES]),
+                int(row[PAUSE_PHASE]),
+            )
+        if row[JITTER] == 0.0:
+            return 0
+        return int(philox.uniform(row[SEED], 0, philox.JITTER, k) * (row[JITTER] + 1.0))
+
+    return late
+
+
+def _sampling(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, k, within, step) -> failure code.
+
+    It measures and runs the law, if sample k comes in this step, and applies the command whose
+    delay has passed.
+    """
+    n = form.n
+    delayed = form.delay
+    slots = form.slots
+    measure = _measuring(form, compile_user)
+    command = _commanding(form, compile_user)
+    late_of = _lateness(form)
+    U, BUFFER, APPLIED = work_places(form).of("u", "buffer", "applied")
+    STEPS, STEP, PERIOD, DELAY = row_places(form).of("steps", "step", "period", "delay")
+
+    @own
+    def apply(work, k):
+        for i in range(n):
+            work[APPLIED + i] = work[BUFFER + k % slots * n + i]
+
+    @own
+    def sample(row, tables, work, k, within, step):
+        late = late_of(row, k)
+        if within == 0 and late != 0:  # until then the last command stays
+            for i in range(n):
+                work[BUFFER + k % slots * n + i] = work[U + i]
+        if within == late:
+            t = k * row[PERIOD] + late * row[STEP]
+            measure(row, tables, work, k, t)
+            if not command(row, tables, work, k, t):
+                return NOT_FINITE
+        if not delayed:
+            if within == late:
+                apply(work, k)
+            return FINE
+        steps = int(row[STEPS])
+        past = step - int(row[DELAY])
+        if past >= 0:
+            sent = past
+            if steps > 1:
+                sent = past // steps
+            if past - sent * steps == late_of(row, sent):
+                apply(work, sent)
+        return FINE
+
+    return sample
+
+
+def _measuring(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, k, t): sensors, noise and estimators of all
+    channels.
+    """
+    n = form.n
+    noise = form.noise
+    errors = []
+    for i, kind in enumerate(form.errors):
+        if kind is None:
+            errors.append(_absent)
+        else:
+            errors.append(_signal(form, f"errors {i}", kind, compile_user))
+    position_error, velocity_error = errors
+    estimate = compile_user(form.estimator.function)
+    gains = reader(form.estimator.names)
+    memory = form.estimator.memory
+    GAINS, SEED, SIGMA_X, SIGMA_V, PERIOD = row_places(form).of(
+        "estimator", "seed", "sigma_x", "sigma_v", "period"
+    )
+    X, V, SEEN_X, SEEN_V, SEEN_A, MEMORY = work_places(form).of(
+        "x", "v", "seen_x", "seen_v", "seen_a", "estimator"
+    )
+
+    @own
+    def measure(row, tables, work, k, t):
+        for i in range(n):
+            x = work[X + i] + position_error(row, tables, work, t, 0)[0]
+            v = work[V + i] + velocity_error(row, tables, work, t, 0)[0]
+            if noise and (row[SIGMA_X] != 0.0 or row[SIGMA_V] != 0.0):
+                z = philox.normals(row[SEED], i, philox.MEASUREMENT, k)
+                x += row[SIGMA_X] * z[0]
+                v += row[SIGMA_V] * z[1]
+            state = view(work, MEMORY + i * memory, memory)
+            found = _pair(estimate(Reading(row[PERIOD], x, v), gains(row, GAINS), state))
+            work[SEEN_X + i] = x
+            work[SEEN_V + i] = found[0]
+            work[SEEN_A + i] = found[1]
+
+    return measure
+
+
+def _law(form: Form, i: int, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, y, channel) -> u and s of law i."""
+    part = form.laws[i]
+    function = compile_user(part.function)
+    gains = reader(part.names)
+    memory = part.memory
+    at = row_places(form).at[f"law {i}"]
+    first = work_places(form).at["law"]
+    columns = len(part.names) if form.spread else 0
+
+    @own
+    def law(row, tables, work, y, channel):
+        state = view(work, first + channel * memory, memory)
+        return function(y, gains(row, at + channel * columns), state)
+
+    return law
+
+
+def _surface(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, work, y, channel) -> y with the surface's s and v_eq."""
+    part = form.surface
+    if part is None:
+        return own(lambda row, work, y, channel: y)
+    function = compile_user(part.function)
+    gains = reader(part.names)
+    memory = part.memory
+    at = row_places(form).at["surface"]
+    first = work_places(form).at["surface"]
+
+    @own
+    def on_surface(row, work, y, channel):
+        state = view(work, first + channel * memory, memory)
+        s, v_eq = function(y, gains(row, at), state)
+        return Measurement(
+            y.t,
+            y.dt,
+            y.x,
+            y.v,
+            y.e,
+            y.de,
+            y.r,
+            y.dr,
+            y.ddr,
+            y.f,
+            y.g,
+            y.a,
+            y.limit,
+            y.model,
+            1.0,
+            s,
+            v_eq,
+            y.q,
+            y.dq,
+            y.fq,
+            y.gq,
+        )
+
+    return on_surface
+
+
+def _commanding(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, k, t) -> whether all commands are finite.
+
+    It runs the law of every channel.
+    """
+    n = form.n
+    slots = form.slots
+    true_model = form.true_model
+    references = []
+    for i, kind in enumerate(form.references):
+        references.append(_signal(form, f"references {i}", kind, compile_user))
+    refer = _by_channel(references)
+    if form.feedforward is None:
+        feed = _absent
+    else:
+        feed = _signal(form, "feedforward", form.feedforward, compile_user)
+    law = _by_channel([_law(form, i, compile_user) for i in range(len(form.laws))])
+    on_surface = _surface(form, compile_user)
+    nominal = compile_user(form.nominal.function)
+    values = reader(form.nominal.names)
+    KNOWN, LIMITS, PERIOD, USES_MODEL = row_places(form).of(
+        "known", "limits", "period", "uses_model"
+    )
+    SEEN_X, SEEN_V, SEEN_A, D, BUFFER, U, S, R = work_places(form).of(
+        "seen_x", "seen_v", "seen_a", "d", "buffer", "u", "s", "r"
+    )
+
+    @own
+    def command(row, tables, work, k, t):
+        known = values(row, KNOWN)
+        xs = view(work, SEEN_X, n)
+        vs = view(work, SEEN_V, n)
+        forward = feed(row, tables, work, t, 0)[0]
+        for i in range(n):
+            r, dr, ddr = refer(row, tables, work, t, i)
+            f, g = nominal(xs, vs, i, known)
+            if true_model:
+                f += work[D + i] * g
+            a = work[SEEN_A + i]
+            if math.isnan(a):
+                a = ddr
+            limit = row[LIMITS + i]
+            x = xs[i]
+            v = vs[i]
+            y = Measurement(
+                t,
+                row[PERIOD],
+                x,
+                v,
+                x - r,
+                v - dr,
+                r,
+                dr,
+                ddr,
+                f,
+                g,
+                a,
+                limit,
+                row[USES_MODEL],
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            )
+            u, s = law(row, tables, work, on_surface(row, work, y, i), i)
+            u += forward
+            if not (math.isfinite(u) and math.isfinite(s) and math.isfinite(r)):
+                return False
+            u = min(max(u, -limit), limit)
+            work[BUFFER + k % slots * n + i] = u
+            work[U + i] = u
+            work[S + i] = s
+            work[R + i] = r
+        return True
+
+    return command
+
+
+def _disturbing(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, t, k): the sum of the disturbances on each
+    channel at time t, s.
+
+    k is the sample at its first stage, and -1 at all others.
+    """
+    if not form.disturbances:
+        return own(lambda row, tables, work, t, k: None)
+    n = form.n
+    total = own(lambda row, tables, work, t, i, k, d: d)
+    for j, kind in reversed(list(enumerate(form.disturbances))):
+        total = _adding(form, f"disturbances {j}", kind, total, compile_user)
+    D = work_places(form).at["d"]
+
+    @own
+    def disturb(row, tables, work, t, k):
+        for i in range(n):
+            work[D + i] = total(row, tables, work, t, i, k, 0.0)
+
+    return disturb
+
+
+def _adding(form: Form, name: str, kind: Any, others: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function that adds a disturbance, and the others, to d."""
+    evaluate = _signal(form, name, kind, compile_user)
+    active = row_places(form).at[name] + ACTIVE
+    last = work_places(form).at[name]
+    alone = kind.random
+    sees = kind.sees
+    PERIOD = row_places(form).at["period"]
+    X, V, R, LAST_R, S = work_places(form).of("x", "v", "r", "last_r", "s")
+
+    @own
+    def value(row, tables, work, t, i, k):
+        if sees:
+            if i > 0 or k < 0:
+                return work[last]
+            r = work[R]
+            rate = (r - work[LAST_R]) / row[PERIOD] if k > 0 else 0.0
+            return evaluate(row, work, t, work[X] - r, work[V] - rate, work[S])[0]
+        if i > 0 and not alone:
+            return work[last]
+        return evaluate(row, tables, work, t, i)[0]
+
+    @own
+    def add(row, tables, work, t, i, k, d):
+        if row[active] != 0.0:
+            work[last] = value(row, tables, work, t, i, k)
+            d += work[last]
+        return others(row, tables, work, t, i, k, d)
+
+    return add
+
+
+def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, k, within, step): a physics step of RK4."""
+    n = form.n
+    jump = form.jump
+    disturbed = bool(form.disturbances)
+    # a signal without memory is the same at the second stage and at the third
+    remembers = any(kind.memory for kind in form.disturbances)
+    nominal = compile_user(form.nominal.function)
+    values = reader(form.nominal.names)
+    X, V, A, X0, V0, SUM_V, SUM_A, APPLIED, D = work_places(form).of(
+        "x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "d"
+    )
+    STEP, PERIOD, JUMP_STEP, BEFORE, AFTER = row_places(form).of(
+        "step", "period", "jump_step", "before", "after"
+    )
+
+    @own
+    def advance(row, tables, work, k, within, step):
+        h = row[STEP]
+        xs = view(work, X, n)
+        vs = view(work, V, n)
+        p = values(row, BEFORE)
+        if jump and row[JUMP_STEP] >= 0.0 and step >= row[JUMP_STEP]:
+            p = values(row, AFTER)
+        for i in range(n):
+            work[X0 + i] = xs[i]
+            work[V0 + i] = vs[i]
+            work[SUM_V + i] = 0.0
+            work[SUM_A + i] = 0.0
+        for stage in range(4):
+            if disturbed and stage > 0 and (stage != 2 or remembers):
+                fraction = LAST_STAGE if stage == 3 else 0.5
+                disturb(row, tables, work, k * row[PERIOD] + (within + fraction) * h, -1)
+            for i in range(n):
+                f, g = nominal(xs, vs, i, p)
+                work[A + i] = f + g * (work[APPLIED + i] + work[D + i])
+            weight = 1.0 if stage % 3 == 0 else 2.0
+            reach = h if stage == 2 else 0.5 * h
+            for i in range(n):
+                speed = vs[i]
+                change = work[A + i]
+                work[SUM_V + i] += weight * speed
+                work[SUM_A + i] += weight * change
+                xs[i] = work[X0 + i] + reach * speed
+                vs[i] = work[V0 + i] + reach * change
+        for i in range(n):
+            xs[i] = work[X0 + i] + h / 6.0 * work[SUM_V + i]
+            vs[i] = work[V0 + i] + h / 6.0 * work[SUM_A + i]
+
+    return advance
+
+
+def _recording(form: Form) -> Any:
+    """Return a compiled function (row, work, scores, log, k): what is kept of sample k."""
+    n = form.n
+    columns = len(LOGGED)
+    tally = tallying(form)
+    LOGGING = row_places(form).at["logging"]
+    X, V, D, U, S, R, LAST_U, LAST_R = work_places(form).of(
+        "sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r"
+    )
+
+    @own
+    def record(row, work, scores, log, k):
+        tally(row, work, scores, k)
+        for i in range(n):
+            if row[LOGGING] != 0.0:
+                at = (k * n + i) * columns
+                log[at + 0] = work[X + i]
+                log[at + 1] = work[V + i]
+                log[at + 2] = work[U + i]
+                log[at + 3] = work[S + i]
+                log[at + 4] = work[D + i]
+                log[at + 5] = work[R + i]
+            work[LAST_U + i] = work[U + i]
+            work[LAST_R + i] = work[R + i]
+
+    return record

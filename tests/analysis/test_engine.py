@@ -1,0 +1,98 @@
+"""The fast engine against MuJoCo: one contract for laws, plants and conditions."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.engine import cpu, group
+from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES
+from smc_mujoco.analysis.engine.scores import METRICS, RESTING
+from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.metrics import catalogue
+from smc_mujoco.signals import BandLimited, Held, MinimumJerk, OrnsteinUhlenbeck, Relay
+from smc_mujoco.simulation import state
+
+AGREES = 1e-9  # of the start
+SINE = smc.Sine(0.2, 5.0)
+ALIKE = {  # they differ in numbers alone, and one loop runs them together
+    "nominal": {},
+    "noise": {"noise": smc.Noise(1e-3, 5e-3), "seed": 7},
+    "delay": {"input_delay": 3e-3, "disturbance": SINE, "control_period": 2e-3},
+    "random": {"disturbance": (OrnsteinUhlenbeck(0.2, 0.1), smc.Step(0.1, 2.0)), "seed": 3},
+    "jump": {"jump": smc.Jump(3.0, {"mass": 2.0}), "mismatch": {"mass": 0.8}},
+    "relay": {"disturbance": Relay(0.2, rate=1.0), "model": "nominal"},
+    "jitter": {"clock": smc.Clock(jitter=5e-4, missed=0.1), "physics_step": 2.5e-4},
+    "pauses": {"clock": smc.Clock(pause=5e-3, pause_every=0.1)},
+}
+APART = {
+    "estimated": {"velocity": "levant", "input_delay": 3e-3, "disturbance": SINE},
+    "moving": {"reference": MinimumJerk(0.4, 1.0, 2.0), "feedforward": smc.Constant(0.1)},
+    "true model": {"model": "true", "disturbance": BandLimited(0.1, 1.0, 5.0)},
+    "known errors": {"noise": smc.Noise(velocity_error=Held((0.0, 0.5), (0.0, 0.01)))},
+    "surface": {"surface": "nonsingular_terminal"},
+}
+
+
+def check(plant, law, conditions, duration=10.0):
+    """Compare the samples and scores of runs, in one group, with those of MuJoCo."""
+    base = smc.Scenario(plant=plant, law=law, duration=duration)
+    cases = [dataclasses.replace(base, **fields) for fields in conditions.values()]
+    moving = not isinstance(cases[0].references[0], smc.Constant)
+    metrics = [name for name in METRICS if not (moving and name in RESTING)]
+    assert [group.why_not(case, metrics) for case in cases] == [""] * len(cases)
+    made = group.Group(cases, metrics)
+    made.rows[:, made.places.at["logging"]] = 1.0
+    logs = np.full((len(cases), base.samples + 1, base.plant.n, len(LOGGED)), np.nan)
+    scores = cpu.run(made.form, made.rows, made.tables, 1, logs)
+    others = []
+    for case in cases:
+        x0 = tuple(x + 1e-12 for x in case.resolved.x0)
+        others.append(dataclasses.replace(case, x0=x0))
+    runs = zip(smc.run(cases), smc.run(others), logs, scores, strict=True)
+    for name, (trace, other, log, score) in zip(conditions, runs, strict=True):
+        if trace.diverged_at is not None:
+            assert score[FAILURE] != state.FINE
+            step = trace.scenario.resolved.physics_step
+            assert score[FAILED_STEP] * step == pytest.approx(trace.diverged_at, abs=2e-3)
+            continue
+        assert score[FAILURE] == state.FINE
+        if base.law.template.continuous:
+            for i, column in enumerate(LOGGED):
+                samples = getattr(trace, column)
+                apart = np.abs(log[: len(samples), :, i] - samples).max()
+                room = np.abs(getattr(other, column) - samples).max()
+                assert apart <= AGREES * max(1.0, np.abs(samples).max()) + room, (name, column)
+        expected = catalogue.score(trace)
+        close = catalogue.score(other)
+        for metric, value in zip(metrics, score[SCORES:], strict=True):
+            room = 3.0 * abs(close[metric] - expected[metric])
+            assert value == pytest.approx(expected[metric], rel=AGREES, abs=AGREES + room), (
+                name,
+                metric,
+            )
+
+
+@pytest.mark.parametrize(
+    "plant", ["duffing", pytest.param("inverted_pendulum_network", marks=pytest.mark.slow)]
+)
+def test_a_run_is_that_of_mujoco_at_every_sample(plant):
+    check(plant, "boundary_layer", ALIKE, duration=4.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("condition", APART)
+@pytest.mark.parametrize(
+    ("plant", "law"),
+    [("inverted_pendulum", "super_twisting"), ("pendulum_network", "boundary_layer")],
+)
+def test_a_run_of_other_parts_is_that_of_mujoco(plant, law, condition):
+    check(plant, law, {condition: APART[condition]}, duration=4.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [law for law in laws() if not laws()[law].plants])
+def test_every_law_runs_as_in_mujoco(law):
+    conditions = {name: ALIKE[name] for name in ("nominal", "noise", "delay", "jump")}
+    check("inverted_pendulum", law, conditions)
