@@ -49,14 +49,13 @@ def counted(count: int, noun: str) -> str:
     return f"1 {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def stated(data: Any) -> dict[str, Any]:
-    """Return what the text of frozen data states: its fields, those by keyword alone last, and only
-    if they differ from their defaults.
+def stated(data: Any, defaults: bool = True) -> dict[str, Any]:
+    """Return the fields of frozen data that its text states, those by keyword alone last, and only
+    if they differ from their defaults; without `defaults`, all are so.
     """
-    fields = sorted(dataclasses.fields(data), key=lambda field: bool(field.kw_only))
     values = {}
-    for field in fields:
+    for field in sorted(dataclasses.fields(data), key=lambda field: bool(field.kw_only)):
         value = getattr(data, field.name)
-        if field.init and not (field.kw_only and value == field.default):
+        if field.init and (value != field.default or (defaults and not field.kw_only)):
             values[field.name] = value
     return values

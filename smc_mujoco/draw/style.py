@@ -399,13 +399,11 @@ def _value(value: object) -> str:
         return str(value).replace("_", " ")
     kind = re.sub(CAMEL, lambda start: f" {start[1].lower()}", type(value).__name__)
     words = [kind]
-    usual = {field.name: field.default for field in dataclasses.fields(value)}
-    fields = stated(value)
-    for name, part in fields.items():
-        if part != usual[name]:
-            said = _value(part)
-            words.append(said if len(fields) == 1 else f"{name.replace('_', ' ')} {said}")
-    return (" " if len(fields) == 1 else ", ").join(words)
+    alone = len(stated(value)) == 1
+    for name, part in stated(value, defaults=False).items():
+        said = _value(part)
+        words.append(said if alone else f"{name.replace('_', ' ')} {said}")
+    return (" " if alone else ", ").join(words)
 
 
 def ending(trace: Trace) -> str:

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
-from smc_mujoco.common.text import counted
+from smc_mujoco.common.text import counted, joined, stated
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -22,7 +22,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, all_joints, joint_names
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, all_joints, joint_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
@@ -289,40 +289,37 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
 
     Kinds must differ, and one at most has bristles on a joint.
     """
+    several_parts = several(Friction, "smc.Coulomb(0.05)")
     items: list[Friction] = []
     for item in as_tuple(value):
-        by_joint = item if isinstance(item, Mapping) else {None: item}
-        places: dict[Friction, list[str]] = {}
-        for joint, given in by_joint.items():
-            for part in several(Friction, "smc.Coulomb(0.05)")(name, given, s):
-                if joint is None:
-                    items.append(part)
-                else:
-                    places.setdefault(part, []).append(joint)
-        items += [dataclasses.replace(part, on=tuple(on)) for part, on in places.items()]
+        if isinstance(item, Mapping):
+            for joint, given in item.items():
+                for part in several_parts(name, given, s):
+                    items.append(dataclasses.replace(part, on=(joint,)))
+        else:
+            items += several_parts(name, item, s)
     items = [_placed(name, part, s.plant) for part in items]
     for part, other in itertools.combinations(items, 2):
-        kinds = type(part).__name__, type(other).__name__
-        if type(part) is type(other) and part.on == other.on:
-            raise ScenarioError(f"{name} has a {kinds[0]} twice: give one")
+        same = type(part) is type(other) and part.on == other.on
         both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
-        if part.bristles and other.bristles and both:
-            raise ScenarioError(
-                f"{name} has {kinds[0]} and {kinds[1]}, which both model bristles: give one"
-            )
+        if same or (part.bristles and other.bristles and both):
+            kinds = f"{type(part).__name__} and {type(other).__name__}"
+            raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
     return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))
 
 
 def _placed(name: str, part: Friction, plant: Plant) -> Friction:
-    """Return a friction whose joints are those of the plant, in their order."""
-    if not part.on:
-        return part
+    """Return a friction with the joints that it acts on, if these are not the driven ones alone."""
     joints = all_joints(plant)
     for joint in part.on:
         if joint not in (EVERY, *joints):
             raise unknown(f"joint of {plant.name} in {name}", joint, joints)
-    on = [joint for joint in joints if joint in part.on or EVERY in part.on]
-    return dataclasses.replace(part, on=tuple(on))
+    if EVERY in part.on:
+        return dataclasses.replace(part, on=joints)
+    for value in stated(part).values():  # a number for each channel is one by name
+        if not part.on and isinstance(value, tuple) and len(value) == plant.n > plant.driven:
+            return dataclasses.replace(part, on=joint_names(plant))
+    return part
 
 
 def actuator(
@@ -333,19 +330,14 @@ def actuator(
     """
     items = several(Actuator, "smc.Lag(0.01)")(name, value, s)
     drives = [part for part in items if part.drives]
-    _check_kinds_differ(name, [part for part in items if not part.drives])
+    others = [type(part).__name__ for part in items if not part.drives]
+    if len(others) > len(set(others)):
+        raise ScenarioError(f"{name} has {joined(others)}: give one of a kind")
     if len(drives) > 2 or (len(drives) == 2 and not isinstance(drives[0], Lag)):
         raise ScenarioError(
             f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), another)"
         )
     return tuple(sorted(items, key=lambda part: not part.drives))
-
-
-def _check_kinds_differ(name: str, items: Sequence[Part]) -> None:
-    """Raise ScenarioError for two parts of the same kind."""
-    kinds = [type(part).__name__ for part in items]
-    if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
-        raise ScenarioError(f"{name} has a {twice[0]} twice: give one")
 
 
 def as_tuple(value: object) -> tuple[Any, ...]:

@@ -59,7 +59,6 @@ from smc_mujoco.simulation.scenario import (
     U_MAX,
     Scenario,
     default_u_max,
-    suggested_u_max,
 )
 from smc_mujoco.simulation.signals import (
     Clock,
@@ -334,11 +333,9 @@ def _as_text(value: Any, defaults: bool = True) -> str:
         gains = ", ".join(f"{gain}={number!r}" for gain, number in value.gains.items())
         return f"{value.name}({gains})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
-        usual = {f.name: f.default for f in dataclasses.fields(value)}
         texts = []
-        for name, content in stated(value).items():
-            if defaults or content != usual[name]:
-                texts.append(f"{name}={_as_text(content, defaults)}")
+        for name, content in stated(value, defaults).items():
+            texts.append(f"{name}={_as_text(content, defaults)}")
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
         return f"({', '.join(_as_text(one, defaults) for one in value)},)"
@@ -446,16 +443,11 @@ def _rubbing(make: Callable[[float], Friction | tuple[Friction, ...]]) -> Recipe
     """
 
     def fields(plant: Plant, duration: float) -> Fields:
-        bounds = suggested_u_max(plant)
-        if not isinstance(bounds, tuple):
-            bounds = (bounds,) * plant.driven
-        made = []
-        for bound, limit in zip(bounds, plant.limits or bounds, strict=True):
-            least = min(bound, limit)
-            made.append(make((least if least < math.inf else U_MAX) / BOUNDS_PER_FRICTION))
-        if len(set(made)) == 1:
-            return {"friction": made[0]}
-        return {"friction": dict(zip(joint_names(plant), made, strict=False))}
+        limits = Scenario.recorded(plant=plant, law="none").limits
+        parts = [make(limit / BOUNDS_PER_FRICTION) for limit in limits]
+        if len(set(limits)) == 1:
+            return {"friction": parts[0]}
+        return {"friction": dict(zip(joint_names(plant), parts, strict=False))}
 
     return fields
 

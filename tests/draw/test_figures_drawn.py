@@ -283,7 +283,7 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
         ["reaction", "sliding variable s ("],  # whose unit is the law's
     ),
     "a pole with friction": (
-        {"plant": "cart_pole", "friction": Coulomb(0.01)},
+        {"plant": "cart_pole", "friction": {"*": Coulomb(0.01)}},
         ["reaction (N)", "reaction on q (N·m)"],
         [],
     ),

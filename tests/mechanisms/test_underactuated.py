@@ -183,15 +183,9 @@ def test_the_stops_end_the_rail(name):
 
 PARTS = {
     "ideal": {},
-    "viscous": {"friction": smc.Viscous(0.05)},
-    "coulomb": {"friction": smc.Coulomb(0.001)},
-    "lugre": {
-        "friction": smc.hardware.LuGre(
-            coulomb=0.001,
-            static=0.0012,
-            stribeck=0.05,
-        )
-    },
+    "viscous": {"friction": {"*": smc.Viscous(0.05)}},
+    "coulomb": {"friction": {"*": smc.Coulomb(0.001)}},
+    "lugre": {"friction": {"*": smc.hardware.LuGre(coulomb=0.001, static=0.0012, stribeck=0.05)}},
     "lag": {"actuator": smc.Lag(0.01)},
     "motor": {"actuator": smc.DCMotor()},
     "rate": {"actuator": smc.hardware.RateLimit(200.0)},
@@ -253,7 +247,7 @@ def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_pr
         runs.append(
             scenario(
                 "cart_pole",
-                friction=smc.Coulomb(level),
+                friction={"hinge": smc.Coulomb(level)},
                 duration=20.0,
             )
         )

@@ -89,31 +89,22 @@ class Friction(Part):
         words = [f"{name}={value!r}" for name, value in stated(self).items()]
         return f"{type(self).__name__}({', '.join(words)})"
 
-    def structure(self) -> tuple[Hashable, ...]:
+    def structure(self) -> Hashable:
         return type(self), self.on
-
-    def reach(self, n: int, driven: int) -> int:
-        """Return on how many of n channels it acts without names, the driven ones first."""
-        del n
-        return driven
 
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""
-        if self.on:
-            return [spec.joint(name) for name in self.on]
-        channels = joints(spec)
-        return channels[: self.reach(len(channels), len(drives(spec)))]
+        named = [spec.joint(name) for name in self.on]
+        return named or joints(spec)[: len(drives(spec))]
 
     def dofs(self, model: mujoco.MjModel) -> np.ndarray:
         """Return the degrees of freedom that it acts on."""
-        if self.on:
-            return np.array([model.joint(name).dofadr[0] for name in self.on])
-        channels = dof_ids(model)
-        return channels[: self.reach(len(channels), len(drive_ids(model)))]
+        named = [model.joint(name).dofadr[0] for name in self.on]
+        return np.array(named or dof_ids(model)[: len(drive_ids(model))], int)
 
     def joint_names(self, plant: Plant) -> tuple[str, ...]:
         """Return the names of the plant's joints that it acts on."""
-        return self.on or joint_names(plant)[: self.reach(plant.n, plant.driven)]
+        return self.on or joint_names(plant)[: plant.driven]
 
     def scaled(self, factor: float) -> "Friction":
         """Return this friction with a factor on its force."""
@@ -241,9 +232,10 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
 def all_joints(plant: Plant) -> tuple[str, ...]:
     """Return the names of all hinges and slides of a plant, first those of its channels."""
     model = compiled(plant.spec())
-    kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
-    found = np.flatnonzero(np.isin(model.jnt_type, kinds))
-    others = [model.joint(int(joint)).name for joint in found]
+    others = []
+    for joint in range(model.njnt):
+        if model.jnt_type[joint] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+            others.append(model.joint(joint).name)
     return tuple(filter(None, dict.fromkeys((*joint_names(plant), *others))))
 
 

@@ -39,7 +39,7 @@ over each physics step.
 
 import dataclasses
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import mujoco
@@ -74,17 +74,6 @@ class Sliding(Friction):
     def names(self) -> tuple[str, ...]:
         """The fields, which the formula reads as p."""
         return tuple(field.name for field in dataclasses.fields(self) if field.name != "on")
-
-    def _lengths(self) -> frozenset[int]:
-        """Return the lengths of the fields that are sequences."""
-        values = [getattr(self, name) for name in self.names]
-        return frozenset(len(value) for value in values if isinstance(value, tuple))
-
-    def reach(self, n: int, driven: int) -> int:
-        return n if n in self._lengths() else driven
-
-    def structure(self) -> tuple[Hashable, ...]:
-        return (*super().structure(), self._lengths())
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:

@@ -74,8 +74,8 @@ def test_joints_survive_text_json_and_a_batch(friction):
         ({"wheel": smc.Coulomb(0.1)}, "unknown joint .* 'wheel': choose from hinge, slide"),
         (smc.Coulomb(0.1, on=("wheel",)), "unknown joint .* 'wheel'"),
         ({"slide": 0.1}, "friction is 0.1: give"),
-        ({"*": LUGRE, "hinge": SIGMOID}, "both model bristles"),
-        ({"slide": (smc.Coulomb(0.1), smc.Coulomb(0.2))}, "has a Coulomb twice"),
+        ({"*": LUGRE, "hinge": SIGMOID}, "LuGre and Sigmoid on the same joint"),
+        ({"slide": (smc.Coulomb(0.1), smc.Coulomb(0.2))}, "Coulomb and Coulomb on the same joint"),
         ({"*": smc.hardware.Sigmoid((0.1, 0.2, 0.3), 9.0)}, "one number, or 2"),
     ],
 )
