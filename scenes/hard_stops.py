@@ -24,7 +24,7 @@ scene = smc.Scene(
             "inverted_pendulum",
             duration=4.0,
             changes={
-                "contact": smc.Contact("stops", restitution=e),
+                "contact": smc.hardware.Contact("stops", restitution=e),
                 "disturbance": smc.signals.Impulse(2.0, time=1.0, width=0.01),
             },
         )

@@ -28,7 +28,7 @@ scene = smc.Scene(
             "pendulum_network",
             duration=4.0,
             changes={
-                "contact": smc.Contact("bobs", restitution=e),
+                "contact": smc.hardware.Contact("bobs", restitution=e),
                 "x0": (-0.8, -0.6, 0.0, 0.5, 0.7),
             },
         )

@@ -27,7 +27,7 @@ scene = smc.Scene(
     title="Duffing block on a rough floor",
     conditions={
         f"mu {mu:g}": smc.paper.comparison(
-            "duffing", duration=6.0, changes={"contact": smc.Contact("floor", friction=mu)}
+            "duffing", duration=6.0, changes={"contact": smc.hardware.Contact("floor", friction=mu)}
         )
         for mu in (0.05, 0.1, 0.2)
     },

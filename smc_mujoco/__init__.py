@@ -16,19 +16,18 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Laws: law, laws, law_function, law_from
     Plants: plant, plants, plant_from, Channel
     Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder,
-        Backlash, DCMotor, Lag
+        Backlash, DCMotor, Lag, Stops, Wall, Ball
     Compare: compare, which, tune, margins, grid, study, leaderboard, Table
     More to run and to look at: stream, scores, Scene, play, ScenarioError
     Surfaces, estimators, policies: surface, surface_function, estimator, estimator_function,
         policy
-    Machines: Contact, rig, rigs, identify
     Signals and time: Signal, Jump, Clock
     Analyse: worst_case, sensitivity, Uncertainty
-    Benchmark: problem, results
+    Benchmark: problem, results, rig
 
 What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, series),
 `smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
-attraction), `smc.audits` (claims of papers, certificates, orders of accuracy, the report),
+attraction), `smc.audits` (claims of papers, certificates, orders of accuracy, the report, rigs),
 `smc.fidelity`, `smc.metrics` (of joints and tips), `smc.exchange` (laws from and to C and FMUs),
 `smc.envs` (environments for agents), `smc.errors` (warnings) and `smc.paper`.
 

@@ -1,4 +1,6 @@
-"""Audits of papers and of laws: claims, certificates, orders of accuracy, and the whole study."""
+"""Audits of papers, laws and machines: claims, certificates, orders of accuracy, the whole study;
+rigs, and parameters from their records.
+"""
 
 from smc_mujoco.common import lazy
 

@@ -1,9 +1,10 @@
-"""Friction models and drives beyond those at the root."""
+"""Friction models, drives and kinds of contact beyond those at the root."""
 
+from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 
-__all__ = ["LuGre", "RateLimit", "ServoFriction", "Sigmoid", "Stepper", "servo"]
+__all__ = ["Contact", "LuGre", "RateLimit", "ServoFriction", "Sigmoid", "Stepper", "servo"]

@@ -339,7 +339,8 @@ def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> boo
     if path.parent.name in CATALOGUES or ast.unparse(node.body[0]) == "...":
         return True
     # of a signal, of a part
-    return node.name in ("value", "bounds", "parameters", "edit", "fields", "structure")
+    of_parts = "edit", "edit_on", "fields", "structure", "placed", "meets"
+    return node.name in ("value", "bounds", "parameters", *of_parts)
 
 
 def test_everything_public_is_explained():

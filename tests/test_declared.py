@@ -42,6 +42,10 @@ GIVEN = {  # what a class also needs, or two fields that depend on each other
     "Scenario": {"plant": "duffing", "law": "classical"},
     "Jump": {"factors": {}},
     "Contact": {"kind": "stops"},
+    "Stops": {"limits": {}},
+    "OfBody": {"body": "arm"},
+    "Wall": {"body": "arm", "direction": (0, 0, 1)},
+    "Ball": {"body": "arm"},
     "Push": {"body": "bob"},
     "BandLimited": {"high": 2.0},
 }

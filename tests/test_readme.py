@@ -72,7 +72,6 @@ LITTLE = {
         "budget": 4,
     },
     "tune": {"objective": SHORTLY, "searches": 2},
-    "identify": {"most": 2},
     "worst_case": {"budget": 8},
     "film": {"size": (640, 360)},
 }

@@ -43,7 +43,7 @@ class Clip(NamedTuple):
 
 
 BLOW = {
-    "contact": smc.Contact("stops", restitution=0.8),
+    "contact": smc.hardware.Contact("stops", restitution=0.8),
     "friction": smc.Coulomb(0.05),
     "disturbance": smc.signals.Impulse(2.0, time=0.6, width=0.01),
 }

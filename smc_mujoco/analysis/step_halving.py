@@ -114,7 +114,7 @@ def repetitions(trace: Trace) -> list[Scenario]:
     if chatters(trace):
         with contextlib.suppress(ScenarioError):  # the step is too short for a quarter
             found.append(halved(halved(scenario)))
-    if scenario.contact.kind != "none" and first_order(scenario):
+    if scenario.contact and first_order(scenario):
         step = scenario.resolved.physics_step
         with contextlib.suppress(ScenarioError):  # another part needs this integrator
             found.append(dataclasses.replace(scenario, integrator="RK4", physics_step=step))

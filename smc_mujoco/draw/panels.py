@@ -263,7 +263,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
             driven.append(place)
             errors.append(place._replace(quantity="settling"))
             controls.append(place._replace(quantity="u"))
-    contact = any(trace.scenario.contact.kind != "none" for trace in traces)
+    contact = any(trace.scenario.contact for trace in traces)
     of_tip = over_groups(traces, "tip")
     if contact:
         of_tip += over_groups(traces, "contact")

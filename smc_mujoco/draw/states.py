@@ -21,6 +21,7 @@ from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -98,7 +99,7 @@ def has_dry_friction(scenario: Scenario) -> bool:
         return True
     if any((isinstance(f, Coulomb) and f.level > 0.0) or f.bristles for f in scenario.friction):
         return True
-    if scenario.contact.kind == "none":
+    if not scenario.contact:
         return False
     model = shapes(scenario)[0].model
     return any(
@@ -116,7 +117,7 @@ def backlash_gap(scenario: Scenario) -> float:
 def in_contact(trace: Trace) -> np.ndarray:
     """Return where each channel touches an obstacle or another channel, (K + 1, n)."""
     contact = np.zeros(trace.x.shape, bool)
-    if trace.scenario.contact.kind == "none":
+    if not trace.scenario.contact:
         return contact
     parts = shapes(trace.scenario)
     data = [mujoco.MjData(shape.model) for shape in parts]
@@ -126,9 +127,14 @@ def in_contact(trace: Trace) -> np.ndarray:
         reacting = (trace.reaction != 0.0).any(axis=1)
     else:
         reacting = np.zeros(len(trace.t), bool)
+    moved = None
+    if any(part.loose for part in trace.scenario.contact):
+        moved = poses(trace, trace.t)
     for k in np.flatnonzero(reacting):
         now = sum(float(trace.t[k]) >= shape.time for shape in parts) - 1
         model, posed, (hits, owner) = parts[now].model, data[now], tables[now]
+        if moved is not None:
+            posed.qpos[:] = moved[k]
         posed.qpos[places] = trace.x[k]
         mujoco.mj_kinematics(model, posed)
         mujoco.mj_collision(model, posed)
@@ -137,7 +143,10 @@ def in_contact(trace: Trace) -> np.ndarray:
             if frozenset(geoms) in hits:
                 channels = owner[model.geom_bodyid[geoms]]
                 contact[k, channels[channels >= 0]] = True
-    return contact
+    joints = joint_ids(parts[0].model)  # at their stops
+    low, high = parts[0].model.jnt_range[joints].T
+    stopped = (trace.x <= low) | (trace.x >= high)
+    return contact | (stopped & (parts[0].model.jnt_limited[joints] > 0))
 
 
 def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], np.ndarray]:
@@ -160,7 +169,7 @@ def flanks(trace: Trace) -> np.ndarray:
     """Return the side from which each rotor pushes its joint, -1, 0 or 1, (K + 1, n): 1 pushes
     towards larger x.
     """
-    alone = not trace.scenario.friction and trace.scenario.contact.kind == "none"
+    alone = not (trace.scenario.friction or trace.scenario.contact)
     return np.sign(np.nan_to_num(trace.reaction if alone else trace.force))
 
 

@@ -282,12 +282,17 @@ class Plant:
         return self.build(self.n)
 
     def load(
-        self, factors: Mapping[str, float] | None = None, nuserdata: int = 0
+        self,
+        factors: Mapping[str, float] | None = None,
+        nuserdata: int = 0,
+        spec: mujoco.MjSpec | None = None,
     ) -> mujoco.MjModel:
         """Compile the ideal plant, with factors on its parameters by name, and mjData.userdata of
         length nuserdata.
+
+        `spec`: its own, with additions.
         """
-        model = compiled_for_runs(self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
+        model = compiled_for_runs(spec or self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model

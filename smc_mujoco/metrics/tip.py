@@ -23,13 +23,14 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.part import drive_ids, initial_pose, joint_ids, joint_names
+from smc_mujoco.mechanisms.hardware.part import OWN, drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.run import states
 from smc_mujoco.simulation.signals import Push
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def tip_error(trace: Trace) -> np.ndarray:
 
 def knows_contacts(scenario: Scenario) -> bool:
     """Return whether a scenario has contacts whose forces follow from a trace."""
-    return scenario.contact.kind != "none" and not _with_hidden_state(scenario)
+    return bool(scenario.contact) and not _with_hidden_state(scenario)
 
 
 def _with_hidden_state(scenario: Scenario) -> list:
@@ -116,7 +117,7 @@ def _with_hidden_state(scenario: Scenario) -> list:
 def contacts(trace: Trace) -> Contacts:
     """Return the normal forces and the penetrations of a run's contacts, read-only."""
     scenario = trace.scenario.resolved
-    if scenario.contact.kind == "none":
+    if not scenario.contact:
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
     if hidden := _with_hidden_state(scenario):
         part = type(hidden[0]).__name__
@@ -140,6 +141,9 @@ def contacts(trace: Trace) -> Contacts:
     contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)
+    whole = None
+    if any(part.loose for part in scenario.contact):
+        whole = states(trace, trace.t)
     for k in range(len(trace.t)):
         if np.isnan(trace.x[k]).any():  # the run has failed
             for values in contacts:
@@ -148,6 +152,8 @@ def contacts(trace: Trace) -> Contacts:
         if k == jump:
             models.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
+        if whole is not None:  # a ball, which no channel moves
+            data.qpos[:], data.qvel[:] = whole[0][k], whole[1][k]
         data.qpos[positions] = trace.x[k]
         data.qvel[rates] = trace.v[k]
         data.qfrc_applied[rates] = trace.d[k]
@@ -170,8 +176,10 @@ def _add_contacts(model: mujoco.MjModel, data: mujoco.MjData, contacts: Contacts
         mujoco.mj_contactForce(model, data, i, wrench)
         contacts.force[k] += wrench[0]
         contacts.depth[k] = max(contacts.depth[k], -data.contact.dist[i])
-        # 1 for a geom that moves, 0 for a fixed one; the normal points from the first to the second
-        moves = model.body_weldid[model.geom_bodyid[data.contact.geom[i]]] != 0
+        # 1 for a geom of the machine that moves, else 0; the normal points from first to second
+        bodies = model.geom_bodyid[data.contact.geom[i]]
+        moves = np.array([model.body(j).name.startswith(OWN) for j in bodies])
+        moves = (model.body_weldid[bodies] != 0) & ~moves
         first, second = moves.astype(float)
         contacts.push[k] += (second - first) * wrench[0] * data.contact.frame[i, :3]
 

@@ -20,7 +20,7 @@ from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.hardware.contact import Contact
+from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, all_joints, joint_names
 from smc_mujoco.mechanisms.named import as_plant
@@ -271,17 +271,23 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     return PerChannel(tuple(items))
 
 
-def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
-    """Return a contact that the plant offers, from itself or its kind; None means "none"."""
-    if value is None:
-        value = "none"
-    if isinstance(value, str):
-        value = Contact(value)
-    if not isinstance(value, Contact):
-        kinds = ", ".join(["none", *s.plant.contacts])
-        raise ScenarioError(f"{name} is {shown(value)}: give smc.Contact(...) or one of {kinds}")
-    value.check(s.plant)
-    return value
+def contact(name: str, value: object, s: Any) -> tuple[Obstacle, ...]:
+    """Return obstacles, from one or several, themselves or kinds of the plant's own; None means
+    "none".
+    """
+    parts = []
+    for item in as_tuple(value):
+        part = Contact(item) if isinstance(item, str) else item
+        if not isinstance(part, Obstacle):
+            kinds = ", ".join(["none", *s.plant.contacts])
+            raise ScenarioError(
+                f"{name} is {shown(item)}: give smc.Stops, smc.Wall, smc.Ball or one of {kinds}"
+            )
+        part.check(s.plant)
+        if part != Contact("none"):
+            parts.append(part)
+    _check_kinds_differ(name, [part for part in parts if isinstance(part, Contact)])
+    return tuple(parts)
 
 
 def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]:

@@ -46,6 +46,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.contact import Obstacle
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
@@ -80,8 +81,8 @@ MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
 # their values add up when conditions are joined
-ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")
-ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name
+ADDITIVE_FIELDS = ("disturbance", "friction", "actuator", "contact")
+ABSTRACT = (Part, Friction, Actuator, Obstacle, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
 # The suite's defaults, under which its plants and laws are compared.
@@ -318,7 +319,7 @@ def _kinds() -> dict[str, Any]:
 
     If two have one name, the suite's is returned.
     """
-    from smc_mujoco.mechanisms.hardware import servos  # noqa: F401
+    from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
     from smc_mujoco.simulation import time_series  # noqa: F401
 
     kinds: list[type] = [Noise, Jump, Clock, *subclasses(Part), *subclasses(Signal)]

@@ -41,6 +41,7 @@ from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law, checked_name, known_laws
+from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, catalogue
 from smc_mujoco.simulation import coerce
@@ -98,9 +99,8 @@ class Starts:
             scenario = dataclasses.replace(scenario, x0=beside_goal(scenario.plant))
         if seed == 0 and not scenario.plant.pose:
             return dataclasses.replace(scenario, seed=0)
-        kind = scenario.contact.kind
         z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
-        if kind != "none":
+        if scenario.contact:
             z = [-abs(factor) for factor in z]
         x0 = []
         for x, r, factor in zip(scenario.resolved.x0, scenario.plant.origin, z, strict=True):
@@ -109,7 +109,7 @@ class Starts:
             else:
                 away = self.by if x >= r else -self.by
                 x0.append(r + (x - r) * (1.0 + self.spread * factor) + away * factor)
-        if kind == "bobs":
+        if "bobs" in kinds(scenario.contact):
             x0.sort()
         return dataclasses.replace(scenario, seed=seed, x0=x0)
 

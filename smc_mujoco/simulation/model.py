@@ -13,14 +13,13 @@ import functools
 import itertools
 import weakref
 from collections.abc import Collection, Hashable
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.mechanisms import rotation
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.part import (
     PASSIVE,
@@ -30,8 +29,9 @@ from smc_mujoco.mechanisms.hardware.part import (
     drive_ids,
     exerted,
     free_joint,
-    initial_pose,
     joint_ids,
+    moving_joints,
+    state_with,
 )
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
@@ -55,10 +55,7 @@ MAX_OVERLAP = 1e-3
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
-    added: list[Part] = []
-    if scenario.contact.kind != "none":
-        added.append(scenario.contact)
-    added += scenario.friction
+    added: list[Part] = [*scenario.contact, *scenario.friction]
     added += [part for part in scenario.actuator if not part.in_callback]
     if scenario.sensor is not None:
         added.append(scenario.sensor)
@@ -69,7 +66,8 @@ def structure(scenario: Scenario) -> Hashable:
     """Return a key that is equal for scenarios whose mechanisms differ only in numbers."""
     plant = scenario.plant
     of_parts = tuple(part.structure() for part in parts(scenario))
-    edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
+    placed = tuple(part.placed(plant) for part in scenario.contact)
+    edits = placed, plant.mechanisms.get(scenario.mechanism)
     stepping = scenario.resolved.integrator, scenario.resolved.physics_step, scenario.exact_friction
     return (
         plant.build,
@@ -263,7 +261,8 @@ def spec(scenario: Scenario) -> mujoco.MjSpec:
     spec = scenario.plant.spec()
     if scenario.mechanism != "equation":
         scenario.plant.mechanisms[scenario.mechanism].edit(spec)
-    scenario.contact.edit_on(scenario.plant, spec)
+    for obstacle in scenario.contact:
+        obstacle.edit_on(scenario.plant, spec)
     for part in parts(scenario):
         part.edit(spec)
     for sensor in spec.sensors:
@@ -375,36 +374,6 @@ def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray
     return state_with(model, moving_joints(model), scenario.resolved.x0, scenario.resolved.v0)
 
 
-def moving_joints(model: mujoco.MjModel) -> np.ndarray:
-    """Return the joints of the channels and those that their actuators drive, rotors or the same
-    joints, (2, n).
-    """
-    if free_joint(model) >= 0:
-        return np.array([joint_ids(model)] * 2)
-    joints = joint_ids(model)
-    driven = model.actuator_trnid[drive_ids(model), 0]
-    return np.array([joints, [*driven, *joints[len(driven) :]]])
-
-
-def state_with(
-    model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in
-    `initial_pose`.
-    """
-    qpos = initial_pose(model)
-    qvel = np.zeros(model.nv)
-    if (free := free_joint(model)) >= 0:
-        first = model.jnt_qposadr[free]
-        dof = model.jnt_dofadr[free]
-        qpos[first : first + 7] = [*x[:3], *rotation.quaternion(*x[3:])]
-        qvel[dof : dof + 6] = v
-        return qpos, qvel
-    qpos[model.jnt_qposadr[joints]] = x
-    qvel[model.jnt_dofadr[joints]] = v
-    return qpos, qvel
-
-
 def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
     """Write a scenario's state at t = 0 into the data of its model, with the past readings of
     delayed sensors.
@@ -424,7 +393,7 @@ def check_start(shared: Mechanism, scenario: Scenario) -> None:
     are remembered.
     """
     inputs = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
-    if scenario.contact.kind == "none" or inputs in shared.free_starts:
+    if not scenario.contact or inputs in shared.free_starts:
         return
     model = copy.copy(shared.model)
     put_values(model, shared.model, scenario, 0)
@@ -452,7 +421,7 @@ def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
         raise ScenarioError(
             f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {overlap[0]} "
             f"{'inside' if inside else 'beyond'} {overlap[1]} of contact "
-            f"{scenario.contact.kind!r}: give another x0"
+            f"{joined(map(str, scenario.contact))}: give another x0"
         )
 
 

@@ -219,8 +219,13 @@ def cores(threads: Annotated[int, Whole(low=1, high=1024)] | None = None) -> int
 
 
 def poses(trace: Trace, times: np.ndarray) -> np.ndarray:
-    """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the
-    last one.
+    """Return qpos at times in s, (times, nq), see `states`."""
+    return states(trace, times)[0]
+
+
+def states(trace: Trace, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos, (times, nq), and qvel, (times, nv), at times in s, each at the physics step
+    before; after a failure the last one.
 
     A trace has the channels only, so the run is simulated again.
     """
@@ -230,17 +235,19 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray:
     wanted: list[int] = np.clip(
         np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total
     ).tolist()
-    qpos_at: dict[int, np.ndarray] = {}
+    state_at = {}
     with callback.installed():
         batch = ScenarioBatch([prepared], threads=1)
         qpos = batch.batch.bind("qpos")
-        last = qpos[0].copy()
+        qvel = batch.batch.bind("qvel")
+        last = qpos[0].copy(), qvel[0].copy()
         for end in sorted(set(wanted)):
             batch.advance_to(end)
             if batch.records["failure"][0] == state.FINE:
-                last = qpos[0].copy()
-            qpos_at[end] = last
-    return np.array([qpos_at[end] for end in wanted])
+                last = qpos[0].copy(), qvel[0].copy()
+            state_at[end] = last
+    found = [state_at[end] for end in wanted]
+    return np.array([q for q, _ in found]), np.array([v for _, v in found])
 
 
 class ScenarioBatch:

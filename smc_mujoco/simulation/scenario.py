@@ -8,6 +8,7 @@ mechanism. The law knows at most the plant's nominal parameters.
 import copy
 import dataclasses
 import functools
+import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,7 +28,7 @@ from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, suits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.contact import Contact
+from smc_mujoco.mechanisms.hardware.contact import Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.drives import (
     DCMotor,
     DriveStep,
@@ -53,6 +54,7 @@ from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import (
     Clock,
+    Constant,
     Dryden,
     Impulse,
     Jump,
@@ -160,8 +162,8 @@ class Scenario:
         them, on the joints that an actuator drives, with their numbers in the unit of each. By
         name, {"slide": Coulomb(0.1), "hinge": Viscous(1e-4)}, any joint has its own, and "*" is all
         of them.
-      contact: what the mechanism touches: a Contact that the plant offers, the kind of one, or
-        "none".
+      contact: what the mechanism touches: a kind that the plant offers, such as "stops", or a
+        hardware.Contact of one; Stops, a Wall, a Ball, which any plant takes; several; or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
       actuator: what is between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag and
         another drive; a Backlash may follow. None: the command is the force. u is limited to u_max
@@ -220,7 +222,7 @@ class Scenario:
     seed: Seed = 0
     integrator: Annotated[str, OneOf(names=coerce.INTEGRATORS)] | None = None
     friction: tuple[Friction, ...] = field(coerce.friction, None)
-    contact: Contact = field(coerce.contact, None)
+    contact: tuple[Obstacle, ...] = field(coerce.contact, None)
     mechanism: str = field(coerce.mechanism, "equation")
     actuator: tuple[Actuator, ...] = field(coerce.actuator, None)
     sensor: Encoder | None = field(coerce.instance(Encoder, "smc.Encoder(counts=...)"), None)
@@ -253,7 +255,7 @@ class Scenario:
             seed: int = 0,
             integrator: str | None = None,
             friction: coerce.Frictions | None = None,
-            contact: Contact | str | None = None,
+            contact: Obstacle | str | Sequence[Obstacle | str] | None = None,
             mechanism: str = "equation",
             actuator: Actuator | Sequence[Actuator] | None = None,
             sensor: Encoder | None = None,
@@ -264,6 +266,7 @@ class Scenario:
         check(self.resolved)
         check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
         check_inertia(self.resolved)
+        check_obstacles(self.resolved)
         check_names(self.resolved)
         for doubt in (next(_doubts(self.resolved), ""), _made_up_bound(self)):
             if doubt:
@@ -325,7 +328,7 @@ class Scenario:
             "gains": self.law.source,
         }
         # values of fields that were left out
-        absent = (None, (), {}, Noise(), Clock(), Contact("none"))
+        absent = (None, (), {}, Noise(), Clock())
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
             given = f.name not in rows and value != f.default and value not in absent
@@ -355,7 +358,7 @@ class Scenario:
     @property
     def plain_equation(self) -> bool:
         """Whether MuJoCo integrates only the plant's equation, with or without drives."""
-        if self.friction or self.contact.kind != "none" or self.mechanism != "equation":
+        if self.friction or self.contact or self.mechanism != "equation":
             return False
         smooth = self.plant.smooth and not self.plant.rubs
         return smooth and all(part.drives for part in self.actuator)
@@ -375,7 +378,7 @@ class Scenario:
         by_formula = self.formula_frictions == tuple(dry) and not self.plant.rubs
         if not by_formula and not all(isinstance(part, Coulomb) for part in dry):
             return False
-        if self.contact.kind != "none" or self.mechanism != "equation":
+        if self.contact or self.mechanism != "equation":
             return False
         if any(isinstance(d, Push) for d in self.disturbance):
             return False
@@ -551,7 +554,7 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     plant.
     """
     x0 = s.plant.x0
-    if s.contact.kind == "bobs":  # pendulums in a row must not start beyond each other
+    if "bobs" in kinds(s.contact):  # pendulums in a row must not start beyond each other
         x0 = tuple(sorted(x0))
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
@@ -878,6 +881,13 @@ def check_inertia(s: Resolved) -> None:
             )
 
 
+def check_obstacles(s: Resolved) -> None:
+    """Check that a run does not start beyond a stop or in a wall."""
+    for part in s.contact:
+        if met := part.meets(s.plant, s.x0):
+            raise ScenarioError(f"x0 of {s.plant.name} has {met}: give another x0, or more room")
+
+
 def check_names(s: Resolved) -> None:
     """Check that no parameter is named twice, once by its own name and once as the mass."""
     for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
@@ -913,10 +923,10 @@ def check_mechanism(s: Resolved) -> None:
         if s.mechanism != "equation":
             model = mechanism_model(s.plant, s.mechanism)
             list(s.plant.mechanisms[s.mechanism].fields(model, values))  # raises, too
-        for name, value in s.plant.placed.items():
-            if s.contact.kind != "none" and (present := getattr(values, name)) != value:
+        for (name, value), kind in itertools.product(s.plant.placed.items(), kinds(s.contact)):
+            if (present := getattr(values, name)) != value:
                 raise ScenarioError(
-                    f"the obstacles of contact {s.contact.kind!r} of {s.plant.name} are placed for "
+                    f"the obstacles of contact {kind!r} of {s.plant.name} are placed for "
                     f"{name} = {value:g}, and {name} is {present:g}: leave {name} as it is"
                 )
 
@@ -958,6 +968,20 @@ def _doubtful_units(s: Resolved) -> Iterator[str]:
             yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
 
 
+def _unreachable_goals(s: Resolved) -> Iterator[str]:
+    """Yield a sentence about each obstacle that a constant reference runs into."""
+    if not all(isinstance(signal, Constant) for signal in s.references):
+        return
+    goal = [signal.parameters()["amplitude"] for signal in s.references]
+    goal += s.plant.goal or [0.0] * s.plant.free
+    for part in s.contact:
+        if met := part.meets(s.plant, goal):
+            yield (
+                f"the reference of {s.plant.name} has {met}, so that it is not reached: give "
+                "another reference or more room, unless it is to lean there"
+            )
+
+
 def _doubts(s: Resolved) -> Iterator[str]:
     """Yield a sentence about each number that may be in degrees, ms or percent, each motor that is
     too weak, and bristles that are too stiff.
@@ -977,6 +1001,7 @@ def _doubts(s: Resolved) -> Iterator[str]:
                     f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
                 )
     yield from _doubtful_units(s)
+    yield from _unreachable_goals(s)
     # ramps may have many turns
     amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):

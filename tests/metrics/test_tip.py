@@ -39,7 +39,7 @@ def pressed():
     )
     path = tasks.wall_path()
     start = tuple(signal.values[0] for signal in path)
-    wall = smc.Contact("wall", friction=0.0)
+    wall = smc.hardware.Contact("wall", friction=0.0)
     return smc.run(
         smc.Scenario(
             plant="panda",

@@ -198,7 +198,7 @@ def scattered(number):
         takes = {"friction": any(p.name.startswith("rub:") for p in edited.pairs)}
         takes["restitution"] = any(p.name.startswith("hit:") for p in edited.pairs)
         numbers = {"friction": u(0, 1), "restitution": u(0, 0.9)}
-        contact = smc.Contact(
+        contact = smc.hardware.Contact(
             contact, **{k: numbers[k] for k, take in takes.items() if take and rng.integers(2)}
         )
     return smc.Scenario(
@@ -861,7 +861,7 @@ EVERYTHING = {
         period=2e-3,
         delay=1e-3,
     ),
-    "contact": smc.Contact("stops", restitution=0.3),
+    "contact": smc.hardware.Contact("stops", restitution=0.3),
     "mechanism": "springs",
     "disturbance": (
         smc.signals.Gust(1.0, 0.0, 0.1),
@@ -914,7 +914,7 @@ def test_drives_keep_the_plain_integrator():
 def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
     offers = smc.plant(name)
     fields = EVERYTHING | {"mechanism": "springs" if offers.mechanisms else "equation"}
-    fields["contact"] = smc.Contact(next(iter(offers.contacts)), restitution=0.3)
+    fields["contact"] = smc.hardware.Contact(next(iter(offers.contacts)), restitution=0.3)
     trace = smc.run(scenario(name, **fields, **(APART if offers.n > 1 else {})))
     again = smc.load(trace.save(tmp_path / "a.npz"))
     assert again.scenario == trace.scenario

@@ -542,7 +542,7 @@ def _only_limits(case: Scenario) -> bool:
     rarely act.
     """
     model = with_values(prepare(case).mechanism.model, case)
-    plain = not case.friction and case.contact.kind == "none" and case.mechanism == "equation"
+    plain = not case.friction and not case.contact and case.mechanism == "equation"
     dry = model.neq or model.dof_frictionloss.any() or model.tendon_frictionloss.any()
     return bool(plain and not dry and all(part.in_callback for part in case.actuator))
 

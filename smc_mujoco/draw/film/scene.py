@@ -17,7 +17,7 @@ from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import find
 from smc_mujoco.draw.film import camera
 from smc_mujoco.draw.film.camera import Camera
-from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.hardware.part import OWN, joint_ids
 from smc_mujoco.mechanisms.plant import model_path
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
@@ -74,7 +74,9 @@ def compose(
         if k == 0:
             spec.option = machine.option
             spec.compiler = machine.compiler
-        frame.attach_body(machine.body("machine"), f"m{k}/", "")
+        for body in machine.worldbody.bodies:
+            if body.name == "machine" or body.name.startswith(OWN):
+                frame.attach_body(body, f"m{k}/", "")
     spec.material("floor").emission = 0.13  # nearly as white as the page below
     for light in spec.lights:
         if light.castshadow and light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:

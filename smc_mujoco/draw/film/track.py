@@ -109,7 +109,7 @@ def motion(trace: Trace, times: np.ndarray) -> Motion | None:
     None if there are none, or if that is not known.
     """
     scenario = scene.first_channels(trace.scenario)
-    if scenario.plant.on_stage:
+    if scenario.plant.on_stage and not any(part.loose for part in scenario.contact):
         return None
     model = models.compile_model(scenario)
     names = [model.joint(i).name for i in joint_ids(model)]

@@ -83,7 +83,7 @@ class Rig:
     """A real machine.
 
     Attributes:
-      name, label: as in `smc.rigs()`, and what it is, in a line.
+      name, label: as in `smc.audits.rigs()`, and what it is, in a line.
       quantities: name -> Quantity.
       machine: function of the quantities, by name, that returns fields of a Scenario: plant,
         actuator, sensor, ...
@@ -100,7 +100,7 @@ class Rig:
         record, for records whose torques are predicted from the measured motion. None: records are
         replayed.
       identified_from: names of the records that its quantities were identified from.
-      free: names of the quantities that its records determine, which `smc.identify` finds by
+      free: names of the quantities that its records determine, which `smc.audits.identify` finds by
         default.
       window: s, of the pieces in which identification first repeats a record; each starts from its
         measured state.

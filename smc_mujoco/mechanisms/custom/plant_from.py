@@ -39,7 +39,7 @@ from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.custom.others import OTHERS
-from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, ROTOR, START
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue, check_ranges
 
 if TYPE_CHECKING:
@@ -171,7 +171,7 @@ class UserFields:
     def __call__(self, model, p):
         scale = np.ones(model.nbody)
         for i in range(model.nbody):
-            if not model.body(i).name.startswith(ROTOR):
+            if not model.body(i).name.startswith((ROTOR, OWN)):
                 scale[i] = p.m / self.mass
         yield Field("body_mass", slice(None), model.body_mass * scale)
         yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])

@@ -24,8 +24,8 @@ other, such a spring would create energy. With a low impedance it sets a force i
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from typing import Annotated
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from typing import Annotated, ClassVar
 
 import mujoco
 import numpy as np
@@ -68,7 +68,29 @@ SLIDING_FRICTION = slice(0, 2)  # of a pair's five friction coefficients
 
 
 @dataclasses.dataclass(frozen=True)
-class Contact(Part):
+class Obstacle(Part):
+    """Base of what a mechanism may touch."""
+
+    loose: ClassVar[bool] = False  # whether it moves by itself
+
+    def check(self, plant: Plant) -> None:
+        """Raise ScenarioError if the plant cannot have it."""
+
+    def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
+        """Add it to the plant's mechanism."""
+
+    def placed(self, plant: Plant) -> Hashable:
+        """Return a key that is equal where `edit_on` does the same."""
+        return self, plant
+
+    def meets(self, plant: Plant, x: Iterable[float]) -> str:
+        """Return in words what meets it with the channels at x, (n,) rad or m; "" for nothing."""
+        del plant, x
+        return ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact(Obstacle):
     """One of the contacts that a plant offers.
 
     Attributes:
@@ -88,6 +110,9 @@ class Contact(Part):
             raise ScenarioError(
                 f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'"
             )
+
+    def __str__(self) -> str:
+        return repr(self.kind)
 
     def check(self, plant: Plant) -> None:
         """Check that the plant offers this contact."""
@@ -115,8 +140,13 @@ class Contact(Part):
             impedances = model.pair_solimp[bouncing, 0]
             yield Field("pair_solref", bouncing, [solref(self.restitution, d) for d in impedances])
 
-    def structure(self) -> Hashable:
-        return type(self), self.kind
+    def placed(self, plant: Plant) -> Hashable:
+        return plant.contacts[self.kind]
+
+
+def kinds(obstacles: Iterable[Obstacle]) -> list[str]:
+    """Return the kinds of those that a plant offers."""
+    return [part.kind for part in obstacles if isinstance(part, Contact)]
 
 
 def _pairs(model: mujoco.MjModel, sort: str) -> list[int]:
@@ -159,18 +189,22 @@ def _loss(zeta: float) -> float:
     return zeta * math.acosh(zeta) / math.sqrt(zeta * zeta - 1.0)
 
 
-def solref(restitution: float, impedance: float) -> tuple[float, float]:
+def solref(
+    restitution: float, impedance: float, depth: float = 0.0, directions: float = 3.0
+) -> Pair:
     """Return solref, MuJoCo's time constant in s and damping ratio, for a restitution of bodies
-    that move on a line.
+    that move on a line; `depth` in m per m/s, 0 for that of the library's contacts.
 
     The acceleration is a = a0 + A f, with A the inverse mass that the blow meets. MuJoCo sets f =
     (aref - a0) / (A + R) with R = A' (1 - d) / d. Its estimate A' of A is the mean over three
-    directions, here A / 3. So the spring and the dashpot act with the share A / (d A + (1 - d) A').
+    directions, here A / 3, but A itself for a joint's limit and for a free body: `directions` = 1.
+    So the spring and the dashpot act with the share A / (d A + (1 - d) A').
     """
     e = max(restitution, MIN_RESTITUTION)
     zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
-    share = 1.0 / (impedance + (1.0 - impedance) / 3.0)
-    depth = DEPTH_OF_BOBS if impedance == SOFT_IMPEDANCE else DEPTH
+    share = 1.0 / (impedance + (1.0 - impedance) / directions)
+    if not depth:
+        depth = DEPTH_OF_BOBS if impedance == SOFT_IMPEDANCE else DEPTH
     return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
 
 
@@ -182,15 +216,36 @@ def hit(
 ) -> None:
     """Let two geoms hit each other, without friction."""
     impedance = SOFT_IMPEDANCE if both_move else FIRM_IMPEDANCE
-    _pair(spec, HIT, geoms, solref(restitution, impedance), impedance, 0.0)
+    add_pair(spec, HIT, geoms, solref(restitution, impedance), impedance, 0.0)
 
 
 def rub(spec: mujoco.MjSpec, geoms: tuple[str, str], friction: float) -> None:
     """Let two geoms slide on each other under a normal force."""
-    _pair(spec, RUB, geoms, SOLREF_RUB, SOFT_IMPEDANCE, friction)
+    add_pair(spec, RUB, geoms, SOLREF_RUB, SOFT_IMPEDANCE, friction)
 
 
-def _pair(
+def enable(spec: mujoco.MjSpec, what: str) -> None:
+    """Let what is added act, a "LIMIT" or "CONTACT", where the file lets none act."""
+    flags = mujoco.mjtDisableBit
+    if spec.option.disableflags & flags.mjDSBL_CONSTRAINT.value:
+        for name in ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT"):
+            spec.option.disableflags |= getattr(flags, f"mjDSBL_{name}").value
+        spec.option.disableflags &= ~flags.mjDSBL_CONSTRAINT.value
+    flag = getattr(flags, f"mjDSBL_{what}").value
+    if not spec.option.disableflags & flag:
+        return
+    spec.option.disableflags &= ~flag
+    if what == "LIMIT":
+        for part in (*spec.joints, *spec.tendons):
+            part.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+        return
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 0
+    for pair in spec.pairs:
+        spec.delete(pair)
+
+
+def add_pair(
     spec: mujoco.MjSpec, sort: str, geoms: tuple[str, str], normal: Pair, d: float, friction: float
 ) -> None:
     """Add a contact pair with the solref of its normal, its impedance d and its friction."""

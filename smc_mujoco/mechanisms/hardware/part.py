@@ -12,7 +12,7 @@ joint that a channel's actuator drives, if it is not the channel's joint itself.
 import dataclasses
 import functools
 from collections.abc import Hashable, Iterator, Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
@@ -21,6 +21,7 @@ from smc_mujoco.common.constraints import Number, constrain
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import stated
+from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 PASSIVE = "passive:"
@@ -32,6 +33,7 @@ HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
 # impedance at and away from zero; equal, so the rest has no effect
 HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
+OWN = "smc:"  # begins the names of bodies that obstacles add
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
 # A pose: the position in the axes of the world, m, and the rotation vector of the attitude, rad,
@@ -287,3 +289,33 @@ def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:
     """
     key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
     return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()
+
+
+def moving_joints(model: mujoco.MjModel) -> np.ndarray:
+    """Return the joints of the channels and those that their actuators drive, rotors or the same
+    joints, (2, n).
+    """
+    if free_joint(model) >= 0:
+        return np.array([joint_ids(model)] * 2)
+    joints = joint_ids(model)
+    driven = model.actuator_trnid[drive_ids(model), 0]
+    return np.array([joints, [*driven, *joints[len(driven) :]]])
+
+
+def state_with(
+    model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in
+    `initial_pose`.
+    """
+    qpos = initial_pose(model)
+    qvel = np.zeros(model.nv)
+    if (free := free_joint(model)) >= 0:
+        first = model.jnt_qposadr[free]
+        dof = model.jnt_dofadr[free]
+        qpos[first : first + 7] = [*x[:3], *rotation.quaternion(*x[3:])]
+        qvel[dof : dof + 6] = v
+        return qpos, qvel
+    qpos[model.jnt_qposadr[joints]] = x
+    qvel[model.jnt_dofadr[joints]] = v
+    return qpos, qvel

@@ -85,7 +85,7 @@ def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
     offset.
     """
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
-    result = smc.identify(near, axis_record(0.6 + begin, begin), starts=1, most=3)
+    result = smc.audits.identify(near, axis_record(0.6 + begin, begin), starts=1, most=3)
     for name, value in result.values.items():
         assert value == pytest.approx(AXIS.values[name], rel=0.02)
     assert min(result.fits[0].values()) > 99.0
@@ -99,7 +99,7 @@ def moved():
 
 @pytest.fixture(scope="module")
 def found(moved):
-    return smc.identify(AXIS.with_values(WRONG), moved, starts=1)
+    return smc.audits.identify(AXIS.with_values(WRONG), moved, starts=1)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     far = AXIS.with_values({"mass": 2000.0})
     brief = smc.run(AXIS.scenario(duration=0.5, reference=smc.Sine(0.05, 8.0), x0=0.0))
     one, again, other = (
-        smc.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6)
+        smc.audits.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6)
     )
     assert one.values == again.values
     assert one.errors == again.errors
@@ -150,7 +150,7 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
             noise=noise,
         )
     )
-    result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
+    result = smc.audits.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
     for name, value in result.values.items():
         assert abs(value - AXIS.values[name]) < 3.0 * result.errors[name]
         assert result.errors[name] < 0.01 * AXIS.values[name]
@@ -166,10 +166,10 @@ def test_noise_is_read_off_a_moving_record():
 
 def test_parameters_that_cannot_be_told_apart_are_named(swung):
     with pytest.raises(smc.ScenarioError, match="in the records depends on torque_limit"):
-        smc.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
+        smc.audits.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
     still = smc.run(AXIS.scenario(duration=0.06, x0=0.0))
     with pytest.raises(smc.ScenarioError, match=r"cannot tell|nothing in the records depends on"):
-        smc.identify(AXIS, still, starts=1)
+        smc.audits.identify(AXIS, still, starts=1)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
 )
 def test_what_cannot_be_found_is_named(rig, names, words):
     with pytest.raises(smc.ScenarioError, match=words):
-        smc.identify(rig, {"t": [0]}, names)
+        smc.audits.identify(rig, {"t": [0]}, names)
 
 
 def test_records_of_two_kinds_and_none_are_refused(moved):
@@ -193,7 +193,7 @@ def test_records_of_two_kinds_and_none_are_refused(moved):
         [moved, {"t": [0]}],
     ):
         with pytest.raises(smc.ScenarioError, match="records"):
-            smc.identify("emps", records_given)
+            smc.audits.identify("emps", records_given)
 
 
 def test_a_search_stays_within_its_ranges_to_the_last_bit():
@@ -286,7 +286,7 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """
     record = pushed(2026, seconds)
     rare = math.erfc(4.0 / math.sqrt(2.0))
-    found = smc.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
+    found = smc.audits.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
     assert min(found.fits[0].values()) >= min(found.fits_before[0].values())
     free = uncertainty.BLOCKS[0] - 1
     low, high = np.sqrt(chi2.ppf([rare / 2.0, 1.0 - rare / 2.0], free) / free) * [
@@ -334,7 +334,7 @@ def test_the_twin_of_a_run_has_the_whole_machine_of_the_run():
     machine = {
         "control_period": 2e-3,
         "friction": smc.Coulomb(0.1),
-        "contact": smc.Contact("floor"),
+        "contact": smc.hardware.Contact("floor"),
         "actuator": smc.Lag(0.02),
         "sensor": smc.Encoder(counts=512),
         "u_max": 7.0,
@@ -393,7 +393,7 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
 
     It holds an offset of 340 N, and not the greater ones that the search tries.
     """
-    smc.identify(smc.rig("emps", offset=-340.0), moved, ["offset"], starts=6, most=2)
+    smc.audits.identify(smc.rig("emps", offset=-340.0), moved, ["offset"], starts=6, most=2)
     assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
 
 

@@ -89,7 +89,7 @@ def test_the_numbers_of_a_machine_and_their_sources_are_as_recorded(name, snapsh
     assert "\n".join(lines(smc.rig(name))) == snapshot
 
 
-@pytest.mark.parametrize("name", smc.rigs())
+@pytest.mark.parametrize("name", smc.audits.rigs())
 def test_each_quantity_changes_the_machine(name):
     """From values where no term is 0."""
     rig = smc.rig(name)

@@ -40,7 +40,7 @@ def test_every_record_that_a_rig_was_identified_from_has_rows():
     reported = set()
     for one in twin_figures.rows():
         reported.add(one.record)
-    for name in smc.rigs():
+    for name in smc.audits.rigs():
         assert set(smc.rig(name).identified_from) <= reported, name
 
 

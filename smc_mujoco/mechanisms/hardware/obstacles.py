@@ -1,0 +1,337 @@
+"""End stops, walls and falling balls that any machine can meet: your own, the library's, a body
+that flies.
+
+    contact=smc.Stops({"elbow": (-1.0, 0.2)})
+    contact=(smc.Wall("hand", direction=(0, 0, -1), gap=0.15), smc.Ball("hand", mass=0.2))
+
+They find their place in the start pose of the plant, its own x0, so that they stand there in all
+runs, wherever these start. They touch what they name and nothing else: a wall and a ball the geoms
+of one body that collide, or all of its geoms if none does. Their blows are those of
+`hardware.contact`, without friction.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.constraints import Number, Range
+from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.mechanisms.hardware import contact
+from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, Pair, enable, solref
+from smc_mujoco.mechanisms.hardware.part import OWN, Positive, moving_joints, state_with
+from smc_mujoco.mechanisms.plant import Field, Plant
+
+Restitution = Annotated[float, Number(low=0.0, high=contact.MAX_RESTITUTION)]
+# An obstacle on a plant: the model of both, its place, (3,) m, the geoms that it hits, its own geom
+Placed = tuple[mujoco.MjModel, np.ndarray, list[int], int]
+
+# m per m/s of a blow: chosen, so that 2 m/s goes 6 mm deep, and the body hardly turns meanwhile
+BLOW_DEPTH = 0.003
+STEEL = (0.70, 0.72, 0.75, 1.0)
+RED = (0.85, 0.30, 0.20, 1.0)
+# m, chosen: of the slab that shows a wall, and of the ball that shows a stop
+THICKNESS, POST_RADIUS = 0.03, 0.02
+NUDGE = 1e-3  # rad or m: a step that shows the way of a body
+CLOSE = 1e-7  # m: shapes that are so near touch
+FAR = 10.0  # sizes of the machine, from where a shape approaches it
+SHAPES = mujoco.mjtGeom
+UNTOUCHED = {"contype": 0, "conaffinity": 0}  # by other geoms
+HIDDEN = UNTOUCHED | {"group": 5, "rgba": (0.0, 0.0, 0.0, 0.0)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Stops(Obstacle):
+    """End stops of joints, in place of their own limits.
+
+    A blow of 1 rad/s (m/s) goes 5 mrad (mm) deep.
+
+    Attributes:
+      limits: joint -> its lowest and highest position, rad or m. Any hinge or slide, also one
+        without a channel.
+      restitution: ratio of the speeds after and before a blow, 0 .. 0.98.
+    """
+
+    limits: Mapping[str, Pair]
+    restitution: Restitution = 0.3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        ends = {}
+        for joint, pair in frozen(self.limits).items():
+            ends[joint] = Range()(f"the place of the stops of joint {joint!r}", pair)
+        object.__setattr__(self, "limits", frozen(ends))
+
+    def check(self, plant: Plant) -> None:
+        """Check that the plant has these joints."""
+        model = _loaded(plant)
+        single = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+        known = _names(map(model.joint, np.flatnonzero(np.isin(model.jnt_type, single))))
+        for joint in self.limits:
+            find(f"joint of {plant.name} in Stops", joint, known)
+
+    def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
+        enable(spec, "LIMIT")
+        for name in self.limits:
+            joint = spec.joint(name)
+            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+            joint.range = (-1.0, 1.0)  # `fields` has it in rad, whatever the file's unit
+            joint.margin = 0.0
+            joint.solref_limit = solref(self.restitution, FIRM_IMPEDANCE, directions=1.0)
+            joint.solimp_limit[:2] = FIRM_IMPEDANCE
+        for name, place in _posts(self, plant):
+            before = spec.joint(name).parent.parent
+            _ball(before, "", POST_RADIUS, pos=place, rgba=STEEL, mass=0.0)
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        for name, ends in self.limits.items():
+            yield Field("jnt_range", model.joint(name).id, ends)
+
+    def meets(self, plant: Plant, x: Iterable[float]) -> str:
+        model = _loaded(plant)
+        qpos = _posed(model, x).qpos
+        for name, (low, high) in self.limits.items():
+            place = qpos[model.joint(name).qposadr[0]]
+            if not low < place < high:
+                return f"joint {name!r} at {place:g}, and its stops are at {low:g} and {high:g}"
+        return ""
+
+
+@dataclasses.dataclass(frozen=True)
+class OfBody(Obstacle):
+    """Base of what a body hits: something that is added to the world."""
+
+    body: str
+    restitution: Restitution = dataclasses.field(default=0.3, kw_only=True)
+
+    def check(self, plant: Plant) -> None:
+        """Check that the plant has the body, and that it is met."""
+        model = _loaded(plant)
+        moving = (model.body_weldid > 0) & (model.body_geomnum > 0)
+        known = _names(map(model.body, np.flatnonzero(moving)))
+        find(f"body of {plant.name} in a {type(self).__name__}", self.body, known)
+        _placed(self, plant)
+
+    def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
+        model, place, geoms, _ = _placed(self, plant)
+        enable(spec, "CONTACT")
+        _name_geoms(spec, self.body)
+        other = self.add(spec)
+        other.pos = place
+        # an estimate of `solref` is exact for a ball lighter than what it hits
+        directions = 1.0 if self.loose else 3.0
+        normal = solref(self.restitution, FIRM_IMPEDANCE, BLOW_DEPTH, directions)
+        for geom in geoms:
+            names = model.geom(geom).name, other.name
+            contact.add_pair(spec, contact.HIT, names, normal, FIRM_IMPEDANCE, 0.0)
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add it to the world, as a body and a geom of the same name."""
+        raise NotImplementedError
+
+    def way(self, model: mujoco.MjModel) -> tuple[np.ndarray, float]:
+        """Return the direction from the body to it, (3,), and how far it is at the start, m."""
+        raise NotImplementedError
+
+
+@dataclasses.dataclass(frozen=True)
+class Wall(OfBody):
+    """A wall before a body, flat and without an end, which only this body hits.
+
+    Attributes:
+      body: its name.
+      direction: from the body to the wall, in the axes of the world, (3,), of any length.
+      gap: m, from the body at the plant's start to the wall, greater than 0.
+      size: m, side of the slab that shows it, greater than 0.
+      restitution: ratio of the speeds after and before a blow, 0 .. 0.98.
+    """
+
+    direction: tuple[float, ...]
+    gap: Positive
+    size: Positive = 0.6
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        what = "Wall's direction"
+        way = tuple(number(what, part) for part in items_of(what, self.direction))
+        if len(way) != 3 or not any(way):
+            raise ScenarioError(f"{what} is {way}: give three numbers, not all 0, as (0, 0, -1)")
+        object.__setattr__(self, "direction", way)
+
+    def way(self, model: mujoco.MjModel) -> tuple[np.ndarray, float]:
+        """Return its direction and the gap."""
+        return np.array(self.direction) / np.linalg.norm(self.direction), self.gap
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add a plane, which only pairs see, and the slab that is seen."""
+        wall = _add_body(spec)
+        turn = np.zeros(4)
+        mujoco.mju_quatZ2Vec(turn, -np.array(self.direction))
+        wall.quat = turn
+        size = self.size / 2, self.size / 2, THICKNESS / 2
+        wall.add_geom(name=wall.name, type=SHAPES.mjGEOM_PLANE, size=size, **HIDDEN)
+        behind = {"pos": (0, 0, -THICKNESS / 2), "rgba": STEEL} | UNTOUCHED
+        wall.add_geom(type=SHAPES.mjGEOM_BOX, size=size, **behind)
+        return wall
+
+    def meets(self, plant: Plant, x: Iterable[float]) -> str:
+        model, place, geoms, shape = _placed(self, plant)
+        data = _posed(model, x)
+        data.geom_xpos[shape] = place
+        away = _distance(model, data, geoms, shape)
+        return "" if away > 0.0 else f"body {self.body!r} {-1e3 * away:.3g} mm in its wall"
+
+
+@dataclasses.dataclass(frozen=True)
+class Ball(OfBody):
+    """A ball that falls from rest onto a body, and hits only this body.
+
+    It starts above the centre of mass, and falls by `height` until it meets the body at the plant's
+    start: after sqrt(2 height/g).
+
+    Attributes:
+      body: its name.
+      mass: kg, greater than 0.
+      height: m, of its fall, greater than 0.
+      radius: m, greater than 0.
+      restitution: ratio of the speeds after and before a blow, 0 .. 0.98.
+    """
+
+    loose = True
+
+    mass: Positive = 0.1
+    height: Positive = 0.5
+    radius: Positive = 0.03
+
+    def way(self, model: mujoco.MjModel) -> tuple[np.ndarray, float]:
+        """Return the way up and the height."""
+        if not model.opt.gravity.any():
+            raise ScenarioError("a Ball does not fall without gravity: leave it out")
+        return -model.opt.gravity / np.linalg.norm(model.opt.gravity), self.height
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add a ball that nothing holds."""
+        ball = _add_body(spec)
+        ball.add_freejoint(name=ball.name)
+        _ball(ball, ball.name, self.radius, rgba=RED, mass=self.mass)
+        return ball
+
+
+@functools.lru_cache(maxsize=64)
+def _placed(part: OfBody, plant: Plant) -> Placed:
+    """Find the place of an obstacle: where it meets the body at the plant's start, and back."""
+    spec = plant.spec()
+    _name_geoms(spec, part.body)
+    name = part.add(spec).name
+    model = plant.load(spec=spec)
+    away, room = part.way(model)
+    body = model.body(part.body).id
+    shape = model.geom(name).id
+    place = _meeting(model, _posed(model, plant.x0), body, shape, away)
+    if place is None:
+        raise ScenarioError(
+            f"{shown(part)} does not meet its body on the way to the centre of mass: give another "
+            f"body of {plant.name}, or a larger radius"
+        )
+    return model, place + room * away, _geoms(model, body), shape
+
+
+@functools.lru_cache(maxsize=64)
+def _posts(stops: Stops, plant: Plant) -> list[tuple[str, np.ndarray]]:
+    """Return joint and place, (3,) m in the axes of the body before it, of what shows each stop:
+    a ball that the moved body touches there.
+    """
+    spec = plant.spec()
+    name = _add_body(spec).name
+    _ball(spec.body(name), name, POST_RADIUS)
+    model = plant.load(spec=spec)
+    posts = []
+    for joint, ends in stops.limits.items():
+        at = model.joint(joint).qposadr[0]
+        body = int(model.joint(joint).bodyid[0])
+        before = model.body_parentid[body]
+        for end, nudge in zip(ends, (NUDGE, -NUDGE), strict=True):
+            data = _posed(model, plant.x0)
+            centres = []
+            for place in (end + nudge, end):
+                data.qpos[at] = place
+                mujoco.mj_kinematics(model, data)
+                centres.append(data.xipos[body].copy())
+            way = (centres[1] - centres[0]) / NUDGE
+            if np.linalg.norm(way) < CLOSE or not model.body_geomnum[body]:
+                continue  # a wheel
+            met = _meeting(model, data, body, model.geom(name).id, way / np.linalg.norm(way))
+            if met is not None:
+                frame = data.xmat[before].reshape(3, 3)
+                posts.append((joint, (met - data.xpos[before]) @ frame))
+    return posts
+
+
+def _meeting(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, shape: int, away: np.ndarray
+) -> np.ndarray | None:
+    """Return where a geom meets a body, on its way from afar to the centre of mass, (3,) m; None if
+    it passes.
+    """
+    geoms = _geoms(model, body)
+    far = FAR * model.stat.extent
+    height = far
+    while height > -far:
+        data.geom_xpos[shape] = data.xipos[body] + height * away
+        left = _distance(model, data, geoms, shape)
+        if left < CLOSE:
+            return data.geom_xpos[shape] - left * away
+        height -= left
+    return None
+
+
+def _geoms(model: mujoco.MjModel, body: int) -> list[int]:
+    """Return the geoms of a body that collide; all if none does."""
+    first = model.body_geomadr[body]
+    every = list(range(first, first + model.body_geomnum[body]))
+    masks = model.geom_contype | model.geom_conaffinity
+    return [geom for geom in every if masks[geom]] or every
+
+
+def _distance(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], other: int) -> float:
+    """Return the distance from the nearest of some geoms to another one, m."""
+    return min(mujoco.mj_geomDistance(model, data, geom, other, 1e9, None) for geom in geoms)
+
+
+@functools.lru_cache(maxsize=32)
+def _loaded(plant: Plant) -> mujoco.MjModel:
+    """Return the model of a plant without parts."""
+    return plant.load()
+
+
+def _posed(model: mujoco.MjModel, x: Iterable[float]) -> mujoco.MjData:
+    """Return the data of a model with its channels at x, (n,) rad or m."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = state_with(model, moving_joints(model), x, 0.0)[0]
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def _names(things: Iterable) -> dict[str, None]:
+    """Return the names of bodies or joints that have one."""
+    return dict.fromkeys(thing.name for thing in things if thing.name)
+
+
+def _name_geoms(spec: mujoco.MjSpec, body: str) -> None:
+    """Give each geom of a body a name, if it has none."""
+    for k, geom in enumerate(spec.body(body).geoms):
+        geom.name = geom.name or f"{OWN}{body}:{k}"
+
+
+def _add_body(spec: mujoco.MjSpec) -> mujoco.MjsBody:
+    """Add a body to the world, with a name of this package's own."""
+    return spec.worldbody.add_body(name=f"{OWN}obstacle{len(spec.bodies)}")
+
+
+def _ball(body: mujoco.MjsBody, name: str, radius: float, **look) -> None:
+    """Give a body the shape of a ball, which touches nothing by itself."""
+    body.add_geom(name=name, type=SHAPES.mjGEOM_SPHERE, size=(radius, 0, 0), **UNTOUCHED | look)
