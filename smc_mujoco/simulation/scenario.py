@@ -970,7 +970,8 @@ def _doubtful_units(s: Resolved) -> Iterator[str]:
 
 def _unreachable_goals(s: Resolved) -> Iterator[str]:
     """Yield a sentence about each obstacle that a constant reference runs into."""
-    if not all(isinstance(signal, Constant) for signal in s.references):
+    constant = all(isinstance(signal, Constant) for signal in s.references)
+    if not constant or s.law.name == "none":
         return
     goal = [signal.parameters()["amplitude"] for signal in s.references]
     goal += s.plant.goal or [0.0] * s.plant.free
