@@ -20,7 +20,7 @@ from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle
+from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, all_joints, joint_names
 from smc_mujoco.mechanisms.named import as_plant
@@ -279,14 +279,15 @@ def contact(name: str, value: object, s: Any) -> tuple[Obstacle, ...]:
     for item in as_tuple(value):
         part = Contact(item) if isinstance(item, str) else item
         if not isinstance(part, Obstacle):
-            kinds = ", ".join(["none", *s.plant.contacts])
+            names = ", ".join(["none", *s.plant.contacts])
             raise ScenarioError(
-                f"{name} is {shown(item)}: give smc.Stops, smc.Wall, smc.Ball or one of {kinds}"
+                f"{name} is {shown(item)}: give smc.Stops, smc.Wall, smc.Ball or one of {names}"
             )
         part.check(s.plant)
         if part != Contact("none"):
             parts.append(part)
-    _check_kinds_differ(name, [part for part in parts if isinstance(part, Contact)])
+    if len(own := kinds(parts)) > 1:
+        raise ScenarioError(f"{name} has {own[0]!r} and {own[1]!r} of the plant's own: give one")
     return tuple(parts)
 
 
