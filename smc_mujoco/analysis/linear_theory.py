@@ -72,12 +72,7 @@ def linear(plant: Plant) -> Linear:
     p = SimpleNamespace(**plant.parameters)
     rest = np.zeros(n)
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
-    if (
-        plant.underactuated
-        or plant.mixed
-        or g.min() <= 0.0
-        or np.ptp(g) > EQUALITY_TOLERANCE * g.max()
-    ):
+    if plant.free or plant.mixed or g.min() <= 0.0 or np.ptp(g) > EQUALITY_TOLERANCE * g.max():
         raise ScenarioError(
             f"{plant.name} has no theory here: give a plant with equal joints and an actuator on "
             "each"

@@ -26,7 +26,7 @@ def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
             f"{plant.unmodelled}, "
             f'or give the three, as in smc.law("{law}", a1=0.0, a2=0.0, b=1.0)'
         )
-    if plant.underactuated:
+    if plant.free:
         raise ScenarioError(
             f"{plant.name}'s channel {plant.driven} has no actuator, and {law} does not see "
             "such a joint: take the law 'hierarchical', which does"

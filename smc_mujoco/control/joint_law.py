@@ -14,6 +14,10 @@ equation per channel, so their M is diagonal.
 A gain is a vector (n,), unless its `Gain` is shared. The memory is an array (n, slots). The
 measurement's arrays are copies, which a law may overwrite. A law without the model (`y.model ==
 0.0`) sees M = 1 and h = g = 0.
+
+Where joints are only measured, the m driven channels come first. The law then returns u and s of
+these, (m,) each, and its gains are vectors (m,). M, h and g are of all n, with M x'' + h = (u, 0),
+and y.limit is 0 where nothing drives.
 """
 
 # pyright: reportCallIssue=false
@@ -54,8 +58,9 @@ class JointMeasurement(NamedTuple):
 
 # the vectors, M, h and g, in the order in which they are stored
 ARRAYS = JointMeasurement._fields[4:]
-# What is stored before the arrays. `dynamics` is 0, or the address of a HANDLE.
-HEAD = floats(("t", "dt", "model", "dynamics", "n"))
+# What is stored before the arrays. `dynamics` is 0, or the address of a HANDLE; `driven` is how
+# many commands the law gives.
+HEAD = floats(("t", "dt", "model", "dynamics", "n", "driven"))
 # The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of
 # their parameters, and the force per unit of u.
 HANDLE = floats(("coriolis", "jacobian", "parameters", "unit"))

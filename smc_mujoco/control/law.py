@@ -238,7 +238,7 @@ def suits(law: Law | Template, plant: Plant) -> bool:
     if law.function is None:
         return True
     if isinstance(law, Template) and any(gain.plant for gain in law.gains.values()):
-        return not (plant.unmodelled or plant.underactuated)
+        return not (plant.unmodelled or plant.free)
     if plant.pose and not law.joint:
         return law.name == "none"
     if not law.plants or plant.name in law.plants or (plant.pose and FREE_BODY in law.plants):
@@ -282,7 +282,7 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
         raise ScenarioError(f"laws of kind {kind!r} are not for single plants: leave plant out")
     plant = as_plant(plant)
     known = known_laws() if plant.pose else catalogue()
-    whole = not plant.underactuated and plant.pose != "heading"
+    whole = not plant.free and plant.pose != "heading"
     return [
         name
         for name, law in known.items()

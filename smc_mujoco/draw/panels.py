@@ -217,7 +217,7 @@ def by_channel(panel: Panel) -> list[Panel]:
     if panel.quantity in SINGLE:
         return [panel]
     panels = []
-    scored = panel.traces[0].scenario.plant.scored_channels
+    scored = panel.traces[0].scenario.scored_channels
     for place, channel in enumerate(i for i in panel.group.channels if i in scored):
         within = dataclasses.replace(panel.group, channels=(place,))
         traces = [group_trace(trace, within) for trace in panel.traces]

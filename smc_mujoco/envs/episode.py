@@ -299,7 +299,7 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
     times = (np.arange(samples) * scenario.control_period).tolist()
     several = isinstance(scenario.reference, PerChannel) or scenario.plant.rest
     columns = []
-    for signal in scenario.references if several else scenario.references[:1]:
+    for signal in scenario.references[: scenario.plant.driven if several else 1]:
         try:
             values = np.array([evaluate(signal, t) for t in times])
         except Failure as failure:

@@ -13,7 +13,6 @@ which is compiled and exported like any other law.
 
 import dataclasses
 import functools
-import linecache
 import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -24,6 +23,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.control.written import Matrix, WrittenLaw, state_feedback
 
 INPUTS = {  # what a controller may read -> expression of the law's measurement
     "error": "y.r - y.x",
@@ -33,7 +33,6 @@ INPUTS = {  # what a controller may read -> expression of the law's measurement
 DEFAULT_INPUTS = ("error", "error_rate")
 MAX_STATES = 50
 CURE = "give a TransferFunction or StateSpace, (A, B, C, D, dt), or an array of gains"
-Matrix = tuple[tuple[float, ...], ...]
 
 
 class System(NamedTuple):
@@ -49,11 +48,8 @@ class System(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class LinearLaw:
-    """The function of a linear controller's law.
-
-    It is equal to another one with the same numbers.
-    """
+class LinearLaw(WrittenLaw):
+    """The function of a linear controller's law. Its s is x - r."""
 
     a: Matrix  # in real Schur form if the controller is of continuous time
     b: Matrix
@@ -63,19 +59,6 @@ class LinearLaw:
     name: str  # of the law
     discrete: bool  # whether the matrices give the step of one control period
     control_period: float | None  # s, of the run for which that step is; None for any
-
-    @property
-    def __name__(self) -> str:
-        """The law's name."""
-        return self.name
-
-    def __call__(self, y: Any, gains: Any, memory: Any) -> tuple[float, float]:
-        """Return u, and x - r for s."""
-        return self.py_func(y, gains, memory)
-
-    def __reduce__(self) -> tuple:
-        """Pickle the numbers. The function is written out again."""
-        return type(self), tuple(getattr(self, field.name) for field in dataclasses.fields(self))
 
     @functools.cached_property
     def text(self) -> str:
@@ -88,16 +71,6 @@ class LinearLaw:
         return "def controller(y, gains, memory):\n" + "".join(
             f"    {line}\n" for line in [*lines, "return u, y.e"]
         )
-
-    @functools.cached_property
-    def py_func(self) -> Any:
-        """The compiled text, as a plain function of Python."""
-        file = f"<controller {self.name} {hash(self):x}>"
-        space = {"__name__": "law_from_control"}
-        lines = self.text.splitlines(keepends=True)
-        linecache.cache[file] = len(self.text), None, lines, file  # for the translation to C
-        exec(compile(self.text, file, "exec"), space)
-        return space["controller"]
 
     def _output_line(self) -> str:
         return f"u = gains.scale * ({_sum_of_products([(self.c, 'x'), (self.d, 'w')])})"
@@ -164,7 +137,7 @@ def _sum_of_products(parts: Sequence[tuple[Sequence[float], str]]) -> str:
 def law_from_control(
     K: Any, inputs: Sequence[str] | str | None = None, name: str = "linear_controller"
 ) -> Law:
-    """Return a linear controller as a law of one channel.
+    """Return a linear controller as a law of one channel, or K of the whole state as a law of many.
 
     Args:
       K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m;
@@ -172,7 +145,8 @@ def law_from_control(
         continuous time, and discretised by Tustin's rule with the control period of the run. With
         dt = True it is the step of any control period; with dt in s, of that control period. Or an
         array of gains, (1, m), such as the K of control.lqr: u = K w for the m inputs w, which is
-        -K (x - r, v - r') for error and error_rate.
+        -K (x - r, v - r') for error and error_rate. Or, without `inputs`, an array (driven, 2n):
+        u = -K (x - r, v - r') of all n channels in the plant's order, driven or only measured.
       inputs: what K reads, in its order: error (r - x), error_rate (r' - v), x, v, r, dr, ddr, and
         q, dq of the joint without actuator that this one moves. Default: error, and error_rate if K
         has two inputs.
@@ -186,6 +160,8 @@ def law_from_control(
         or has other inputs than are named.
     """
     errors.name("name of the controller", name)
+    if inputs is None and (whole := _of_all_channels(K)) is not None:
+        return state_feedback(whole, name)
     system = _checked(_system(K))
     states = len(system.a)
     count = system.b.shape[1]
@@ -227,6 +203,22 @@ def law_from_control(
         continuous=True,
     )
     return decorate(function)()
+
+
+def _of_all_channels(K: Any) -> np.ndarray | None:
+    """Return K as an array of one row for each driven channel and two columns for each of several
+    channels; None if it is something else.
+    """
+    if not isinstance(K, np.ndarray | list | tuple):
+        return None
+    try:
+        gains = np.array(K, float)
+    except (TypeError, ValueError):
+        return None
+    rows, columns = gains.shape if gains.ndim == 2 else (0, 0)
+    if columns < max(4, 2 * rows) or columns % 2:
+        return None
+    return gains
 
 
 def _rows(matrix: np.ndarray) -> Matrix:

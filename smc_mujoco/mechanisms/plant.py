@@ -124,9 +124,9 @@ class Plant:
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
     # units of all channels if they differ, (n,); `units` has them in both cases
     mixed: tuple[str, ...] = ()
-    underactuated: bool = (
-        False  # whether it has channels without an actuator, which come after those with one
-    )
+    underactuated: bool = False  # whether each driven channel has a partner without an actuator
+    measured: int = 0  # number of further channels without an actuator, which come last
+    base: int = -1  # first of the six channels of a measured free base, its pose; -1: it has none
     # where its free joints should come to rest, (free,), rad or m; empty: at 0
     goal: tuple[float, ...] = ()
     # Parameter -> the only value that fits the geometry of the contacts
@@ -210,10 +210,11 @@ class Plant:
 
     @property
     def driven(self) -> int:
-        """The number of channels with an actuator, which come first. Each has at most one partner
-        without actuator.
+        """The number of channels with an actuator, which come first. Their partners without an
+        actuator, one for each or none, come next.
         """
-        return self.n // 2 if self.underactuated else self.n
+        moved = self.n - self.measured
+        return moved // 2 if self.underactuated else moved
 
     @property
     def by_mujoco(self) -> bool:
@@ -228,11 +229,12 @@ class Plant:
     @property
     def scored_channels(self) -> tuple[int, ...]:
         """The channels whose errors count: all, but not the tilt of a free body that follows from
-        the force.
+        the force, nor where on its floor a measured base is.
         """
         if self.pose == "heading":
             return (0, 1, 2, 5)
-        return tuple(range(self.n))
+        uncounted = (self.base, self.base + 1) if self.base >= 0 else ()
+        return tuple(i for i in range(self.n) if i not in uncounted)
 
     @property
     def units(self) -> tuple[str, ...]:

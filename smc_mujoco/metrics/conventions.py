@@ -8,6 +8,8 @@ law that drops the pole has settled nothing. A metric with x's unit, or of the c
 driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
 returns every group by itself.
 
+Of a measured base neither x nor y counts, unless the reference names a measured channel.
+
 Of a free body a metric with x's or u's unit is of the position, and its u are the forces of its
 actuators, N. Of the attitude only the heading counts where tilt follows from the force, as with
 rotors that push one way.
@@ -124,7 +126,7 @@ def group_trace(trace: Trace, group: Group) -> Trace:
         whole["x"] = trace.r + trace.e
     columns = []
     for i in group.channels:
-        if i in plant.scored_channels:
+        if i in trace.scenario.scored_channels:
             columns.append(i)
     arrays = {}
     for name, array in whole.items():

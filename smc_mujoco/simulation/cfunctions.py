@@ -40,7 +40,7 @@ from smc_mujoco.common.jit import (
 )
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import measurement_at
+from smc_mujoco.control.joint_law import head_at, measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import SEEN, Plant
@@ -73,28 +73,29 @@ def _compile_joint_law(
 ) -> Function:
     """Compile (y, gains, memory) -> two vectors, of a law of many joints.
 
-    Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u
-    and s, (n,) each.
+    Its inputs are the numbers of a JointMeasurement, its parameters one number for each driven
+    channel a gain. Its outputs are u and s, (n,) each, of which it writes those of driven channels.
     """
     body = jit(function)
     values = _joint_gains(gains, shared)
     attempt = attempting(0)
 
     @checked
-    def law(y, g, m, out):
+    def law(y, g, m, driven, out):
         u, s = body(y, g, m)
-        if len(u) != len(y.x) or len(s) != len(y.x):
+        if len(u) != driven or len(s) != driven:
             raise ValueError
-        for i in range(len(u)):
-            out[i], out[len(u) + i] = u[i], s[i]
+        for i in range(driven):
+            out[i], out[len(y.x) + i] = u[i], s[i]
         return ()
 
     def native(y, g, m, out):
         seen = measurement_at(y)
+        driven = int(head_at(y, 0).driven)
         n = len(seen.x)
         memories = carray(pointer(m), (n, memory))
         output = carray(pointer(out), (2 * n,))
-        return attempt(law, (seen, values(g, n), memories, output), out)
+        return attempt(law, (seen, values(g, driven), memories, driven, output), out)
 
     return _stored(native, function)
 

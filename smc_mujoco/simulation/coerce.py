@@ -255,8 +255,10 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     if isinstance(value, list | tuple) and len(value) == 1:
         value = value[0]
     items: list[Any] = [value]
+    others: list[Any] = []  # of measured channels
     if isinstance(value, Mapping | list | tuple):
-        items = one_per_channel("reference", value, plant)
+        own, others = _split(value, plant)
+        items = one_per_channel("reference", own, plant) + others
     for item in items:
         if not isinstance(item, Signal):
             amplitude = "0.0"
@@ -266,9 +268,25 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
             if callable(item):
                 cure = "give its samples, smc.signals.TimeSeries(times, values)"
             raise ScenarioError(f"reference is {shown(item)}: {cure}")
-    if all(item == items[0] for item in items):
+    if not others and all(item == items[0] for item in items):
         return items[0]
     return PerChannel(tuple(items))
+
+
+def _split(value: Any, plant: Plant) -> tuple[Any, list[Any]]:
+    """Return the references of driven channels, and those of the others if any of these has one;
+    where it has none, it is the channel's goal.
+    """
+    if isinstance(value, list | tuple):
+        if plant.measured and len(value) == plant.n:
+            return value[: plant.driven], list(value[plant.driven :])
+        return value, []
+    names = joint_names(plant)[plant.driven :] if plant.measured else ()
+    if not any(name in value for name in names):
+        return value, []
+    driven = {joint: signal for joint, signal in value.items() if joint not in names}
+    goals = zip(names, plant.goal or (0.0,) * plant.free, strict=True)
+    return driven, [value.get(name, Constant(goal)) for name, goal in goals]
 
 
 def contact(name: str, value: object, s: Any) -> tuple[Obstacle, ...]:

@@ -347,7 +347,7 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
             law = function_at(sim.laws, first)
         if _call(law, first, y, sim.commands) != 0:
             return record.LAW_RAISED
-        for j in range(width):
+        for j in range(min(width, sim.driven)):
             i = first + j
             limit = limits[first + j]
             command = commands[j] + feedforward
@@ -368,7 +368,11 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
         _mix(sim, last_u, buffer)
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
-        buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
+        buffer[i], sample.u, sample.s = 0.0, 0.0, 0.0
+        if sim.referenced <= i:
+            sample.r = 0.0
+        elif not joint and _evaluate_reference(address, sim, k, i) != 0:
+            return record.RAISED
     for i in range(n if sim.other_forces != 0 else 0):
         last_u[i] = log_at(sim.log, k * n + i).u
     return record.FINE
@@ -437,8 +441,8 @@ def _measure_channel(address, sim, k, t, i):
     y.dq = 0.0
     y.fq = 0.0
     y.gq = 0.0
-    partner = i + sim.driven  # a joint without actuator, which moves with channel i
-    if partner < sim.n:
+    if sim.partners != 0:  # a joint without actuator moves with channel i
+        partner = i + sim.driven
         if _evaluate_model(address, sim, partner) != 0:
             return record.RAISED
         y.q = x[partner]
@@ -487,6 +491,7 @@ def _measure_joints(address, sim, k, t):
     head.dt = sim.period
     head.model = sim.uses_model
     head.n = n
+    head.driven = sim.driven
     if sim.handle.coriolis != 0.0:
         head.dynamics = address + record.AT.handle
     else:

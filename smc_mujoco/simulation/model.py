@@ -22,10 +22,12 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.part import (
+    BASE,
     PASSIVE,
     PLACES,
     POSE,
     Part,
+    base_joint,
     drive_ids,
     exerted,
     free_joint,
@@ -140,10 +142,17 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     joints = joint_ids(model).tolist()
     drives = drive_ids(model).tolist()
     drives += [-1] * (len(joints) - len(drives))
+    base = base_joint(model)
     rows = []
     for drive, joint in zip(drives, joints, strict=True):
-        rows.append(_channel(model, data, drive, joint))
-    return np.array([tuple(row.values()) for row in rows], CHANNEL)
+        if joint != base:
+            rows.append(tuple(_channel(model, data, drive, joint).values()))
+        elif joint not in joints[: len(rows)]:
+            table = _places(model, base, BASE)
+            table["qfrc"] = table["qvel"]
+            table["xfrc"] = table["horizontal"] = 0  # of the world, which no force moves
+            rows += table.tolist()
+    return np.array(rows, CHANNEL)
 
 
 def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
@@ -216,23 +225,33 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
     """
     joint = free_joint(model)
     drives = drive_ids(model)
-    table = np.full(len(PLACES), -1, [(name, "i8") for name in CHANNEL.names or ()])
+    table = _places(model, joint, POSE)
+    at = np.arange(len(PLACES))
+    table["gathered"] = table["qvel"]
+    table["xfrc"] = 6 * model.jnt_bodyid[joint] + at
+    # 0 is of the world, which no force moves
+    table["horizontal"] = np.where(at == 0, table["xfrc"], 0)
+    table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
+    return table
+
+
+def _places(model: mujoco.MjModel, joint: int, site: str) -> np.ndarray:
+    """Return where the pose and the rates of a free joint are, measured at a site, (6,) CHANNEL; -1
+    in all other fields.
+    """
+    table = np.full(len(PLACES), -1, CHANNEL)
     at = np.arange(len(PLACES))
     turns = np.arange(len(PLACES)) - 3
     for name, kinds in POSE_SENSORS.items():
-        first, second = (int(model.sensor_adr[model.sensor(POSE + kind).id]) for kind in kinds)
+        first, second = (int(model.sensor_adr[model.sensor(site + kind).id]) for kind in kinds)
         if name == "v_sensor":
             second = second + turns
         table[name] = np.where(turns < 0, first + at, second)
     table["qpos"] = model.jnt_qposadr[joint] + np.minimum(at, 3)
-    table["qvel"] = table["gathered"] = model.jnt_dofadr[joint] + at
-    table["xfrc"] = 6 * model.jnt_bodyid[joint] + at
-    # 0 is of the world, which no force moves
-    table["horizontal"] = np.where(at == 0, table["xfrc"], 0)
+    table["qvel"] = model.jnt_dofadr[joint] + at
     table["turn"] = np.where(turns < 0, -1, turns)
     table["sign"] = np.where(turns < 0, 1, 0)
-    table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
-    return table.astype(CHANNEL)
+    return table
 
 
 @functools.lru_cache(maxsize=32)

@@ -44,7 +44,7 @@ from smc_mujoco.simulation.model import (
     with_values,
 )
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import PerChannel, Push, Signal
+from smc_mujoco.simulation.signals import Constant, PerChannel, Push, Signal
 
 IDEAL_SENSOR = Encoder(counts=math.inf)
 DATA_BYTES = 176 * 2**10  # of an mjData without channels; measured
@@ -154,10 +154,21 @@ def _compile(s: Resolved) -> None:
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
-    """Return the reference of all channels, or those of the driven channels if they differ."""
+    """Return the reference of all channels, or those of the driven channels if they differ; also
+    those of measured channels if the law may read them.
+    """
+    if reads_measured(s):
+        goals = s.plant.goal or (0.0,) * s.plant.free
+        rest = [Constant(goal) for goal in goals]
+        return (*s.references, *rest)[: s.plant.n]
     if isinstance(s.reference, PerChannel):
         return s.references
     return (s.reference,)
+
+
+def reads_measured(s: Resolved) -> bool:
+    """Return whether channels without an actuator have a reference too."""
+    return s.plant.measured > 0 or (s.law.joint and s.plant.free > 0)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -170,7 +181,7 @@ class Packed:
     numbers: np.ndarray  # gains, memories and all else that is float64
     disturbances: np.ndarray  # (m,) DISTURBANCE
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
-    references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
+    references: np.ndarray  # (referenced,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
     python: list[Any]  # the PythonFunctions that are called
@@ -209,6 +220,8 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     values |= {
         "n": s.plant.n,
         "driven": s.plant.driven,
+        "partners": s.plant.free - s.plant.measured,
+        "referenced": len(references(s)) if reads_measured(s) else s.plant.driven,
         "nq": mechanism.model.nq,
         "nv": mechanism.model.nv,
     }
@@ -302,7 +315,7 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
     s = prepared.scenario.resolved
     n = s.plant.n
     memory = {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
-    size = n if s.law.joint else 1  # numbers of a gain
+    size = s.plant.driven if s.law.joint else 1  # numbers of a gain
     laws = []
     for law in buffer.laws():
         gains = []
@@ -418,7 +431,7 @@ def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, 
         "width": width,
         "commands": buffer.reserve(2 * width),
         "states": buffer.put(states.view(float).tolist()),
-        "limits": buffer.put(s.limits),
+        "limits": buffer.put([*s.limits, *[0.0] * s.plant.free]),
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
     }

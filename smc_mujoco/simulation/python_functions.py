@@ -101,7 +101,8 @@ class PythonComponent:
     c.memory).
     """
 
-    def __init__(self, c: Component, n: int):
+    def __init__(self, c: Component, n: int, driven: int = 0):
+        self.driven = driven or n
         self.name = f"{c.kind} {c.name!r}"
         self.returns = RETURN_VALUES[c.kind]
         self.memory = np.zeros((n, c.memory))
@@ -109,7 +110,7 @@ class PythonComponent:
         if len(parts) == 1:
             parts = parts * n
         self.sizes = [part.memory for part in parts]
-        self.gains = [gains_of(part, n) for part in parts]
+        self.gains = [gains_of(part, self.driven) for part in parts]
         plain = {}  # by id, as a callable object may have no hash
         self.functions = []
         for part in parts:
@@ -131,12 +132,12 @@ class PythonComponent:
         return as_floats(self.name, out, self.returns, 2)
 
     def call_joint(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s of a law of many joints, (n,) each; raise Failure if it fails."""
+        """Return u and s of a law of many joints, (driven,) each; raise Failure if it fails."""
         try:
             out = self.functions[0](y, self.gains[0], self.memory)
         except USER_EXCEPTIONS as error:
             raise failure_of(self.name, error) from error
-        n = len(self.memory)
+        n = self.driven
         try:
             u, s = (np.asarray(values, float) for values in out)
         except (TypeError, ValueError, OverflowError):
@@ -335,7 +336,7 @@ def of_component(c: Component, s: Resolved) -> PythonFunction:
 def _of_joint_law(law: Component, s: Resolved) -> PythonFunction:
     """Return a law of many joints."""
     n = s.plant.n
-    component = PythonComponent(law, n)
+    component = PythonComponent(law, n, s.plant.driven)
     memories = Memories(n, law.memory)
     dtype = stored_dtype(n)
 
@@ -343,7 +344,9 @@ def _of_joint_law(law: Component, s: Resolved) -> PythonFunction:
         component.memory = memories[memory]
         stored = np.ctypeslib.as_array(inputs, (dtype.itemsize // 8,)).view(dtype)[0]
         dynamics = NominalDynamics(s, stored["x"], stored["v"])
-        return np.concatenate(component.call_joint(measurement_of(stored, dynamics)))
+        outputs = np.zeros((2, n))
+        outputs[:, : s.plant.driven] = component.call_joint(measurement_of(stored, dynamics))
+        return outputs.ravel()
 
     return PythonFunction(body)
 

@@ -25,8 +25,9 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.control import design
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
-from smc_mujoco.control.law import Law, suits
+from smc_mujoco.control.law import Law, joint_catalogue, suits
 from smc_mujoco.control.surface import Surface
+from smc_mujoco.control.written import StateFeedback
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.drives import (
@@ -434,11 +435,18 @@ class Scenario:
 
     @property
     def references(self) -> tuple[Signal, ...]:
-        """The reference of each driven channel."""
+        """The reference of each driven channel; of all if it names measured channels."""
         reference = self.resolved.reference
         if isinstance(reference, PerChannel):
             return reference.signals
         return (reference,) * self.plant.driven
+
+    @property
+    def scored_channels(self) -> tuple[int, ...]:
+        """The plant's `scored_channels`; all if the reference names measured channels."""
+        if self.plant.measured and len(self.references) == self.plant.n:
+            return tuple(range(self.plant.n))
+        return self.plant.scored_channels
 
     @functools.cached_property
     def steps(self) -> int:
@@ -827,6 +835,10 @@ def check_channels(s: Resolved) -> None:
     plant = s.plant
     joints = getattr(s.law.function, "joints", s.plant.n)
     sized = f"write it for {plant.n}, with SMC_JOINTS, or --joints of export-c"
+    driven = plant.driven
+    if isinstance(s.law.function, StateFeedback):
+        sized = f"give a K of {driven} x {2 * plant.n}"
+        driven = len(s.law.function.K)
     for refused, why in (
         (
             plant.n == 1,
@@ -834,11 +846,20 @@ def check_channels(s: Resolved) -> None:
         ),
         (
             joints != plant.n,
-            f"its C code is for {joints}, where {plant.name} has {plant.n}: {sized}",
+            f"its code is for {joints}, where {plant.name} has {plant.n}: {sized}",
         ),
         (
-            plant.free,
-            f"{plant.name} has {plant.free} without an actuator: give a law of one channel",
+            driven != plant.driven,
+            f"drives {driven}, where {plant.name} drives {plant.driven}: {sized}",
+        ),
+        (
+            plant.free and s.law.name in joint_catalogue(),
+            f"drives all of them, and {plant.name} has {plant.free} without an actuator: give a "
+            "law of your own, smc.design.lqr or smc.law_from(K)",
+        ),
+        (
+            plant.free and s.model != "none" and not plant.by_mujoco,
+            f"{plant.name} has no mass matrix for it: give model='none'",
         ),
         (s.surface is not None, "has its own surface: leave the surface out"),
     ):
@@ -850,6 +871,10 @@ def check_free_body(s: Resolved) -> None:
     """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three
     numbers.
     """
+    if s.plant.base >= 0 and s.sensor is not None:
+        raise ScenarioError(
+            f"the base of {s.plant.name} is measured, and an Encoder is of joints: leave sensor out"
+        )
     if not s.plant.pose:
         return
     # the law of a trace may have no code

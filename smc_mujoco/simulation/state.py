@@ -141,10 +141,12 @@ SIMULATION = np.dtype(
         ("calls", "i8"),
         ("failure", "i8"),
         ("failed_step", "i8"),
-        # sizes: channels, those of them that have an actuator, qpos, qvel, samples in the log,
-        # disturbances
+        # sizes: channels, those of them that have an actuator, their partners, those that have a
+        # reference, qpos, qvel, samples in the log, disturbances
         ("n", "i8"),
         ("driven", "i8"),
+        ("partners", "i8"),
+        ("referenced", "i8"),
         ("nq", "i8"),
         ("nv", "i8"),
         ("samples", "i8"),
@@ -162,7 +164,7 @@ SIMULATION = np.dtype(
         ("log", "i8"),
         ("disturbances", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds
-        # (driven,), ctrl per u
+        # (n,), ctrl per u
         ("delay", "i8"),
         ("delay_slots", "i8"),
         ("delay_buffer", "i8"),
@@ -218,8 +220,8 @@ SIMULATION = np.dtype(
         ("uses_model", "f8"),
         # address of the other forces on the joints, (n,), for a law with the true model; else 0
         ("other_forces", "i8"),
-        # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`,
-        # or `reference`
+        # addresses of the FUNCTIONs of the driven channels, and of those with a reference, where
+        # they differ; 0: all have `law`, or `reference`
         ("laws", "i8"),
         ("references", "i8"),
         # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and

@@ -385,7 +385,7 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     else:
         names = LOGGED
     arrays = {name: np.ascontiguousarray(log[name]) for name in names}
-    if scenario.plant.goal:
+    if scenario.plant.goal and not scenario.plant.measured:
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
     finite = np.array([np.isfinite(values[:end]).all(axis=1) for values in arrays.values()])
     if not finite.all():

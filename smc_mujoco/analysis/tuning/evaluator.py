@@ -166,9 +166,8 @@ def _putter(
     """Return the function that puts a candidate's gains among the numbers of a run."""
     law = prepared.scenario.law
     at = int(record["law"]["parameters"])
-    values = state.view(
-        packed.numbers, at, (len(law.gains), prepared.scenario.plant.n if law.joint else 1)
-    )
+    width = prepared.scenario.plant.driven if law.joint else 1
+    values = state.view(packed.numbers, at, (len(law.gains), width))
     rows = []
     for name in names:
         rows.append(list(law.gains).index(name))

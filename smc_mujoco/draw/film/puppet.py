@@ -77,7 +77,7 @@ class Puppet:
         channel are taken from the pose `rest`, (nq,), by default that of the start.
         """
         x = np.where(self.slides, np.clip(x, -self.rail / 2, self.rail / 2), x)
-        if self.scenario.plant.pose:
+        if self.scenario.plant.pose or self.scenario.plant.base >= 0:
             pose = models.state_with(self.model, self.ids, x, 0.0)[0]
         else:
             pose = (self.start if rest is None else rest).copy()

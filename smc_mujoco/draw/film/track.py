@@ -116,7 +116,7 @@ def motion(trace: Trace, times: np.ndarray) -> Motion | None:
     known = len(names)
     for name in names:
         known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0
-    if known == model.nq:
+    if known == model.nv:
         moved = None
     else:
         moved = poses(trace, times)

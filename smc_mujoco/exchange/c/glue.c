@@ -70,7 +70,7 @@ typedef struct { /* HANDLE of joint_law.py: addresses of two functions and of th
 } smc_mujoco_requests;
 
 typedef struct { /* HEAD of joint_law.py, with the address of smc_mujoco_requests, or 0, and then the arrays */
-    double smc_t, smc_dt, smc_model, smc_dynamics, smc_joints, smc_arrays[SMC_NUMBERS];
+    double smc_t, smc_dt, smc_model, smc_dynamics, smc_joints, smc_driven, smc_arrays[SMC_NUMBERS];
 } smc_mujoco_measurement;
 
 typedef struct {

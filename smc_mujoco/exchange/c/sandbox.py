@@ -168,7 +168,8 @@ def stored(head, requests: Requests, arrays) -> list[float]:
     """Return the numbers of a joint measurement from t, dt and model and its arrays, see
     `joint_law.measurement_at`.
     """
-    return [*head, float(requests.address), requests.joints, *itertools.chain.from_iterable(arrays)]
+    sizes = requests.joints, requests.joints
+    return [*head, float(requests.address), *sizes, *itertools.chain.from_iterable(arrays)]
 
 
 # in the separate process

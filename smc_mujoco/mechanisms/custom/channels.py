@@ -23,7 +23,7 @@ from smc_mujoco.common.errors import (
     users_stacklevel,
 )
 from smc_mujoco.mechanisms.custom.mjcf import pick
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, PLACES, POSE, exerted
+from smc_mujoco.mechanisms.hardware.part import BASE, PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
 from smc_mujoco.mechanisms.rotation import rotation_vector
 
@@ -190,6 +190,46 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
         )
 
 
+def measured_joints(
+    label: str, model: mujoco.MjModel, channels: Pairs, measured: Iterable[str] | None
+) -> tuple[str, ...]:
+    """Return the names of the joints that are measured beside the channels; "base" is the model's
+    only free joint.
+    """
+    if measured is None:
+        return ()
+    if isinstance(measured, str) or not isinstance(measured, Iterable):
+        raise ScenarioError(
+            f"measured is {shown(measured)}: give joints' names, such as ['pole', 'base']"
+        )
+    names = [model.joint(i).name for i in range(model.njnt)]
+    free = [names[i] for i in np.flatnonzero(model.jnt_type == FREE)]
+    taken = joints_of(channels)
+    found = []
+    for name in items_of("measured", measured):
+        joint = name
+        if name == "base" and name not in names and len(free) == 1:
+            joint = free[0]
+        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
+        if kind not in UNIT_OF_JOINT and kind != FREE:
+            raise ScenarioError(
+                f"measured joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one "
+                "that is a hinge, a slide or a free joint"
+            )
+        bases = [other for other in found if other in free]
+        if joint in (*taken, *found) or (kind == FREE and bases):
+            raise ScenarioError(
+                f"measured joint {joint!r} of {label} is measured already, or a second base: "
+                "name each joint once, and one base"
+            )
+        found.append(joint)
+    if found and is_free(model, taken[0]):
+        raise ScenarioError(
+            f"joint {taken[0]!r} of {label} is a free joint, the only channel: leave measured out"
+        )
+    return tuple(found)
+
+
 def starts(
     model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[dict[str, float], list[Range]]:
@@ -205,6 +245,28 @@ def starts(
     }
     x0 = dict(zip(joints, goals(model, joints, keyframe)[0], strict=True)) | chosen
     return x0, [row for row in ranges(model, joints) if keyframe is not None or row[0] in chosen]
+
+
+def places(
+    model: mujoco.MjModel, joints: Sequence[str], start: Mapping[str, float], keyframe: str | None
+) -> tuple[list[str], tuple[str, ...], tuple[float, ...]]:
+    """Return the joint of each channel, its unit and its x0; `start` has x0 of hinges and slides.
+
+    A free joint has six channels.
+    """
+    names = []
+    units = ()
+    x0 = ()
+    for joint in joints:
+        if joint in start:
+            names.append(joint)
+            units += (UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])],)
+            x0 += (start[joint],)
+        else:
+            names += [joint] * len(PLACES)
+            units += ("m",) * 3 + ("rad",) * 3
+            x0 += pose_at_start(model, joint, keyframe)
+    return names, units, x0
 
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
@@ -311,8 +373,15 @@ def add_pose(spec: mujoco.MjSpec, joint: str, drives: Sequence[int]) -> None:
     """Add a free body's sensors, and keep the actuators that are not among its drives as passive
     parts.
     """
-    body = spec.joint(joint).parent
-    site = body.add_site(name=POSE, size=(1e-6,) * 3, group=5)
+    add_pose_sensors(spec, joint, POSE)
+    for i, actuator in enumerate(list(spec.actuators)):
+        if i not in drives:
+            actuator.name = f"{PASSIVE}smc:{i}"
+
+
+def add_pose_sensors(spec: mujoco.MjSpec, joint: str, name: str) -> None:
+    """Add a site of this name to the body of a free joint, and sensors of its pose and rates."""
+    site = spec.joint(joint).parent.add_site(name=name, size=(1e-6,) * 3, group=5)
     site.pos = (0.0, 0.0, 0.0)
     site.quat = (1.0, 0.0, 0.0, 0.0)
     kinds = mujoco.mjtSensor
@@ -320,14 +389,19 @@ def add_pose(spec: mujoco.MjSpec, joint: str, drives: Sequence[int]) -> None:
         (":x", kinds.mjSENS_FRAMEPOS),
         (":q", kinds.mjSENS_FRAMEQUAT),
         (":v", kinds.mjSENS_FRAMELINVEL),
+        (":w", kinds.mjSENS_GYRO),
     ):
-        spec.add_sensor(name=POSE + end, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE)
-    spec.add_sensor(
-        name=f"{POSE}:w", type=kinds.mjSENS_GYRO, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE
-    )
-    for i, actuator in enumerate(list(spec.actuators)):
-        if i not in drives:
-            actuator.name = f"{PASSIVE}smc:{i}"
+        spec.add_sensor(name=name + end, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
+
+
+def add_joint_sensors(spec: mujoco.MjSpec, joint: str) -> None:
+    """Add the sensors of a joint's position and velocity; of a free joint, of its body's pose."""
+    if spec.joint(joint).type == FREE:
+        return add_pose_sensors(spec, joint, BASE)
+    on_joint = {"objtype": mujoco.mjtObj.mjOBJ_JOINT, "objname": joint}
+    spec.add_sensor(name=f"x:{joint}", type=mujoco.mjtSensor.mjSENS_JOINTPOS, **on_joint)
+    spec.add_sensor(name=f"v:{joint}", type=mujoco.mjtSensor.mjSENS_JOINTVEL, **on_joint)
+    return None
 
 
 class Motor(NamedTuple):

@@ -7,6 +7,7 @@ is as the model says. "held": other joints with a motor are held there too, by a
 
 import functools
 import math
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -30,9 +31,9 @@ def target_of(actuator: mujoco.MjsActuator) -> str:
     return actuator.target if actuator.trntype.value in ONE_JOINT else ""
 
 
-def limp(spec: mujoco.MjSpec, channels: Pairs) -> list[str]:
-    """Return the joints that are no channels and have motors, which nothing commands."""
-    mine = {"", *own.joints_of(channels)}
+def limp(spec: mujoco.MjSpec, seen: Iterable[str]) -> list[str]:
+    """Return the joints that are not seen as channels and have motors, which nothing commands."""
+    mine = {"", *seen}
     served = {target_of(actuator) for actuator in spec.actuators if is_servo(actuator)}
     driven = dict.fromkeys(target_of(actuator) for actuator in spec.actuators)
     return [joint for joint in driven if joint not in mine | served]
@@ -58,9 +59,14 @@ def at_start(
 
 
 def edit(
-    spec: mujoco.MjSpec, source: Source, channels: Pairs, keyframe: str | None, others: str
+    spec: mujoco.MjSpec,
+    source: Source,
+    channels: Pairs,
+    keyframe: str | None,
+    others: str,
+    seen: Sequence[str],
 ) -> None:
-    """Edit a model that `source` has just read."""
+    """Edit a model that `source` has just read. Its channels are on the joints that are `seen`."""
     driven = {joint for joint, _ in channels}
     servos = {}
     for i, actuator in enumerate(spec.actuators):
@@ -75,9 +81,9 @@ def edit(
             goal = servo.gainprm[0] * data.ctrl[model.actuator_ctrladr[i]]
         servo.biasprm[0] += goal  # its ctrl stays at 0
     if others == "held":
-        _hold(spec, model, data, limp(spec, channels))
+        _hold(spec, model, data, limp(spec, seen))
     if others == "locked":
-        _lock(spec, model, data, set(own.joints_of(channels)))
+        _lock(spec, model, data, set(seen))
 
 
 def _hold(

@@ -85,6 +85,7 @@ class UserModel:
     # indices of the actuators of a free joint, which is then the only channel
     thrusters: tuple[int, ...] = ()
     others: str = ""  # one of others.OTHERS, or "" if not given
+    measured: tuple[str, ...] = ()  # joints that are measured beside the channels
 
     def edited(self) -> mujoco.MjSpec:
         """Return the model without sensors, and with its other joints as wanted."""
@@ -93,7 +94,8 @@ class UserModel:
         while named := [*spec.tuples, *spec.sensors]:
             # MuJoCo 4 also deletes the tuples that name it, so list them again
             spec.delete(named[0])
-        rest_of.edit(spec, self.source, self.channels, self.keyframe, self.others)
+        seen = own.joints_of(self.channels) + list(self.measured)
+        rest_of.edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
         return spec
 
     def __call__(self, n: int) -> mujoco.MjSpec:
@@ -103,11 +105,8 @@ class UserModel:
             own.add_pose(spec, self.channels[0][0], self.thrusters)
         else:
             own.add_motors(spec, self.motors)
-            for joint in own.joints_of(self.channels):
-                on_joint = {"objtype": mujoco.mjtObj.mjOBJ_JOINT, "objname": joint}
-                kinds = mujoco.mjtSensor
-                spec.add_sensor(name=f"x:{joint}", type=kinds.mjSENS_JOINTPOS, **on_joint)
-                spec.add_sensor(name=f"v:{joint}", type=kinds.mjSENS_JOINTVEL, **on_joint)
+            for joint in (*own.joints_of(self.channels), *self.measured):
+                own.add_joint_sensors(spec, joint)
         # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
         hard = False
         for part in (*spec.joints, *spec.tendons):
@@ -151,6 +150,7 @@ class UserModel:
         }
         data |= {"tip": self.tip} if self.tip else {}
         data |= {"others": self.others} if self.others else {}
+        data |= {"measured": list(self.measured)} if self.measured else {}
         if not self.source.path:
             assets = {}
             for name, content in self.source.assets:
@@ -189,6 +189,7 @@ def plant_from(
     timeout: Timeout = 20.0,
     tip: str | None = None,
     others: Annotated[str, OneOf(names=OTHERS)] | None = None,
+    measured: Iterable[str] | None = None,
 ) -> Plant:
     """Make a plant of an MJCF model.
 
@@ -209,6 +210,11 @@ def plant_from(
       others: what other joints do. "file": as the model says; servos hold the start, or the
         keyframe's ctrl. "held": a joint with a motor is held there too, by a stiff PD. "locked":
         all are welded there. Default: "file", with a warning if that leaves motors at 0.
+      measured: names of further joints that are measured but not driven, in the order of their
+        channels, which come last. Laws of many joints read them, and they count in scores. A free
+        joint, or "base" for the model's only one, gives six channels, base_x to base_rz: position,
+        rotation vector and their rates as of a free body. Its x and y count only in runs whose
+        reference names a measured channel.
       timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:
@@ -226,7 +232,7 @@ def plant_from(
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     pairs = own.coerce(channels)
-    made = _plant(source, pairs, name, keyframe, tip, others or "")
+    made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.read()
     model = source.compiled(spec)
     read = urdf.read(Path(source.path))
@@ -237,7 +243,7 @@ def plant_from(
             f"{source.label} draws joint {joint!r} outside its range, so that the default goal is "
             "the middle of it: give a keyframe or a reference for another one"
         )
-    if others is None and (names := rest_of.limp(spec, pairs)):
+    if others is None and (names := rest_of.limp(spec, [*own.joints_of(pairs), *(measured or ())])):
         doubts.append(
             f"joints of {source.label} have motors that nothing commands, "
             f"{joined(map(repr, names))}: give others='held' (+held after the joints in a text), "
@@ -300,6 +306,7 @@ def _plant(
     keyframe: str | None,
     tip: str | None,
     others: str = "",
+    measured: Iterable[str] | None = None,
 ) -> Plant:
     """Return the plant of a model, see `plant_from`."""
     label = source.label
@@ -312,8 +319,9 @@ def _plant(
         (joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED)))
         for joint, channel in pairs
     )
-    joints = own.joints_of(pairs)
     own.check(label, model, pairs)
+    seen = own.measured_joints(label, model, pairs, measured)
+    joints = [*own.joints_of(pairs), *seen]
     if keyframe is not None:
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
     if tip is not None:
@@ -322,9 +330,12 @@ def _plant(
     if catalogue().taken(file):  # a plant of the library has this name
         file = label
     plant_name = file if name is None else name
-    special = _places(plant_name, model, joints, pairs, keyframe)
+    units, special = _places(plant_name, model, joints, pairs, keyframe)
+    if tip and special.get("base", -1) >= 0:
+        raise ScenarioError(f"the base of {label} is measured: leave the tip out")
+    build = UserModel(source, keyframe, pairs, (), tip or "", others=others, measured=seen)
     if others in ("held", "locked"):
-        model = source.compiled(UserModel(source, keyframe, pairs, (), others=others).edited())
+        model = source.compiled(build.edited())
     motors = ()
     thrusters = ()
     if own.is_free(model, joints[0]):
@@ -333,14 +344,11 @@ def _plant(
             raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
         thrusters = tuple(own.thrusters(model, joints[0]))
         limits = own.reach_of(label, model, joints[0])
-        units = ("m",) * 3 + ("rad",) * 3
         special["pose"] = own.held_pose(label, model, joints[0])
     else:
         motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
         limits = tuple(motor.limit for motor in motors)
-        kinds = [mujoco.mjtJoint(model.joint(joint).type[0]) for joint in joints]
-        units = tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
-    build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters, others)
+    build = dataclasses.replace(build, motors=motors, thrusters=thrusters)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
@@ -359,7 +367,7 @@ def _plant(
         fields=fields,
         nominal=without_model if why_not else NominalModel(build, fields),
         lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
-        underactuated=len(joints) > len(pairs),
+        underactuated=len(joints) - len(seen) > len(pairs),
         direct=True,
         smooth=smooth(model, rubs),
         rubs=rubs,
@@ -374,18 +382,27 @@ def _plant(
 
 def _places(
     plant: str, model: mujoco.MjModel, joints: list[str], pairs: Pairs, keyframe: str | None
-) -> dict[str, Any]:
-    """Return the plant's fields on where its channels start, end and may go."""
+) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the units of the channels, and the plant's fields on where they start, end and may
+    go.
+    """
     if own.is_free(model, joints[0]):
-        x0 = own.pose_at_start(model, joints[0], keyframe)
-        return {"x0": x0, "rest": x0}
-    start, checked = own.starts(model, joints, pairs, keyframe)
+        _, units, x0 = own.places(model, joints, {}, keyframe)
+        return units, {"x0": x0, "rest": x0}
+    alone = [joint for joint in joints if not own.is_free(model, joint)]
+    start, checked = own.starts(model, alone, pairs, keyframe)
     check_ranges(plant, checked, [start[joint] for joint, _, _ in checked])
-    rest, _ = own.goals(model, joints, keyframe)
-    fields = {"x0": tuple(start.values()), "ranges": own.ranges(model, joints)}
+    names, units, x0 = own.places(model, joints, start, keyframe)
+    goals = dict(zip(alone, own.goals(model, alone, keyframe)[0], strict=True))
+    rest = own.places(model, joints, goals, keyframe)[2]
+    fields: dict[str, Any] = {"x0": x0, "ranges": own.ranges(model, names)}
     if any(rest):
         fields |= {"rest": rest, "goal": rest[len(pairs) :]}
-    return fields
+    fields["measured"] = len(names) - len(own.joints_of(pairs))
+    for joint in joints:
+        if joint not in alone:
+            fields["base"] = names.index(joint)
+    return units, fields
 
 
 def without_model(x, v, i, p):
@@ -421,6 +438,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
     for dof in range(model.nv):
         if model.joint(int(model.dof_jntid[dof])).name in joints:
             channel_dofs.append(dof)
+    if any(own.is_free(model, joint) for joint in joints[1:]):
+        return f"nothing is known of what its base stands on: {WITHOUT_MODEL}"
     idle = np.ones(model.nactuator, bool)
     if own.is_free(model, joints[0]):
         idle[own.thrusters(model, joints[0])] = False
@@ -436,7 +455,7 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
     if not loose:
         return ""
     named = f"joint {loose[0].name!r}" if loose[0].name else "a joint without a name"
-    cure = "make it a channel, or the partner of one if nothing drives it"
+    cure = "make it a channel, or name it in measured if nothing drives it"
     return f"{named} moves with its channels and is not measured: {cure}, or {WITHOUT_MODEL}"
 
 
@@ -449,4 +468,5 @@ def restored(data: Mapping, name: str) -> Plant:
         source = mjcf.found(data["path"], data["sha256"])
     others = data.get("others", "")
     pairs = own.coerce(data["channels"])
-    return _plant(source, pairs, name, data["keyframe"], data.get("tip"), others)
+    measured = data.get("measured")
+    return _plant(source, pairs, name, data["keyframe"], data.get("tip"), others, measured)

@@ -34,6 +34,7 @@ HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
 HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
 OWN = "smc:"  # begins the names of bodies that obstacles add
+BASE = "smc:base"  # the same of a free body whose pose is measured, beside driven joints
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
 # A pose: the position in the axes of the world, m, and the rotation vector of the attitude, rad,
@@ -159,14 +160,14 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     """Return the channels' joints: first the driven ones, then those that are only measured."""
     if (site := spec.site(POSE)) is not None:
         return [site.parent.joints[0]] * len(PLACES)
-    names = [actuator.target.removeprefix(ROTOR) for actuator in drives(spec)]
-    measured = []
+    found = [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
+    names = [joint.name for joint in found]
     for sensor in spec.sensors:
-        if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS:
-            measured.append(sensor.objname)
-    return [
-        spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]
-    ]
+        if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS and sensor.objname not in names:
+            found.append(spec.joint(sensor.objname))
+        elif sensor.name == f"{BASE}:x":
+            found += [spec.site(BASE).parent.joints[0]] * len(PLACES)
+    return found
 
 
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
@@ -180,10 +181,22 @@ def free_joint(model: mujoco.MjModel) -> int:
     """Return the index of the free joint whose pose is the channels; -1 if each channel has a joint
     of its own.
     """
-    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, POSE)
-    if site < 0:
+    return _moved_by(model, POSE)
+
+
+def base_joint(model: mujoco.MjModel) -> int:
+    """Return the index of the free joint whose pose is measured beside driven joints; -1 without
+    one.
+    """
+    return _moved_by(model, BASE)
+
+
+def _moved_by(model: mujoco.MjModel, site: str) -> int:
+    """Return the index of the joint of a site's body; -1 if there is no such site."""
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site)
+    if index < 0:
         return -1
-    return int(model.body_jntadr[model.site_bodyid[site]])
+    return int(model.body_jntadr[model.site_bodyid[index]])
 
 
 def exerted(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndarray:
@@ -211,23 +224,31 @@ def driven_ids(model: mujoco.MjModel) -> np.ndarray:
 
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' joints, (n,): first the driven ones, then those that are
-    only measured.
+    only measured. A free joint has six channels.
     """
-    first = driven_ids(model)
+    joints = driven_ids(model).tolist()
     if free_joint(model) >= 0:
-        return first
-    measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
-    return np.array([*first, *(joint for joint in measured if joint not in first)], int)
+        return np.array(joints, int)
+    base = base_joint(model)
+    for i in range(model.nsensor):
+        if model.sensor_type[i] == mujoco.mjtSensor.mjSENS_JOINTPOS:
+            if model.sensor_objid[i] not in joints:
+                joints.append(model.sensor_objid[i])
+        elif base >= 0 and model.sensor(i).name == f"{BASE}:x":
+            joints += [base] * len(PLACES)
+    return np.array(joints, int)
 
 
 @functools.lru_cache(maxsize=32)
 def joint_names(plant: Plant) -> tuple[str, ...]:
     """Return the name of each channel's joint, (n,)."""
     model = compiled(plant.spec())
-    names = tuple(model.joint(int(joint)).name for joint in joint_ids(model))
+    names = [model.joint(int(joint)).name for joint in joint_ids(model)]
     if plant.pose:
         return tuple(f"{name}_{place}" for name, place in zip(names, PLACES, strict=True))
-    return names
+    if plant.base >= 0:
+        names[plant.base : plant.base + len(PLACES)] = [f"base_{place}" for place in PLACES]
+    return tuple(names)
 
 
 @functools.lru_cache(maxsize=32)
@@ -277,10 +298,12 @@ def column_ends(plant: Plant) -> tuple[str, ...]:
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' degrees of freedom, (n,)."""
-    dofs = model.jnt_dofadr[joint_ids(model)]
-    if free_joint(model) < 0:
-        return dofs
-    return dofs + np.arange(len(PLACES))
+    joints = joint_ids(model)
+    dofs = model.jnt_dofadr[joints]
+    pose = max(free_joint(model), base_joint(model))
+    if pose >= 0:
+        dofs[joints == pose] += np.arange(len(PLACES))
+    return dofs
 
 
 def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:
@@ -310,12 +333,19 @@ def state_with(
     """
     qpos = initial_pose(model)
     qvel = np.zeros(model.nv)
-    if (free := free_joint(model)) >= 0:
-        first = model.jnt_qposadr[free]
-        dof = model.jnt_dofadr[free]
-        qpos[first : first + 7] = [*x[:3], *rotation.quaternion(*x[3:])]
-        qvel[dof : dof + 6] = v
-        return qpos, qvel
+    pose = max(free_joint(model), base_joint(model))
+    if pose >= 0:
+        of_pose = np.atleast_2d(joints)[0] == pose
+        x = np.asarray(x)
+        v = np.broadcast_to(v, x.shape)
+        first = model.jnt_qposadr[pose]
+        dof = model.jnt_dofadr[pose]
+        place = x[of_pose]
+        qpos[first : first + 7] = [*place[:3], *rotation.quaternion(*place[3:])]
+        qvel[dof : dof + 6] = v[of_pose]
+        joints = joints[..., ~of_pose]
+        x = x[~of_pose]
+        v = v[~of_pose]
     qpos[model.jnt_qposadr[joints]] = x
     qvel[model.jnt_dofadr[joints]] = v
     return qpos, qvel
