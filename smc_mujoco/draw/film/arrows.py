@@ -1,4 +1,5 @@
-"""Arrows in the scene: control, disturbance, and friction with contact, at each driven joint.
+"""Arrows in the scene: control, disturbance, and friction with contact, at each driven joint; at
+the others friction and contact alone.
 
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows
 how far a control swings that switches faster than the film. With a drive, arrow and bar show its
@@ -145,19 +146,20 @@ class Scale(NamedTuple):
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
-    """Return the scale of the arrows for each group of driven channels."""
+    """Return the scale of the arrows for each group of channels."""
     by_group = {}
     for group, parts in style.split(traces).items():
         if traces[0].scenario.plant.pose:
             pushes = [np.linalg.norm(trace.d[:, :3], axis=1).max() for trace in traces]
             by_group[group] = Scale(0.0, float(max(pushes)) if group.unit == "m" else 0.0)
             continue
+        reaction = max(map(abs, panels.span(parts, "reaction")))
         if not group.driven:
+            by_group[group] = Scale(0.0, 0.0, reaction)
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
         control = _longest(parts, "applied")
-        reaction = max(map(abs, panels.span(parts, "reaction")))
         if control and same:
             reaction = min(reaction, control)
         if drive:
@@ -195,10 +197,9 @@ def _longest(traces: Sequence[Trace], name: str) -> float:
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
-    """Return the scale of the arrows of each of a trace's driven channels."""
-    driven = [group for group in groups(trace.scenario) if group.driven]
+    """Return the scale of the arrows of each of a trace's channels."""
     of_channel = {}
-    for group, scale in zip(driven, scales.values(), strict=True):
+    for group, scale in zip(groups(trace.scenario), scales.values(), strict=True):
         of_channel |= dict.fromkeys(group.channels, scale)
     return [of_channel[i] for i in sorted(of_channel)]
 
@@ -215,14 +216,12 @@ def arrows(
         layers = [("force", scale.control, rgba(colour), 1.0), command]
     layers.append(("disturbance", scale.disturbance, rgba(style.DISTURBANCE), 0.65))
     layers.append(("reaction", scale.reaction, rgba(style.REACTION), 0.8))
-    layers[1:] = [layer for layer in layers[1:] if layer[1]]
     drawn = []
-    for layer, (name, longest, shade, size) in enumerate(layers):
-        if not longest:
-            continue
+    acting = [layer for layer in layers if layer[1]]
+    for layer, (name, longest, shade, size) in enumerate(acting):
         low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
         drawn.append(Arrow(0.0, mean, shade, layer, size))
-        if layer == 0 and high - low > MIN_BAR:
+        if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 

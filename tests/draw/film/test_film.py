@@ -18,7 +18,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.film import camera, encoder, film, pace, puppet, scene, stage
-from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
+from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales, scales_by_channel
 from smc_mujoco.draw.film.caption import key
 from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.draw.film.stage import Stage
@@ -313,6 +313,21 @@ def test_friction_draws_an_arrow_of_its_own_and_the_key_says_so(stuck):
     assert violet.rgba[:3] == pytest.approx(np.array(style.rgb(style.REACTION)) / 255)
     assert abs(violet.high) == pytest.approx(1.0, abs=0.05)  # it slides
     assert "violet arrow: reaction, longest 0.5 N" in key([stuck], scales([stuck]))
+
+
+@pytest.mark.parametrize(("joint", "channel"), [("slide", 0), ("hinge", 1)])
+def test_the_arrow_of_friction_is_at_the_joint_that_rubs(joint, channel):
+    trace = smc.run(
+        smc.Scenario(
+            plant="cart_pole", law="none", friction={joint: smc.Coulomb(0.02)}, duration=0.3
+        )
+    )
+    sizes = scales_by_channel(trace, scales([trace]))
+    acting = loads(trace, np.array([0.2, 0.21]))
+    with_arrow = [i for i in range(2) if arrows(acting, 0, i, sizes[i], "#0072B2")]
+    assert with_arrow == [channel]
+    unit = "N" if joint == "slide" else "N·m"
+    assert f"violet arrow: reaction, longest 0.02 {unit}" in key([trace], scales([trace]))
 
 
 def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
