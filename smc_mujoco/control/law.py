@@ -286,5 +286,8 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     return [
         name
         for name, law in known.items()
-        if suits(law, plant) and (law.plants or name == "none" or whole)
+        if suits(law, plant)
+        and (law.plants or name == "none" or whole)
+        # a law of many joints reads the model
+        and not (law.joint and plant.unmodelled)
     ]

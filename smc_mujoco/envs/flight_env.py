@@ -22,14 +22,10 @@ from smc_mujoco.envs.gymnasium_env import PlantEnv, action_space
 from smc_mujoco.envs.tasks import Pair
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
-from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import ScenarioBatch
-
-# isort: split
-import gymnasium  # already imported by gymnasium_env
 
 
 class FlightEnv(PlantEnv):
@@ -131,12 +127,3 @@ class FlightEnv(PlantEnv):
         w = self.v - r[6:]
         rotation.put_attitude_error(self.x, self.v, r[:6], r[6:], e, w)
         return e, w
-
-
-def environment(plant: Plant | str, *args: Any, **kwargs: Any) -> gymnasium.Env:
-    """Return the environment of a plant: a FlightEnv of a free body, else a PlantEnv.
-
-    Arguments are those of both.
-    """
-    made = FlightEnv if as_plant(plant).pose else PlantEnv
-    return made(plant, *args, **kwargs)

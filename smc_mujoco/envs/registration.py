@@ -70,8 +70,8 @@ def register() -> None:
             if name not in theirs.registry:
                 theirs.register(
                     id=name,
-                    entry_point="smc_mujoco.envs.flight_env:environment",
-                    vector_entry_point="smc_mujoco.envs.vector_env:BatchEnv",
+                    entry_point="smc_mujoco.envs.entry_points:environment",
+                    vector_entry_point="smc_mujoco.envs.entry_points:environments",
                     kwargs={"plant": plant},
                 )
 

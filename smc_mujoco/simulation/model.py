@@ -272,7 +272,7 @@ def mixer(plant: Plant) -> np.ndarray:
 
 def keeps_torques(rows: np.ndarray) -> bool:
     """Return whether the actuators in a `mixer` all push one way and alike, as rotors do."""
-    return len(rows) > 0 and np.ptp(rows[:, 7]) == 0.0 and bool(np.all(rows[:, 6] >= 0.0))
+    return len(set(rows[:, 7].tolist())) == 1 and bool(np.all(rows[:, 6] >= 0.0))
 
 
 def spec(scenario: Scenario) -> mujoco.MjSpec:

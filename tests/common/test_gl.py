@@ -61,9 +61,17 @@ def report(hidden: tuple[str, ...] = (), first: str = "", **variables: str) -> t
     return backend, note, missing
 
 
+USES = [
+    "import smc_mujoco as smc; smc.ScenarioError, smc.Noise\n",
+    "import gymnasium; gymnasium.make('smc_mujoco:smc/Duffing-v0').reset()\n",
+    "import gymnasium; gymnasium.make_vec('smc_mujoco:smc/Duffing-v0', num_envs=2).reset()\n",
+]
+
+
 @pytest.mark.parametrize("wish", ["osmesa", "egl", "x"])
-def test_a_script_runs_whatever_mujoco_gl_names_and_is_warned_once(wish):
-    code = HIDE.format(words=ALL) + "import smc_mujoco as smc; smc.ScenarioError, smc.Noise\n"
+@pytest.mark.parametrize("use", USES, ids=["smc", "make", "make_vec"])
+def test_a_script_runs_whatever_mujoco_gl_names_and_is_warned_once(wish, use):
+    code = HIDE.format(words=ALL) + use
     command = [sys.executable, "-c", code + "import mujoco"]
     environment = os.environ | {"MUJOCO_GL": wish}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

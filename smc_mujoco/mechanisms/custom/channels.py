@@ -169,8 +169,8 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
             continue
         if kind == FREE:
             raise ScenarioError(
-                f"joint {joint!r} of {label} is a free joint: give it as the only channel, "
-                "without fields of a Channel"
+                f"joint {joint!r} of {label} is a free joint: leave it out, or give it as the only "
+                "channel, without fields of a Channel"
             )
         if kind not in UNIT_OF_JOINT:
             raise ScenarioError(
@@ -307,10 +307,9 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
     """
     drives = thrusters(model, joint)
     if not 0 < len(drives) <= len(PLACES):
-        cure = "give it one to six"
         raise ScenarioError(
-            f"{len(drives)} actuators of {label} act at sites of the body of joint {joint!r}: "
-            f"{cure}"
+            f"joint {joint!r} of {label} is a free joint, and {len(drives)} actuators act at sites "
+            "of its body: give it one to six, or give hinges and slides as channels instead"
         )
     plain = (NO_DYNAMICS, mujoco.mjtDyn.mjDYN_FILTER.value, mujoco.mjtDyn.mjDYN_FILTEREXACT.value)
     for i in drives:

@@ -43,6 +43,7 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
     "Error opening file": "put that file there",
     "ASCII": "save that file as a binary STL",
     "mass and inertia": "give that body a mass and an inertia (<inertial>)",
+    "not found Element 'plugin'": "load its library before (mujoco.mj_loadPluginLibrary)",
     "positive eigenvalues": "give that body three moments of inertia above 0",
 }
 
@@ -325,7 +326,8 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
     there = {known: i for i, known in enumerate(names) if known}
     if not there:
         raise ScenarioError(
-            f"unknown {kind} of {label} {shown(name)}: none has a name there, so give it one"
+            f"unknown {kind} of {label} {shown(name)}: none has a name there, so give one of its "
+            f"{kind}s a name, or another file if it has none"
         )
     return find(f"{kind} of {label}", name, there)
 

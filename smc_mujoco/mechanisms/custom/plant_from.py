@@ -47,11 +47,13 @@ if TYPE_CHECKING:
 
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
-GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of limits and contacts that give way by more
+GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of constraints that give way by more
+CREEP = 1e-6  # rad/s (m/s), chosen: of dry friction that creeps faster
+STEP = 2.5e-4  # s, of runs with constraints
 # MuJoCo's noslip pass, which keeps stuck joints from creeping: the most iterations, and tolerance
 NOSLIP = 100, 1e-12
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
-WITHOUT_MODEL = "give a law without a model"
+WITHOUT_MODEL = "give model='none' and a law that reads no model"
 # dynamics of an actuator whose state changes even at ctrl = 0
 DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
 
@@ -108,13 +110,13 @@ class UserModel:
             for joint in (*own.joints_of(self.channels), *self.measured):
                 own.add_joint_sensors(spec, joint)
         # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
-        hard = False
-        for part in (*spec.joints, *spec.tendons):
-            if part.frictionloss > 0.0 and np.array_equal(part.solref_friction, SOFT_SOLREF):
-                part.solref_friction = HARD_SOLREF
-                part.solimp_friction = HARD_SOLIMP
-                hard = True
-        if hard and not (spec.option.noslip_iterations or _touches(spec.copy().compile())):
+        dry = [part for part in (*spec.joints, *spec.tendons) if part.frictionloss > 0.0]
+        hard = [part for part in dry if np.array_equal(part.solref_friction, SOFT_SOLREF)]
+        for part in hard:
+            part.solref_friction = HARD_SOLREF
+            part.solimp_friction = HARD_SOLIMP
+        all_hard = 0 < len(hard) == len(dry)
+        if all_hard and not (spec.option.noslip_iterations or _touches(spec.copy().compile())):
             spec.option.noslip_iterations, spec.option.noslip_tolerance = NOSLIP
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
@@ -236,7 +238,7 @@ def plant_from(
     spec = source.read()
     model = source.compiled(spec)
     read = urdf.read(Path(source.path))
-    doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, model, keyframe)]
+    doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, made)]
     _, outside = ((), []) if made.pose else own.goals(model, own.joints_of(pairs), keyframe)
     for joint in outside:
         doubts.append(
@@ -254,18 +256,20 @@ def plant_from(
     return made
 
 
-def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
-    """Return a sentence on joint limits, and one on contacts, that give way to a blow of 1 rad/s
-    (m/s) by more than GIVE.
+def soft(label: str, made: Plant) -> list[str]:
+    """Return a sentence each on joint limits, contacts and equality constraints that give way to a
+    blow of 1 rad/s (m/s) by more than GIVE, and on dry friction that creeps.
 
     A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
     by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
-    impedance d. Here a is that of the weight at the start.
+    impedance d. Here a is that of the weight at the start. Friction that holds F creeps by R F/b,
+    with MuJoCo's regularisation R and damping b.
     """
+    model = made.load()
+    model.opt.timestep = STEP
     data = mujoco.MjData(model)
-    if keyframe is not None:
-        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
-    data.qvel[:] = 0.0
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     sentences = []
 
@@ -285,16 +289,39 @@ def soft(label: str, model: mujoco.MjModel, keyframe: str | None) -> list[str]:
 
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags
+    if off & flags.mjDSBL_CONSTRAINT.value:
+        return []
+    gravity = float(np.linalg.norm(model.opt.gravity))
     limited = np.flatnonzero(model.jnt_limited)
-    if not off & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value):
+    if not off & flags.mjDSBL_LIMIT.value:
         pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
         limits = model.jnt_solref[limited], model.jnt_solimp[limited]
         tell("joint limits", "solreflimit", *limits, pushed)
-    if _touches(model) and not off & flags.mjDSBL_CONSTRAINT.value:
+    if _touches(model):
         touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
-        gravity = float(np.linalg.norm(model.opt.gravity))
         tell(
             "contacts", "solref", model.geom_solref[touching], model.geom_solimp[touching], gravity
+        )
+    if not off & flags.mjDSBL_EQUALITY.value:
+        held = model.eq_active0 > 0
+        tell(
+            "equality constraints", "solref", model.eq_solref[held], model.eq_solimp[held], gravity
+        )
+    kinds = mujoco.mjtConstraint
+    dry = np.isin(data.efc_type, (kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON))
+    dry &= not (made.smooth or model.opt.noslip_iterations)  # which hold it exactly
+    slack = data.efc_R[dry] / data.efc_KBIP[dry, 1]
+    creep = np.max(slack * data.efc_frictionloss[dry], initial=0.0)
+    if creep > CREEP:
+        # what it holds once the soft constraints have given way
+        model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
+        mujoco.mj_forward(model, data)
+        under = np.max(slack * np.abs(data.efc_force[dry]))
+        sentences.append(
+            f"the dry friction of {label} creeps by {under:.2g} rad/s (m/s) under the weight at "
+            f"the start, and by {creep:.2g} where it holds all that it can: leave out the "
+            "solreffriction in the file if there is one; else nothing creeps without contacts "
+            '(<flag contact="disable"/>)'
         )
     return sentences
 
@@ -455,8 +482,10 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
     if not loose:
         return ""
     named = f"joint {loose[0].name!r}" if loose[0].name else "a joint without a name"
-    cure = "make it a channel, or name it in measured if nothing drives it"
-    return f"{named} moves with its channels and is not measured: {cure}, or {WITHOUT_MODEL}"
+    cure = "make it a channel, or name it in measured if nothing drives it, or "
+    if own.is_free(model, joints[0]) or loose[0].type[0] not in own.UNIT_OF_JOINT:
+        cure = ""
+    return f"{named} moves with its channels and is not measured: {cure}{WITHOUT_MODEL}"
 
 
 def restored(data: Mapping, name: str) -> Plant:

@@ -474,3 +474,21 @@ def test_the_objective_of_a_free_body_is_that_of_its_traces(drone):
     assert made.tracking == pytest.approx(tracking)
     assert made.variation == pytest.approx(variation)
     assert made.objective == goal.evaluation(cases[0], traces).objective
+
+
+SLUNG = """<mujoco><worldbody><body name="body"><freejoint/><site name="a" pos=".1 .1 0"/>
+  <geom size=".1" mass=".5" contype="0" conaffinity="0"/>{}</body></worldbody><actuator>
+  <motor site="a" gear="0 0 1 0 0 0"/><motor site="a" gear="0 0 0 1 0 0"/>
+  <motor site="a" gear="0 0 0 0 1 0"/><motor site="a" gear="0 0 0 0 0 1"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("joint", ["ball", "hinge"])
+def test_laws_of_a_body_with_a_load_are_those_that_run_on_it(joint):
+    load = f"""<body pos="0 0 -.3"><joint type="{joint}" pos="0 0 .3"/>
+      <geom size=".02" mass=".05" contype="0" conaffinity="0"/></body>"""
+    plant = smc.plant_from(SLUNG.format(load), ["body"])
+    assert smc.laws(plant) == ["none"]
+    assert len(smc.laws(smc.plant_from(SLUNG.format(""), ["body"]))) > 1
+    with pytest.raises(smc.ScenarioError, match=r"give model='none' and a law that reads no model"):
+        smc.Scenario(plant=plant, law="geometric")
+    assert smc.run(smc.Scenario(plant=plant, law="none", duration=0.01)).failure is None

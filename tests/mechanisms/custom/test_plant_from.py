@@ -668,6 +668,9 @@ DRY = {
 }
 
 
+NO_CONTACT = '<option><flag contact="disable"/></option>'
+
+
 def dry_arm(kind):
     """The text and plant of an arm with dry friction, which needs a force to stay level."""
     joint, carried, more = DRY[kind]
@@ -706,6 +709,52 @@ def test_the_file_s_own_softness_of_dry_friction_stays():
     kept = smc.plant_from(soft, ["a", "b"]).load()
     assert kept.dof_solref[1].tolist() == [0.02, 1.5]
     assert kept.dof_solref[0, 0] < 1e-6
+
+
+@pytest.mark.filterwarnings("always:the dry friction of")
+@pytest.mark.parametrize(
+    ("kind", "solref"),
+    [
+        ("default masks", ".02 1.5"),
+        ("default masks", "-100 -50"),
+        ("default masks", ""),
+        ("arm", ".02 1.5"),
+        ("tendon", ".05 1"),
+        ("hinge", "-100 -50"),
+    ],
+)
+def test_dry_friction_that_creeps_is_told_with_its_speed_and_each_cure_holds(kind, solref):
+    hard, plant = dry_arm(kind)
+    joints = ["a", "b"][: plant.n]
+    hard = hard.replace("<worldbody>", '<worldbody><geom type="plane" size="9 9 1" pos="0 0 -9"/>')
+    text = hard
+    if solref:
+        text = re.sub(r'(frictionloss="[39]")', rf'\1 solreffriction="{solref}"', hard)
+    with pytest.warns(smc.errors.ScenarioWarning, match="leave out the solreffriction") as caught:
+        plant = smc.plant_from(text, joints)
+    sentence = next(str(w.message) for w in caught if "creeps" in str(w.message))
+    told, bound = (float(text) for text in re.findall(r"by ([0-9.e-]+)", sentence))
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3))
+    assert told == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)
+    assert told < bound
+    cured = hard if solref else text.replace("<worldbody>", f"{NO_CONTACT}<worldbody>")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error" if not solref else "ignore")
+        held = smc.run(smc.Scenario(plant=smc.plant_from(cured, joints), law="none"))
+    assert np.abs(held.v[-1]).max() < (2e-5 if solref else 1e-9)
+
+
+@pytest.mark.filterwarnings("always:the equality constraints of")
+@pytest.mark.parametrize("solref", [".02 1", ".04 .5", "-900 -60"])
+def test_a_warning_says_how_far_an_equality_gives_way(solref):
+    text = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="j" type="slide"
+      axis="1 0 0"/>{LINK.format(0.3, 0.5)}</body></worldbody>
+      <equality><joint joint1="j" solref="{solref}"/></equality></mujoco>"""
+    with pytest.warns(smc.errors.ScenarioWarning, match="equality constraints") as caught:
+        plant = smc.plant_from(text, {"j": {"motor": True}})
+    (told,) = map(float, re.findall(r"by ([0-9.]+) mrad", str(caught[0].message)))
+    trace = smc.run(smc.Scenario(plant=plant, law="none", v0=1.0, duration=0.5))
+    assert 1e-3 * told == pytest.approx(trace.x.max(), rel=0.15)
 
 
 @pytest.mark.filterwarnings("default:the joint limits of")
