@@ -13,6 +13,7 @@ from smc_mujoco.simulation.signals import (
     Push,
     Ramp,
     Relay,
+    Sum,
     Wind,
 )
 from smc_mujoco.simulation.time_series import Held, TimeSeries, Waypoints, cartesian_path
@@ -29,6 +30,7 @@ __all__ = [
     "Push",
     "Ramp",
     "Relay",
+    "Sum",
     "TimeSeries",
     "Waypoints",
     "Wind",

@@ -79,7 +79,7 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
 
 def arrived(trace: Trace) -> bool:
     """Return whether a run has arrived, see `conventions`; False if it diverged or failed."""
-    if trace.failure is not None or trace.diverged_at is not None:
+    if trace.failure is not None or trace.diverged_at is not None or conventions.leans(trace):
         return False
     for group, part in conventions.by_group(trace).items():
         off = error(part)
@@ -131,6 +131,8 @@ def settling_time(trace: Trace) -> float:
     """
     if travels(trace):
         return np.nan
+    if conventions.leans(trace):
+        return np.inf
     return last_exit(
         trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace)
     )

@@ -22,6 +22,8 @@ project:
 - scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over
   them if that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
 - settling band: |e| <= 2 % of the scale.
+- leaning: a joint of a user's model whose u stays at one bound for half of the last part, or whose
+  base falls, has neither settled nor arrived.
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which
   a signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is
   outside.
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
 
 SETTLING_BAND = 0.02  # of the scale
 LAST_PART = 0.2  # of the run's duration
+LEANS = 0.5  # of the last part, chosen: an honest law has left its bound by then
 ARRIVAL_BAND = 0.1  # of the scale
 ARRIVAL_COUNTS = 5.0  # of what the sensor tells apart
 STRAIGHT = 1e-6  # of the steps of a reference: by less they differ on a straight line
@@ -315,6 +318,23 @@ def at_rest(trace: Trace) -> np.ndarray:
     conventions.
     """
     return np.abs(trace.v) <= max(REST_SHARE * float(np.abs(trace.v).max()), REST_SPEED)
+
+
+def leans(trace: Trace) -> bool:
+    """Return whether a joint of a user's model leans on something, or cannot be judged: u stays at
+    one of its bounds for more than LEANS of the last part, or the base falls.
+    """
+    plant = trace.scenario.plant
+    if not plant.is_user_model or plant.pose:
+        return False
+    from smc_mujoco.mechanisms.custom.scales import falls
+
+    limits = np.array(trace.scenario.limits)
+    u = trace.u[last_part(trace)]
+    if len(limits) != u.shape[1]:  # a group of some channels
+        limits = limits.max()
+    ends = np.sign(u) * (np.abs(u) >= limits)
+    return bool(np.any(np.abs(ends.mean(axis=0)) > LEANS)) or bool(falls(plant))
 
 
 def last_part(trace: Trace) -> slice:

@@ -248,8 +248,14 @@ def reference(name: str, value: Signal | ByChannel[Signal] | None, s: Any) -> Si
 def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     """Return the reference of a plant's driven channels.
 
-    A list of one signal counts as the signal.
+    A list of one signal counts as the signal. Joints that a mapping leaves out hold their goal.
     """
+    at_goal = [Constant(x) for x in plant.rest] or [REST] * plant.n
+    if isinstance(value, Mapping):
+        joints = joint_names(plant)[: plant.driven]
+        value = dict(zip(joints, at_goal, strict=False)) | dict(value)
+    elif getattr(value, "about", ""):
+        value = [value] * plant.driven
     if isinstance(value, PerChannel):
         value = value.signals
     if isinstance(value, list | tuple) and len(value) == 1:
@@ -268,6 +274,9 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
             if callable(item):
                 cure = "give its samples, smc.signals.TimeSeries(times, values)"
             raise ScenarioError(f"reference is {shown(item)}: {cure}")
+    for i, item in enumerate(items):
+        if getattr(item, "about", ""):
+            items[i] = at_goal[i] + dataclasses.replace(item, about="")
     if not others and all(item == items[0] for item in items):
         return items[0]
     return PerChannel(tuple(items))

@@ -264,7 +264,7 @@ def from_file(path: Path) -> list[Condition]:
     return conditions
 
 
-def _parsed(node: ast.expr) -> Any:
+def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
     """Return the value of a literal, or of a call that makes a part, a signal or an estimator."""
     match node:
         case ast.Constant(value=value):
@@ -281,6 +281,10 @@ def _parsed(node: ast.expr) -> Any:
                 for key, value in zip(keys, values, strict=True)
                 if key is not None
             }
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            first, second = _parsed(left), _parsed(right)
+            if isinstance(first, Signal) and isinstance(second, Signal):
+                return first + second
         case ast.Call():
             return _call(node)
     raise ScenarioError(
@@ -337,6 +341,8 @@ def _as_text(value: Any, defaults: bool = True) -> str:
         texts = []
         for name, content in stated(value, defaults).items():
             texts.append(f"{name}={_as_text(content, defaults)}")
+        if getattr(value, "about", ""):
+            texts.append("about='goal'")
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
         return f"({', '.join(_as_text(one, defaults) for one in value)},)"

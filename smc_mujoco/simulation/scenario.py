@@ -49,7 +49,7 @@ from smc_mujoco.mechanisms.hardware.part import (
 from smc_mujoco.mechanisms.hardware.rotors import flies
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
-from smc_mujoco.mechanisms.plant import Plant, check_ranges
+from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.philox import PROCESS
@@ -64,6 +64,7 @@ from smc_mujoco.simulation.signals import (
     PerChannel,
     Push,
     Signal,
+    extremes,
 )
 
 MAX_TIME = 1e9  # s, of runs
@@ -141,8 +142,8 @@ class Scenario:
         If u is a voltage, the bound is in V; its default is the motor's.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the
         plant's x0; v0 = 0.
-      reference: r(t), the same for every channel, or one for each driven channel. Default: the
-        plant's `rest`, or 0.
+      reference: r(t), the same for every channel, or one for each driven channel; joints that a
+        mapping leaves out hold their default. Default: the plant's `rest`, or 0.
       feedforward: a known signal that is added to the law's u before its bound, the same for every
         driven channel: an excitation, or the command of a recorded experiment (with the law
         "none"). None: nothing is added.
@@ -266,6 +267,7 @@ class Scenario:
         self._convert()
         check(self.resolved)
         check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
+        check_reference_ranges(self.resolved)
         check_inertia(self.resolved)
         check_obstacles(self.resolved)
         check_names(self.resolved)
@@ -731,6 +733,9 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(
                 f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it"
             )
+    for signal in (*s.disturbance, s.feedforward):
+        if getattr(signal, "about", ""):
+            raise ScenarioError(f"{shown(signal)} is about the goal: only a reference may be")
     if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.feedforward)):
         raise ScenarioError(
             "only a reference may have a signal for each channel: give one signal for all"
@@ -753,6 +758,17 @@ def check_signals(s: Resolved) -> None:
         check_function_of_time("reference", signal, "a smooth signal")
     if s.feedforward:
         check_function_of_time("feedforward", s.feedforward, "a known signal of u")
+
+
+def check_reference_ranges(s: Resolved) -> None:
+    """Check that each reference stays within its joint's range."""
+    for (joint, low, high), signal in zip(s.plant.ranges, s.references, strict=False):
+        least, most = extremes(signal, s.duration)
+        if not low - MAX_EXCESS <= least <= most <= high + MAX_EXCESS:
+            raise ScenarioError(
+                f"the reference of joint {joint!r} of {s.plant.name} goes from {least:.4g} to "
+                f"{most:.4g}, beyond its range from {low:g} to {high:g}: give another reference"
+            )
 
 
 def check_function_of_time(name: str, signal: Signal, cure: str) -> None:

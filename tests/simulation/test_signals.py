@@ -43,6 +43,7 @@ pytestmark = pytest.mark.quick
 FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 4)
 NOISE = BandLimited(0.3, 5.0, 15.0)
 UNEVEN = TimeSeries([0.1, 0.2, 0.25, 0.7, 1.3], [1.0, -2.0, 0.5, 0.0, 3.0])
+MOVE = MinimumJerk(1.0, 0.2, 0.5)
 EVERY = [
     Constant(1.5),
     Sine(0.7, 11.0, 0.3),
@@ -53,8 +54,9 @@ EVERY = [
     OrnsteinUhlenbeck(0.5, 0.1),
     NOISE,
     UNEVEN,
+    Constant(-1.5) + Sine(0.7, 11.0, 0.3) + Step(1.5, 0.3) + Ramp(2.0, 0.3) + MOVE,
     Ramp(2.0, 0.3),
-    MinimumJerk(1.0, 0.2, 0.5),
+    MOVE,
     Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)),
     Held((0.1, 0.2, 0.7), (1.0, -2.0, 0.5)),
     Relay(

@@ -67,6 +67,8 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.metrics.catalogue import arrived
+from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.codes import code_hashes
 from smc_mujoco.simulation.conditions import Condition
@@ -579,10 +581,31 @@ def _warn_of_result(tuned: Tuned) -> None:
             f"{tuned.objective:.3g} s² instead of {tuned.before:.3g} s²: give a larger budget"
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
+    if tuned.plant.is_user_model:
+        _warn_of_machine(run(first))
     if tuned.definition.excess(first):
         _warn(
             f"all gains {tried} are predicted to chatter with more than "
             f"{tuned.definition.chattering:g}: give a larger budget, or a larger chattering"
+        )
+
+
+def _warn_of_machine(trace: Trace) -> None:
+    """Warn of a run of a user's model that falls, leans on something, or does not arrive."""
+    from smc_mujoco.mechanisms.custom.scales import falls
+
+    who = f"{trace.scenario.law.name} on {trace.scenario.plant.name}"
+    if why := falls(trace.scenario.plant):
+        _warn(why)
+    elif leans(trace):
+        _warn(
+            f"{who} stays at the bound of u with its best gains: it leans on something, or needs "
+            "more force; give another goal or start, or a larger u_max if the motor gives more"
+        )
+    elif not arrived(trace):
+        _warn(
+            f"{who} does not arrive within {trace.scenario.duration:g} s with its best gains: give "
+            "a larger budget, or a longer duration"
         )
 
 

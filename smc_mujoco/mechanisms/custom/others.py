@@ -12,12 +12,14 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
+DEPTH = 5e-3  # m, chosen: soft feet stand less deep
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE
 
 
@@ -58,6 +60,35 @@ def at_start(
     return model, data
 
 
+def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
+    """Raise ScenarioError if what the channels move starts or should end inside something."""
+    model, data = at_start(source, channels, keyframe)
+    joints = own.joints_of(channels)
+    moved = np.zeros(model.nbody, bool)
+    moved[[model.joint(joint).bodyid[0] for joint in joints]] = True
+    for i in range(1, model.nbody):
+        moved[i] |= moved[model.body_parentid[i]]
+    at = mujoco.MjData(model)
+    at.qpos[:] = data.qpos
+    for what in ("start", "goal"):
+        mujoco.mj_fwdPosition(model, at)
+        for contact in at.contact:
+            bodies = model.geom_bodyid[contact.geom]
+            if contact.dist < -DEPTH and moved[bodies[0]] != moved[bodies[1]]:
+                first, second = (
+                    model.geom(i).name or model.body(model.geom_bodyid[i]).name
+                    for i in contact.geom.tolist()
+                )
+                raise ScenarioError(
+                    f"the {what} of {source.label} has {first!r} {-1e3 * contact.dist:.0f} mm "
+                    f"inside {second!r}: give another x0 or keyframe"
+                )
+        if model.joint(joints[0]).type[0] == own.FREE:
+            return
+        for joint, x in zip(joints, own.goals(model, joints, keyframe)[0], strict=True):
+            at.qpos[model.joint(joint).qposadr[0]] = x
+
+
 def edit(
     spec: mujoco.MjSpec,
     source: Source,
@@ -94,7 +125,7 @@ def _hold(
     mujoco.mj_fullM(model, data, inertia)
     for name in joints:
         joint = model.joint(name)
-        if joint.type[0] not in own.UNIT_OF_JOINT:
+        if mujoco.mjtJoint(joint.type[0]) not in own.UNIT_OF_JOINT:
             continue
         dof = joint.dofadr[0]
         kp = inertia[dof, dof] * HELD**2

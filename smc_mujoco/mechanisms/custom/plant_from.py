@@ -237,6 +237,8 @@ def plant_from(
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.read()
     model = source.compiled(spec)
+    if _touches(model):
+        rest_of.check_clear(source, pairs, keyframe)
     read = urdf.read(Path(source.path))
     doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, made)]
     _, outside = ((), []) if made.pose else own.goals(model, own.joints_of(pairs), keyframe)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from smc_mujoco.mechanisms.custom.channels import ONE_JOINT
 from smc_mujoco.mechanisms.hardware.part import dof_ids, driven_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant
 
@@ -73,15 +74,22 @@ def at_goal(plant: Plant) -> AtGoal:
             D[:, j] -= sign * _forces(model, data) / STEP
             data.qvel[:] = 0.0
     strayed = 0.0
-    bases = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    bases = bases[np.isin(model.body_rootid[model.jnt_bodyid[bases]], _roots(model))]
-    if len(bases):
-        load, strayed = _held(model, data, int(model.jnt_bodyid[bases[0]]), load, M[dofs, dofs])
+    if base := _free_base(model):
+        load, strayed = _held(model, data, base, load, M[dofs, dofs])
     return AtGoal(M, D, K, dofs, load, model.dof_frictionloss[dofs], strayed)
 
 
-def _roots(model: mujoco.MjModel) -> np.ndarray:
-    return model.body_rootid[model.jnt_bodyid[driven_ids(model)]]
+def _free_base(model: mujoco.MjModel) -> int:
+    """Return the body that carries the first channel and moves in two ways or more, none of them
+    driven; 0 if there is none.
+    """
+    base = int(model.body_rootid[model.jnt_bodyid[driven_ids(model)[0]]])
+    first = model.body_jntadr[base]
+    joints = np.arange(first, first + model.body_jntnum[base])
+    on_joints = np.isin(model.actuator_trntype, ONE_JOINT)
+    if np.isin(joints, model.actuator_trnid[on_joints, 0]).any() or model.body_dofnum[base] < 2:
+        return 0
+    return base
 
 
 def _held(

@@ -1,0 +1,278 @@
+"""Joints without a channel, the scales of joints with one, goals and starts, on three machines."""
+
+import dataclasses
+import re
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioWarning
+from smc_mujoco.mechanisms.custom import others, scales
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.metrics.catalogue import arrived
+from smc_mujoco.metrics.conventions import leans
+from smc_mujoco.simulation import serialise
+
+# servos and motors, a frame, two joints on one body, a spring, a range away from 0
+ARM = """<mujoco model="arm"><compiler angle="radian"/>
+<default><geom type="capsule" size=".03"/><general ctrllimited="true" ctrlrange="-1 1"/></default>
+<worldbody><frame pos="0 0 1" euler=".3 0 .2"><body name="base" euler="0 .2 0">
+ <joint name="a" axis="0 0 1"/><geom fromto="0 0 0 .1 0 -.3"/><frame pos="0 .02 0">
+ <body name="upper" pos=".1 0 -.3" euler=".1 0 0"><joint name="b" axis="0 1 0" damping=".2"/>
+  <joint name="roll" axis="1 0 0" stiffness="2"/><geom fromto="0 0 0 0 .1 -.3"/>
+  <body name="lower" pos="0 .1 -.3"><joint name="c" axis="1 0 0" range="-2.4 -.5"/>
+   <geom fromto="0 0 0 0 0 -.25"/></body></body></frame></body></frame></worldbody>
+<actuator><position joint="a" kp="300" kv="20" ctrlrange="-4 4"/><motor joint="b" gear="40"/>
+ <motor joint="c" gear="20"/><motor joint="roll" gear="9"/></actuator>
+<keyframe><key name="home" qpos=".8 -.6 .2 -1.1" ctrl=".8 0 0 0"/></keyframe></mujoco>"""
+# a gripper: a tendon with a servo, an equality, a channel that slides
+HAND = """<mujoco model="hand"><option timestep=".001"/><worldbody>
+<body name="wrist" pos="0 0 .5"><joint name="lift" type="slide" axis="0 0 1"/>
+ <geom size=".05" mass=".8"/>
+ <body name="left" pos=".1 0 0"><joint name="l" type="slide" axis="1 0 0" range="-.04 .04"/>
+  <geom size=".02" mass=".1"/></body>
+ <body name="right" pos="-.1 0 0"><joint name="r" type="slide" axis="-1 0 0" range="-.04 .04"/>
+  <geom size=".02" mass=".1"/></body></body></worldbody>
+<tendon><fixed name="both"><joint joint="l" coef=".5"/><joint joint="r" coef=".5"/></fixed></tendon>
+<equality><joint joint1="l" joint2="r"/></equality>
+<actuator><position tendon="both" kp="50" kv="3"/><motor joint="lift"/></actuator>
+<keyframe><key name="home" qpos=".1 .01 .01"/></keyframe></mujoco>"""
+# it stands on wide feet with its knees bent, and falls if nothing holds them
+WALKER = """<mujoco model="walker"><option timestep=".002"/><worldbody><geom type="plane" size="9 9 1"/>
+<body name="torso" pos="0 0 .6"><freejoint name="free"/><geom type="box" size=".15 .2 .05" mass="5"/>
+ {legs}</body></worldbody><actuator>{motors}</actuator>
+<keyframe><key name="home" qpos="0 0 {high} 1 0 0 0 {bent}"/></keyframe></mujoco>"""
+LEG = """<body name="thigh{i}" pos="0 {y} 0"><joint name="hip{i}" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".04" mass="1"/><body name="shin{i}" pos="0 0 -.3">
+<joint name="knee{i}" axis="0 1 0" armature=".05"/><geom type="capsule" fromto="0 0 0 0 0 -.25"
+ size=".03" mass=".5"/><geom type="box" pos="0 0 -.28" size=".2 .07 .02" mass=".5"/></body></body>"""
+LEGS = "".join(LEG.format(i=i, y=0.2 - 0.4 * i) for i in range(2))
+MOTORS = "".join(f'<motor joint="hip{i}"/><motor joint="knee{i}"/>' for i in range(2))
+MACHINES = {
+    "arm": (ARM, "b"),
+    "hand": (HAND, "lift"),
+    "walker": (WALKER.format(legs=LEGS, motors=MOTORS, high=0.601, bent="0 0 0 0"), "knee0"),
+}
+PID = smc.law("pid", kp=9.0, ki=1.0, kd=2.0)
+FAST = {"duration": 2.0, "conditions": ("nominal",)}
+
+
+def plant(name, mode, key="home", **channel):
+    text, joint = MACHINES[name]
+    fields = {"motor": True} | channel
+    return smc.plant_from(text, {joint: smc.Channel(**fields)}, keyframe=key, others=mode)
+
+
+def posed(name, x):
+    """The file's own model at its keyframe, with its channel at x."""
+    text, joint = MACHINES[name]
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.qpos[model.joint(joint).qposadr[0]] = x
+    mujoco.mj_forward(model, data)
+    return model, data, model.joint(joint).dofadr[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_locked_joint_leaves_every_pose_and_the_channel_s_load(name, seed):
+    x = np.random.default_rng(seed).uniform(-1.0, 1.0)
+    model, data, dof = posed(name, x)
+    locked = plant(name, "locked").load()
+    assert locked.nv == locked.nu == 1
+    at = mujoco.MjData(locked)
+    at.qpos[:] = x
+    mujoco.mj_forward(locked, at)
+    np.testing.assert_allclose(at.xpos, data.xpos, atol=1e-12)
+    np.testing.assert_allclose(at.xmat, data.xmat, atol=1e-12)
+    wanted = data.qfrc_bias[dof] - data.qfrc_passive[dof]
+    assert at.qfrc_bias[0] - at.qfrc_passive[0] == pytest.approx(wanted, abs=1e-10)
+    # links that never met do not meet now
+    pairs = {tuple(model.geom_bodyid[contact.geom]) for contact in data.contact}
+    assert {tuple(locked.geom_bodyid[contact.geom]) for contact in at.contact} <= pairs
+    assert plant(name, "locked").unmodelled == ""
+
+
+def moved(made):
+    """How far each other joint goes while a PD of the test's own moves the channel to its goal, and
+    the channel's error at the end.
+    """
+    model = made.load()
+    model.opt.timestep = 2.5e-4
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
+    first = data.qpos.copy()
+    joint = model.joint(model.actuator_trnid[-1, 0])
+    at, dof = joint.qposadr[0], joint.dofadr[0]
+    (goal,), (data.qpos[at],) = made.origin, scales.beside_goal(made)
+    far = np.zeros(model.nq)
+    load = scales.at_goal(made).load[0]
+    for _ in range(4000):
+        data.ctrl[-1] = load + model.dof_M0[dof] * (
+            400.0 * (goal - data.qpos[at]) - 40.0 * data.qvel[dof]
+        )
+        mujoco.mj_step(model, data)
+        far = np.maximum(far, np.abs(data.qpos - first))
+    names = [model.joint(i).name for i in range(model.njnt)]
+    return {n: far[i] for i, n in enumerate(names) if n != joint.name}, data.qpos[at] - goal
+
+
+@pytest.mark.parametrize("mode", [None, *others.OTHERS])
+@pytest.mark.parametrize("name", ["arm", "hand"])
+def test_servos_hold_the_start_and_held_motors_too(name, mode):
+    far, error = moved(plant(name, mode))
+    limp = {"c", "roll"} if mode in (None, "file") else set()
+    assert max([0.0, *(far[joint] for joint in set(far) - limp)]) < 0.1
+    assert not limp or name == "hand" or far["c"] > 0.3
+    assert mode == "locked" or far
+    assert mode not in ("held", "locked") or abs(error) < 0.05
+
+
+@pytest.mark.parametrize("mode", others.OTHERS)
+@pytest.mark.parametrize("name", MACHINES)
+def test_text_and_record_make_the_same_plant_again(name, mode, tmp_path, monkeypatch):
+    text, joint = MACHINES[name]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.xml").write_text(text)
+    made = as_plant(f"m.xml:{joint}(motor)@home+{mode}")
+    assert made.argument == f"m.xml:{joint}(motor)@home+{mode}"
+    assert as_plant(made.argument).spec().to_xml() == made.spec().to_xml()
+    again = serialise.restore(serialise.describe(smc.Scenario(plant=made, law="pid"))).plant
+    assert again.spec().to_xml() == made.spec().to_xml()
+    assert again.rest == made.rest
+    assert again.argument == made.argument
+
+
+def test_motors_that_nothing_commands_are_told_with_a_cure_that_works():
+    with pytest.warns(ScenarioWarning, match="nothing commands, 'c' and 'roll'") as told:
+        plant("arm", None)
+    text = next(str(one.message) for one in told if "nothing commands" in str(one.message))
+    for word in re.findall(r"'(held|locked|file)'", text):
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", ".*nothing commands")
+            plant("arm", word)
+
+
+def two_links(stiffness):
+    text = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name="a" axis="0 1 0"
+     stiffness="{stiffness}" springref="0"/><geom size=".05" pos=".4 0 0" mass="2"/>
+     <body pos=".4 0 0"><joint name="b" axis="0 1 0" damping=".3" frictionloss=".2"/>
+     <geom size=".05" pos=".3 0 0" mass="1"/></body></body></worldbody>
+     <actuator><motor joint="b"/></actuator></mujoco>"""
+    return smc.plant_from(text, ["b"])
+
+
+def test_scales_are_those_of_two_links_by_hand():
+    made = two_links(0.0)
+    at = scales.at_goal(made)
+    ball = 0.4 * 0.05**2  # of each, over its mass
+    b = 0.3**2 + ball
+    M = np.array([[2 * 0.16 + 2 * ball + 0.7**2 + ball, 0.7 * 0.3 + ball], [0.7 * 0.3 + ball, b]])
+    np.testing.assert_allclose(at.M, M, rtol=1e-9)
+    assert at.load == pytest.approx(-9.81 * 0.3, rel=1e-9)
+    assert at.D[1, 1] == pytest.approx(0.3, rel=1e-6)
+    need = 2 * 9.81 * 0.3 + (60 * b + 8 * 0.3) * 0.3 + 1.5 * 0.2
+    assert scales.needs(made) == (pytest.approx(need, rel=0.05),)
+    assert smc.Scenario(plant=made, law="pid").limits == scales.needs(made)
+    # a limp joint answers freely, a stiff one as if it were locked
+    assert scales.mobility(made, 1.0, 0.3)[0] == pytest.approx(np.linalg.inv(M)[1, 1], rel=1e-2)
+    assert scales.mobility(two_links(1e6), 1.0, 0.3)[0] == pytest.approx(1.0 / b, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("key", "limits", "goal", "told"),
+    [
+        (None, "-1 1", 0.0, False),
+        (None, "-2.7 -.8", -1.75, True),
+        ("home", "-2.7 -.8", -1.1, False),
+    ],
+)
+def test_the_goal_is_in_the_range_and_runs_start_beside_it(key, limits, goal, told):
+    text = ARM.replace('range="-2.4 -.5"', f'range="{limits}"')
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made = smc.plant_from(text, ["c"], keyframe=key, others="locked")
+    assert any("outside its range" in str(w.message) for w in caught) == told
+    assert made.origin == made.x0 == (goal,)
+    assert np.all(smc.run(smc.Scenario(plant=made, law="pid", duration=0.01)).r == goal)
+    low, high = map(float, limits.split())
+    room = max(high - goal, goal - low)
+    for run in smc.grid(made, PID, seeds=4):
+        (x,) = run.resolved.x0
+        assert abs(x - goal) == pytest.approx(min(0.3, 0.6 * room), rel=0.201)
+        assert low < x < high
+    given = smc.grid(made, PID, starts=smc.starts(x0=goal + 0.01), seeds=3)[2].resolved.x0[0]
+    assert 0.008 <= given - goal <= 0.012
+    for beyond in (smc.Constant(high + 0.1), smc.Sine(high - low, 9.0, about="goal")):
+        with pytest.raises(smc.ScenarioError, match=f"'c' of arm .* {re.escape(f'{low:g}')}"):
+            smc.Scenario(plant=made, law="pid", reference=beyond)
+
+
+def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
+    made = smc.plant_from(ARM, {"b": {}, "c": {}}, keyframe="home", others="locked")
+    sine = smc.Sine(0.1, 3.0, about="goal")
+    runs = []
+    for reference in ({"c": sine}, {"c": smc.Constant(-1.1) + smc.Sine(0.1, 3.0)}):
+        runs.append(smc.Scenario(plant=made, law="pid", reference=reference, duration=0.5))
+    assert runs[0] == runs[1] == serialise.restore(serialise.describe(runs[0]))
+    trace = smc.run(runs[0])
+    wanted = np.stack([0 * trace.t - 0.6, -1.1 + 0.1 * np.sin(3.0 * trace.t)], axis=1)
+    np.testing.assert_allclose(trace.r, wanted, atol=1e-12)
+    with pytest.raises(smc.ScenarioError, match="only a reference"):
+        dataclasses.replace(runs[0], disturbance=sine)
+
+
+@pytest.mark.parametrize("what", ["start", "goal"])
+def test_a_pose_inside_something_is_refused_with_the_names(what):
+    wall = '<worldbody><geom name="wall" type="box" size=".1 .1 .1" pos=".25 0 .1"/>'
+    text = f"""<mujoco>{wall}<body><joint name="j" axis="0 1 0"/>
+      <geom name="link" type="capsule" fromto="0 0 .1 .3 0 .1" size=".03"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>"""
+    x0 = {"start": None, "goal": 2.0}[what]
+    with pytest.raises(smc.ScenarioError, match=f"the {what} of .*'wall'.*'link'|'link'.*'wall'"):
+        smc.plant_from(text, {"j": smc.Channel(x0=x0)})
+
+
+@pytest.mark.parametrize("mode", [pytest.param("held", marks=pytest.mark.slow), "locked"])
+@pytest.mark.parametrize("name", ["arm", pytest.param("hand", marks=pytest.mark.slow)])
+def test_a_joint_is_tuned_and_settles(name, mode):
+    made = plant(name, mode)
+    goal = dataclasses.replace(smc_objective(), **FAST)
+    tuned = smc.tune(made, "pid", budget=8, searches=1, objective=goal, threads=1)
+    assert tuned.scales["X"] == pytest.approx(0.3)
+    trace = smc.run(smc.grid(made, tuned.law, duration=3.0)[0])
+    assert np.abs(trace.e[-500:]).max() < 0.05
+    assert arrived(trace)
+    assert not leans(trace)
+
+
+def smc_objective():
+    from smc_mujoco.analysis.tuning.objective import Objective
+
+    return Objective()
+
+
+def test_a_joint_that_leans_on_its_stop_never_settles():
+    stop = smc.plant_from(ARM, {"c": {}}, keyframe="home", others="locked")
+    weak = smc.Scenario(plant=stop, law=smc.law("pid", kp=1e3, ki=0.0, kd=1.0), duration=1.0)
+    for u_max, leaning in ((20.0, False), (0.05, True)):
+        trace = smc.run(dataclasses.replace(weak, u_max=u_max))
+        assert leans(trace) == leaning
+        assert np.isinf(smc.score(trace)["settling_time"]) >= leaning
+
+
+def test_a_robot_that_falls_is_told_so_and_never_settles():
+    standing = plant("walker", "held")
+    assert scales.falls(standing) == ""
+    text = WALKER.format(legs=LEGS, motors=MOTORS, high=0.68, bent=".4 0 .4 0")
+    limp = smc.plant_from(text, ["knee0"], keyframe="home", others="file")
+    assert "locked" in scales.falls(limp)
+    trace = smc.run(smc.Scenario(plant=limp, law="pid", duration=0.1))
+    assert np.isinf(smc.score(trace)["settling_time"])
+    assert not arrived(trace)
+    assert scales.falls(plant("walker", "locked")) == ""
