@@ -255,7 +255,7 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
         joints = joint_names(plant)[: plant.driven]
         value = dict(zip(joints, at_goal, strict=False)) | dict(value)
     elif getattr(value, "about", ""):
-        value = [value] * plant.driven
+        value = [value] * plant.driven  # pyright: ignore[reportAssignmentType] a Sine
     if isinstance(value, PerChannel):
         value = value.signals
     if isinstance(value, list | tuple) and len(value) == 1:

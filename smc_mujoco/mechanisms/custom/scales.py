@@ -99,6 +99,7 @@ def _held(
     sizes.
     """
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model.opt.timestep = min(model.opt.timestep, 0.1 / STIFF)
     joints = driven_ids(model)
     places = model.jnt_qposadr[joints]
     dofs = model.jnt_dofadr[joints]
@@ -116,12 +117,15 @@ def _held(
             total += np.abs(push)
     geoms = np.flatnonzero(model.geom_bodyid == base)
     size = model.geom_rbound[geoms].max(initial=0.0) or model.stat.extent
-    return total / (steps - steps // 2), float(np.linalg.norm(data.xpos[base] - first) / size)
+    held = total / (steps - steps // 2)
+    if np.isfinite(held).all():
+        load = held
+    return load, float(np.linalg.norm(data.xpos[base] - first) / size)
 
 
 def falls(plant: Plant) -> str:
     """Return a sentence if the base of a user's plant falls while its joints are held, or ""."""
-    if plant.pose or not plant.is_user_model or not at_goal(plant).strayed > 1.0:
+    if plant.pose or not plant.is_user_model or at_goal(plant).strayed <= 1.0:
         return ""
     return (
         f"the base of {plant.name} falls or drives off while its joints are held, by more than its "
