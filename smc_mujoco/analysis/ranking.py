@@ -332,7 +332,8 @@ class Comparison:
         at = block, self.laws.index(law), self.laws.index(rival)
         if self.below[list(at[1:]), block].any():
             return math.nan
-        lead = least_visible_lead(self.leads[at], self.limits.first, self.relevant)
+        error = self.limits.winner if self.winners[block] else self.limits.first
+        lead = least_visible_lead(self.leads[at], error, self.relevant)
         charged = _difference(self.plain[at], self.leads[at])
         known = charged[~np.isnan(charged)]
         if known.size:

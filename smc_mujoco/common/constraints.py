@@ -226,10 +226,12 @@ def suggesting(kind: type[T]) -> type[T]:
 
 
 def constrained(function: Callable[P, T]) -> Callable[P, T]:
-    """Check the arguments of each call whose parameters declare a constraint, before the function
-    runs.
+    """Check the arguments of each call whose parameters declare a constraint or are flags, before
+    the function runs.
     """
-    constraints = of_parameters(function)
+    kinds = function.__annotations__.items()
+    flags = {name: Flag() for name, kind in kinds if kind is bool}
+    constraints = flags | of_parameters(function)
     signature = inspect.signature(function)
 
     @functools.wraps(function)

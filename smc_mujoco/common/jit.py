@@ -187,7 +187,8 @@ def attempting(count: int, estimates: bool = False) -> Callable:
         returned = resolved.return_type
         items = list(returned.types if isinstance(returned, types.BaseTuple) else [returned])  # pyright: ignore[reportAttributeAccessIssue] tuples of numba have it
         if not all(isinstance(item, types.Integer | types.Float | types.Boolean) for item in items):
-            raise TypingError(f"it returns {returned} instead of numbers")
+            kind = str(returned).replace("none", "None")
+            raise TypingError(f"it returns {kind} instead of numbers")
         if len(items) != count and not (estimates and len(items) == 1):
             raise TypingError(f"it returns {len(items)} numbers instead of {count}")
 

@@ -517,7 +517,7 @@ def template_decorator(
             )
     if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
         raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
-    if options.get("finite_time", "") not in FINITE_TIME:
+    if str(options.get("finite_time", "")) not in FINITE_TIME:
         raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
     for name in positive:
         gain = find("gain that is positive", name, checked)

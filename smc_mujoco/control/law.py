@@ -159,8 +159,8 @@ def law_function(
     keeps the values that its globals and closure had at compilation, and its random numbers would
     come from a shared generator. Each new function object is compiled once and occupies about 2.5
     MB until the process ends, because numba never frees code. So change the value of a gain instead
-    of defining a function per value. Ctrl-C does not stop a compiled law with an endless loop; kill
-    the process. Endless recursion in a compiled law crashes the process.
+    of defining a function per value. A compiled law that never returns keeps a core busy until
+    Python ends, also after Ctrl-C. Endless recursion in a compiled law crashes the process.
 
     Returns:
       A decorator. The decorated function, called with gains as in `my_law(lam=5.0)`, returns the

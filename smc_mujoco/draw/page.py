@@ -22,7 +22,8 @@ from matplotlib.patches import Patch
 from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.constraints import OneOf
+from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import replacing
 from smc_mujoco.control.source import NONE, Source, kinds
 from smc_mujoco.draw import style
@@ -99,9 +100,7 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
     if size is None:
         return style.FULL_WIDTH, None
     if isinstance(size, str):
-        if size not in NAMED:
-            raise unknown("size", size, NAMED)
-        return NAMED[size]
+        return find("size", size, NAMED)
     try:
         width, height = map(float, size)
     except (TypeError, ValueError):
@@ -253,8 +252,8 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
         raise ScenarioError(
             f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg"
         )
-    if format is not None and format not in FORMATS:
-        raise unknown("format", format, FORMATS)
+    if format is not None:
+        OneOf(names=FORMATS)("format", format)
     ending = base.suffix[1:]
     if ending in FORMATS:
         base = base.with_suffix("")

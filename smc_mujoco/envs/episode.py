@@ -78,9 +78,9 @@ class Setting:
             raise ScenarioError(
                 f"{plant.name} is no free body: make its environment by gymnasium.make"
             )
-        if task not in known:
+        if not isinstance(task, str) or task not in known:
             raise ScenarioError(
-                f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}"
+                f"task {shown(task)} is not for {plant.name}: choose from {', '.join(known)}"
             )
         changes = _checked({} if changes is None else changes, task)
         # the run that equals an episode

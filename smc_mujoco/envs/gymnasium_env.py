@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.constraints import OneOf
 from smc_mujoco.common.extras import extra
 from smc_mujoco.envs import registration
 from smc_mujoco.envs.episode import Episode, Setting, bounded
@@ -60,8 +60,8 @@ class PlantEnv(Episode, gymnasium.Env):
         `changes`: Scenario field -> value, of `episode.FIELDS`.
         """
         super().__init__(Setting(plant, task, changes, flies=self.flies))
-        if render_mode not in (None, "rgb_array"):
-            raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
+        if render_mode is not None:
+            OneOf(names=["rgb_array"])("render_mode", render_mode)
         scenario = self.setting.scenario
         self.render_mode = render_mode
         self.max_samples = scenario.samples

@@ -50,7 +50,7 @@ IDEAL_SENSOR = Encoder(counts=math.inf)
 DATA_BYTES = 176 * 2**10  # of an mjData without channels; measured
 CHANNEL_BYTES = 2 * 2**10  # of an mjData per channel; measured
 # of jit.attempting, and of numba
-RETURNS_OTHERS = re.compile(r"it returns (\d+) numbers instead of")
+RETURNS_OTHERS = re.compile(r"it returns (None|\d+ numbers) instead of")
 UNKNOWN_FIELD = re.compile(
     r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b"
 )
@@ -121,15 +121,14 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
     about = reason.partition(" does not compile: ")[0]
     of = next((part for part in components if about == f"{part.kind} {part.name!r}"), None)
     if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
-        count = mistake[1]
+        returned = re.sub("^1 numbers", "1 number", mistake[1])
         wanted = {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
-        raise BrokenLawError(
-            f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}"
-        )
+        raise BrokenLawError(f"{about} returns {returned}: return {wanted}")
     if of is not None and (mistake := UNKNOWN_FIELD.search(reason)):
         record = FIELDS.get(mistake[2], ()) or of.gains
-        kind = f"{'field of y' if mistake[2] in FIELDS else 'gain'} in {about}"
-        raise BrokenLawError(str(unknown(kind, mistake[1], record)))
+        where = "y" if mistake[2] in FIELDS else "gains"
+        hint = str(unknown(where, mistake[1], record)).partition(": ")[2]
+        raise BrokenLawError(f"{about} reads {where}.{mistake[1]}, which is not there: {hint}")
 
 
 def _compile(s: Resolved) -> None:

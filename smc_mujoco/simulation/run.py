@@ -33,7 +33,7 @@ from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.prepare import Prepared, pack, prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import PLANT_DIVERGED as PLANT_DIVERGED_SHORT
-from smc_mujoco.simulation.trace import Trace, from_log
+from smc_mujoco.simulation.trace import Trace, from_log, warn_of_broken
 
 # isort: split
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
@@ -116,6 +116,11 @@ def run(
     work = sum(item.scenario.work for item in prepared)
     with bar(counted(len(prepared), "run"), work, shown=shown_bar) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
+    broken = {}
+    for trace in traces.values():
+        if " raised " in trace.broken or " instead of " in trace.broken:
+            broken.setdefault(trace.scenario.law.name, trace.broken)
+    warn_of_broken(broken)
     if isinstance(scenarios, Scenario):
         return traces[0]
     return [traces[i] for i in range(len(prepared))]

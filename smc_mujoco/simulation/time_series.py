@@ -274,7 +274,7 @@ def _columns(path: str | os.PathLike[str], names: list[str], column: str | None)
         )
     if column is None:
         return at, int(at == 0)
-    if column not in (*names, *plain):
+    if not isinstance(column, str) or column not in (*names, *plain):
         raise unknown(f"column of {path}", column, names)
     return at, (names if column in names else plain).index(column)
 

@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -248,6 +248,12 @@ class Trace:
             import pyarrow
 
         return pyarrow.table(self.columns()).__arrow_c_stream__(requested_schema)
+
+    def __iter__(self) -> Iterator[dict[str, float]]:
+        """Yield each sample as column -> value, as pandas.DataFrame(trace) reads it."""
+        columns = self.columns()
+        for row in zip(*columns.values(), strict=True):
+            yield dict(zip(columns, row, strict=True))
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return the `columns` as a pandas DataFrame, indexed by t.

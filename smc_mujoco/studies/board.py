@@ -20,7 +20,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 
 LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
-MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
+MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
 MEDIANS = (
     f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share; "
@@ -31,8 +31,9 @@ MARKS = (
     "Arrived: the error stays within 10 % of the start in the last fifth of the run, or within 5 "
     "times what the sensor tells apart. "
     "'detects 24 %': a lead of 24 % between the law and the one in front would have been seen in "
-    f"{100 * POWER:g} % of such comparisons. 'by the step': the medians at the physics step and at "
-    f"half of it, which differ by more than {APART}; {RANGE}."
+    f"{100 * POWER:g} % of such comparisons; 'detects no lead': not even the largest. 'never', "
+    "'fails' and 'not arrived' are no values, and worse than any. 'by the step': the medians at "
+    f"the physics step and at half of it, which differ by more than {APART}; {RANGE}."
 )
 
 
@@ -57,11 +58,13 @@ class Lead(NamedTuple):
     rival: str
     effect: Effect
     floor: str = ""  # in words, if the law is below it and the rival is not
+    lacking: str = ""  # how many runs of the rival have no value, such as "5 of 24"
 
     @property
     def words(self) -> str:
         """The ratio with its interval, such as "0.88 of pid (0.84 to 0.92), ahead in 24 of 24
-        runs"; "a is below the sensor's 0.01 rad, b is not: at least 1.3 times less".
+        runs"; "5 of 24 runs of pid have no value, ahead in 24 of 24 runs"; "a is below the
+        sensor's 0.01 rad, b is not: at least 1.3 times less".
         """
         ratio, low, high = map(number, self.effect[:3])
         if self.floor:
@@ -75,6 +78,8 @@ class Lead(NamedTuple):
         else:
             samples = "runs"
         ahead = f"ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
+        if self.lacking:
+            return f"{self.lacking} runs of {self.rival} have no value, {ahead}"
         return f"{ratio} of {self.rival} ({low} to {high}), {ahead}"
 
 
@@ -272,7 +277,7 @@ class Board(Tables):
                 seen.append(lead)
         if not seen:
             return "cannot tell them apart"
-        return f"cannot tell them apart ({_detects(max(seen))})"
+        return f"cannot tell them apart ({_detects(max(seen), max(seen) >= MAX_VISIBLE)})"
 
     def visible(self, law: str) -> float:
         """Return the largest, over the blocks, of the least leads that would have been seen, a
@@ -408,11 +413,16 @@ def _cell(board: Board, entry: Entry) -> Cell:
     """
     median = size(entry.interval.median, board.metric)
     visible = board.visible(entry.law)
-    blind = board.too_few or visible >= MAX_VISIBLE or board.barred
+    silent = 0  # blocks without a winner in which no lead of the law would have been seen
+    for block in board.blocks:
+        silent += not block.winner and block.visible.get(entry.law, 0.0) >= MAX_VISIBLE
+    blind = board.too_few or silent or board.barred
     blind = blind or any(block.unranked and entry.law in block.below for block in board.blocks)
     below = [spread(entry.interval, board.metric)]
     if not math.isnan(visible):
-        below.append(_detects(visible))
+        below.append(_detects(visible, silent))
+        if 0 < silent < len(board.blocks):
+            below[-1] += f" in {silent} of {len(board.blocks)} conditions"
     for block in board.blocks:
         if entry.law in block.below:
             below.append(f"below {block.floor}")
@@ -425,10 +435,12 @@ def _cell(board: Board, entry: Entry) -> Cell:
     return Cell(median, "\n".join(filter(None, below)), best, alarm="\n".join(filter(None, alarms)))
 
 
-def _detects(lead: float) -> str:
+def _detects(lead: float, silent: int) -> str:
     """Return the least lead that would have been seen, such as "detects 24 %"."""
-    if lead >= MAX_VISIBLE:
+    if silent:
         return "detects no lead"
+    if lead >= MAX_VISIBLE:
+        return f"detects {number(1.0 / (1.0 - lead))} times less"
     return f"detects {100 * lead:.2g} %"
 
 
@@ -437,8 +449,9 @@ def key(boards: Sequence[Board]) -> str:
     family = max(board.family for board in boards)
     winner = (
         "A winner is better than every other law in a paired test, corrected for "
-        f"{counted(family, 'comparison')} a metric. Pairs of runs tell by how much, not the "
-        f"medians. Ahead means by more than {relevance(boards[0].relevant)}."
+        f"{counted(family, 'comparison')} a metric. The rival that a verdict names is the hardest "
+        "to tell from the winner. Pairs of runs tell by how much, not the medians. "
+        f"Ahead means by more than {relevance(boards[0].relevant)}."
     )
     parts = [MEDIANS, MARKS, winner]
     if any(board.by_step for board in boards):

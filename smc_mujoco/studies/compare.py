@@ -50,6 +50,7 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Time of the laws' compiled code a sample on this machine"
 TIME_HEADINGS = "plant", "law", "of pid's", "median (s)", "99 % quantile (s)"
 GAINS = "plant", "law", "gains", "sets", "best set"
+BEST_SET = "Runs take the sets in turn; the best set is that of the search with the least J."
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -126,7 +127,7 @@ class Compared(Tables):
                 times.append((plant, name, *of_law))
         if times:
             tables.append(Tabular(headings=TIME_HEADINGS, rows=times, title=TIMES, left=2))
-        notes = self.remarks
+        notes = [BEST_SET, *self.remarks]
         return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=5)]
 
     @property

@@ -10,6 +10,7 @@ number, so that a comparison holds over the gains with which a tuning may end.
 import contextlib
 import dataclasses
 import math
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -171,11 +172,14 @@ class Trial(NamedTuple):
 
     def check(self, laws: Mapping[str, Laws]) -> None:
         """Refuse, before gains are searched, two things of one name, and what moves nothing."""
-        every = []
         for of_plant in laws.values():
-            for law in of_plant:
-                every.append(coerce.law(law))
-        check_names(self.plants, every, self.conditions)
+            made = list(map(coerce.law, of_plant))
+            check_names(self.plants, made, self.conditions)
+            for named in (self.plants, made, self.conditions):
+                names = [one.name for one in named]
+                for name in names:
+                    if names.count(name) > 1:
+                        raise ScenarioError(f"{name!r} is there twice: give it once")
         for plant in self.plants:
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
@@ -212,11 +216,16 @@ class Trial(NamedTuple):
             if tune and not defaults:
                 self._check_tunable(plant, laws[plant.name], candidates, starts[plant.name])
         made: dict[str, list[Candidate]] = {}
+        count = sum(of_plant.count(None) for of_plant in known.values())
+        begun = 0
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
                 candidate = found or _default(law)
                 if found is None and tune:
+                    begun += 1
+                    if self.progress:
+                        print(f"gains of law {begun} of {count}", file=sys.stderr)
                     candidate = self.tuned(plant, law, starts[plant.name], searches, budget)
                 made[plant.name].append(candidate)
         return made

@@ -7,7 +7,6 @@ with several blocks wins in every one. The conclusions hold for the plants and c
 table, over initial states and noise, and over the gains with which the laws ran.
 """
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -281,10 +280,12 @@ def _lead(comparison: Comparison, at: int, order: Sequence[int], floor: str) -> 
     rival = _closest(comparison, at, first, order)
     names = comparison.laws[first], comparison.laws[rival]
     effect = comparison.effect(at, *names)
-    arrives = math.isfinite(comparison.centres[rival, at])
-    if effect.samples and arrives and not comparison.unranked[at, first, rival]:
-        return Lead(*names, effect, floor if effect.below else "")
-    return None
+    if not effect.samples or comparison.unranked[at, first, rival]:
+        return None
+    lacking = ""
+    if lost := comparison.without_value[rival, at]:
+        lacking = f"{lost} of {comparison.seeds[at]}"
+    return Lead(*names, effect, floor if effect.below else "", lacking)
 
 
 def _closest(comparison: Comparison, at: int, first: int, order: Sequence[int]) -> int:
@@ -298,7 +299,7 @@ def _closest(comparison: Comparison, at: int, first: int, order: Sequence[int]) 
 
 def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str, float]:
     """Return law -> the least lead that would have been seen between it and the law in front, if
-    neither is below the floor; {} without a test.
+    all runs of both have values and neither is below the floor; {} without a test.
 
     For the law in front it is that over its closest rival.
     """
@@ -306,6 +307,8 @@ def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str,
         return {}
     names = comparison.laws
     first = order[0]
+    if winner := comparison.winners[at]:
+        first = names.index(winner)
     seen = {}
     for i in sorted(order):
         if i != first:
@@ -313,7 +316,7 @@ def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str,
         else:
             rival = _closest(comparison, at, first, order)
         lead = comparison.visible(at, names[first], names[rival])
-        if not math.isnan(lead) and math.isfinite(comparison.centres[i, at]):
+        if not np.isnan(lead) and not comparison.without_value[[i, first, rival], at].any():
             seen[names[i]] = lead
     return seen
 

@@ -31,7 +31,7 @@ from smc_mujoco.common.files import shipped, slug
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.draw.film.camera import Camera, checked
-from smc_mujoco.metrics.catalogue import CATALOGUE, settling_time
+from smc_mujoco.metrics.catalogue import CATALOGUE, arrived, settling_time
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -196,6 +196,9 @@ class Outcome:
         """
         values = self[condition].values(measure)[condition]
         known = {label: value for label, value in values.items() if not math.isnan(value)}
+        if isinstance(measure, str) and sign > 0.0 and not CATALOGUE[measure].error:
+            runs = self.traces[condition]  # who does nothing is calm
+            known = {label: value for label, value in known.items() if arrived(runs[label])}
         if not known or min(sign * value for value in known.values()) == math.inf:
             return {}
         best = min(known.values(), key=lambda value: sign * value)

@@ -75,10 +75,10 @@ class Advice(Tables):
 
     @property
     def _name(self) -> str:
-        """The first law's name, or a sentence if no run of it settles in some condition."""
-        if self.settles[self.law.name]:
-            return self.law.name
-        return f"none settles in every condition, nearest: {self.law.name}"
+        """The first law's name, or a sentence if it does not settle reliably."""
+        if self.settles[self.law.name] < RELIABLE:
+            return f"none settles reliably, nearest: {self.law.name}"
+        return self.law.name
 
     @property
     def _sure(self) -> str:

@@ -4,6 +4,7 @@
 import dataclasses
 import json
 import math
+import re
 import signal
 import sys
 import threading
@@ -161,7 +162,6 @@ def test_a_state_that_starts_outside_the_world_has_diverged_at_once():
 
 
 RETURNS = {
-    "nothing": lambda y, gains, memory: None,
     "text": lambda y, gains, memory: ("a", "b"),
     "complex": lambda y, gains, memory: (1j, 0.0),
     "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
@@ -179,6 +179,32 @@ def test_a_law_that_returns_the_wrong_thing_is_named(name, capfd):
         "instead of the two numbers u, s",
     )
     assert capfd.readouterr().err == ""
+
+
+MISTAKES = {  # what is said of a law that no run can have
+    "returns None: return u and s": lambda y, gains, memory: None,
+    "returns 1 number: return u and s": lambda y, gains, memory: (y.x,),
+    "reads gains.k2, which is not there: did you mean 'k'": lambda y, g, memory: (g.k2, 0.0),
+    "reads y.ee, which is not there: did you mean 'e'": lambda y, gains, memory: (y.ee, 0.0),
+}
+
+
+@pytest.mark.parametrize("said", MISTAKES)
+def test_a_mistake_of_a_law_is_said_before_the_run(said):
+    with pytest.raises(smc.ScenarioError, match=re.escape(f"law '<lambda>' {said}")):
+        smc.run(scenario(made(MISTAKES[said], {"k": 1.0})))
+
+
+def test_a_law_that_raises_is_warned_of():
+    """It stood only in the repr of the trace."""
+
+    def late(y, gains, memory):
+        return 1.0 / (y.t < 0.005), 0.0
+
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match="late.* failed by itself in a run: .* raised"
+    ):
+        smc.run([scenario(made(late))] * 2)
 
 
 def changes_its_gains(y, gains, memory):

@@ -288,7 +288,10 @@ def test_parquet_holds_every_number_to_the_last_bit_and_the_scenario(name, trace
     trace = traces[name]
     table = parquet.read_table(trace.export(tmp_path / "a.parquet"))
     assert table.column_names == list(trace.columns())
+    rows = list(trace)  # as pandas.DataFrame(trace) reads it
+    assert len(rows) == len(trace.t)
     for column, expected in trace.columns().items():
+        np.testing.assert_array_equal([row[column] for row in rows], expected)
         np.testing.assert_array_equal(table[column].to_numpy(), expected)
     assert (
         json.loads(table.schema.metadata[b"scenario"])["plant"]["name"] == trace.scenario.plant.name

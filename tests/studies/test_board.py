@@ -162,6 +162,30 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert "detects no lead" in repr(blind)
 
 
+@pytest.mark.parametrize("conditions", [("nominal",), ("nominal", "noise", "sine")])
+@pytest.mark.parametrize("never", [0.0, 0.4, 1.0])  # share of the rivals' runs
+@pytest.mark.parametrize("spread", [0.1, 3.0, 9.0])
+def test_where_a_law_wins_no_cell_says_that_no_lead_is_seen(spread, never, conditions):
+    """A lead of 4088 times was named beside "detects no lead", and "0 of classical (0 to .5)" where
+    its runs never settle.
+    """
+    table = made(conditions=conditions)
+    random = np.random.default_rng(int(10 * (spread + never)))
+    times = np.exp(random.normal(size=(3, 20 * len(conditions))) * spread)
+    times[2] *= np.exp(-4.0 * spread - 1.0)
+    times[:2][random.random(times[:2].shape) < never] = math.inf
+    table.columns["settling_time"] = times.ravel()
+    (board,) = found = leaderboard(table, metrics=["settling_time"])
+    assert board.winner == "third"
+    assert "no lead" not in repr(found).split("Medians with")[0]
+    assert found.tables[0].rows[0][1].strong
+    if never:
+        assert re.search(
+            r"wins.*: \d+ of 20 runs of (50|second).* have no value, ahead in", board.result
+        )
+    assert not re.search(r"\b0 of|\(0 to", board.result)
+
+
 def test_half_a_step_that_moves_a_median_is_an_alarm():
     table = made()
     halves = []

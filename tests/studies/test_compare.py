@@ -222,6 +222,9 @@ def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
 REFUSED = [
     (([my_law], "duffing", "noisy"), {}, "did you mean 'noise'"),
     (([my_law, my_law(lam=2.0)], "duffing"), {}, "two laws have the name 'my_law'"),
+    ((["pid", "pid"], "duffing"), {}, "'pid' is there twice: give it once"),
+    (([my_law], ["duffing", "duffing"]), {}, "'duffing' is there twice"),
+    (([my_law], "duffing", ["noise", "noise"]), {}, "'noise' is there twice"),
     (([my_law], "duffing"), {"worst": 5}, "give True or a class, such as smc.Uncertainty"),
 ]
 

@@ -165,6 +165,13 @@ def test_leaders_lead_or_are_tied_in_every_measure():
     assert outcome.leaders("settling_time", "tv_rate") == ["b"]
 
 
+def test_who_never_arrives_is_not_the_calmest():
+    runs = {"a": made(RUN, 0.5, 1.0), "idle": made(RUN, NEVER, 0.1)}
+    outcome = Outcome(traces={"nominal": runs})
+    assert outcome.least("tv_rate").startswith("a (")
+    assert outcome.leaders("tv_rate") == ["a"]
+
+
 def test_a_measure_may_be_a_function_and_a_range_has_a_unit_only_where_all_runs_have_it():
     assert (
         single(a=0.4, b=0.2).least(lambda trace: trace.t[-1], unit="s") == "a and b tied (2.00 s)"

@@ -98,6 +98,7 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         seeds=4,
     )
     assert "no law is reliable here, this one settles in 0 %" in short.answer[3]
+    assert short.answer[0].startswith("Use: none settles reliably, nearest: ")
     barred = dataclasses.replace(advice.leaderboard[0].blocks[0], untuned=("slow",))
     board = dataclasses.replace(advice.leaderboard[0], blocks=(barred,))
     untuned = dataclasses.replace(advice, leaderboard=[board])

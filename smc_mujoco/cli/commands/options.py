@@ -149,7 +149,11 @@ PlantName = Annotated[
     ),
 ]
 Quick = Annotated[
-    bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")
+    bool,
+    typer.Option(
+        "--quick",
+        help="Less of everything: a first answer in minutes, later where laws are tuned first.",
+    ),
 ]
 Relevant = Annotated[
     float,

@@ -10,6 +10,7 @@ The plant is its equation M x'' = phi(x) - D(x) x' + u + d, integrated exactly, 
 every instant. No theorem here is about what else a machine does.
 """
 
+import dataclasses
 import functools
 import itertools
 import math
@@ -152,9 +153,10 @@ def _class(within: Uncertainty) -> float:
         raise ScenarioError(
             f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
         )
-    if within != Uncertainty(disturbance=within.disturbance, slope=within.slope):
+    if dataclasses.replace(within, disturbance=1.0) != Uncertainty(disturbance=1.0):
         raise ScenarioError(
-            "a certificate is about disturbances alone: give a class with a disturbance only"
+            f"within has {within.words()}, and a certificate knows a bound of d alone: give "
+            "smc.Uncertainty(disturbance=...)"
         )
     return within.disturbance
 

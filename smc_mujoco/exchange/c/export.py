@@ -10,7 +10,7 @@ import math
 import re
 import textwrap
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
@@ -56,8 +56,7 @@ def law_to_c(
       ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python
         that cannot be translated, which the error quotes.
     """
-    if numbers not in NUMBER_BYTES:
-        raise unknown("type of numbers", numbers, NUMBER_BYTES)
+    find("type of numbers", numbers, NUMBER_BYTES)
     plant = None
     if isinstance(law, Scenario):
         if joints is not None:
@@ -113,7 +112,7 @@ def number_of_joints(law: Component, joints: int | None) -> int:
             )
         return 0
     if law.plants == (FREE_BODY,):
-        if joints not in (None, len(PLACES)):
+        if joints is not None and whole("joints", joints, 1, MAX_JOINTS) != len(PLACES):
             raise ScenarioError(
                 f"law {law.name!r} is of a free body, of {len(PLACES)} joints: leave "
                 f"joints={shown(joints)} out"

@@ -17,6 +17,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.evidence.certificates.certificate import Certificate
 
 pytest.importorskip("flint", reason="python-flint is not installed: the extra proof does")
@@ -324,7 +325,7 @@ CHANGED = {  # case -> plant, law, gains; u_max is 6
 
 
 @pytest.mark.parametrize("case", CHANGED)
-def test_a_gain_changed_in_a_certificate_is_refused_under_a_new_seal(case):
+def test_a_law_changed_in_a_certificate_is_refused_under_a_new_seal(case):
     plant, law, gains = CHANGED[case]
     made = smc.audits.certify(smc.Scenario(plant=plant, law=smc.law(law, **gains)))
     whole: Any = made.data
@@ -333,10 +334,30 @@ def test_a_gain_changed_in_a_certificate_is_refused_under_a_new_seal(case):
             data = copy.deepcopy(whole)
             data["law"]["gains"][gain] = other * (1.0 if value is None else value or 1e-6)
             assert refused(data), (gain, other)
-    for unread in ("tau", "tt", "ki"):
-        data = copy.deepcopy(whole)
-        data["law"]["gains"][unread] = 1e9
-        assert refused(data), unread
+        assert refused(changed(whole, ("law", "gains"), lambda gains, name=gain: gains.pop(name)))
+    for name, template in catalogue().items():
+        if name != law:
+            assert refused(changed(whole, ("law",), lambda it, name=name: it.update(name=name)))
+        for unread in template.gains.keys() - whole["law"]["gains"].keys():
+            added = {unread: template.gains[unread].default}
+            assert refused(
+                changed(whole, ("law", "gains"), lambda it, added=added: it.update(added))
+            )
+
+
+@pytest.mark.parametrize(
+    "field", [f.name for f in dataclasses.fields(smc.Uncertainty) if f.name != "disturbance"]
+)
+def test_a_class_with_more_than_a_bound_of_d_is_refused(field):
+    """A slope was taken and ignored."""
+    value: Any = 0.1
+    if field == "parameters":
+        value = {"delta": (0.5, 2.0)}
+    elif "tuple" in str(smc.Uncertainty.__annotations__[field]):
+        value = 3.0, 4.0
+    within = smc.Uncertainty(disturbance=1.0, **{field: value})
+    with pytest.raises(smc.ScenarioError, match="knows a bound of d alone"):
+        smc.audits.certify(scenario("duffing"), within)
 
 
 def numbers(value, path=()):
