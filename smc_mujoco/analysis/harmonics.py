@@ -89,7 +89,7 @@ class Loop:
             raise ScenarioError(
                 "chattering is predicted for samples that are on time: measure it in a run"
             )
-        if s.stepper is not None:
+        if s.accelerates:
             raise ScenarioError(
                 "chattering is not predicted for a Stepper, whose queue is no lag: measure it in "
                 "a run"

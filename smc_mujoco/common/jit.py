@@ -111,6 +111,16 @@ pointer = _at(types.CPointer(types.float64))  # an address as a pointer to float
 integers = _at(types.CPointer(types.int64))  # an address as a pointer to int64
 
 
+@intrinsic
+def place(typingctx, array):
+    """Return the address that a pointer is."""
+
+    def codegen(context, builder, signature, args):
+        return builder.ptrtoint(args[0], ir.IntType(64))
+
+    return types.int64(array), codegen
+
+
 def floats(names: Iterable[str]) -> np.dtype:
     """Return the dtype of a record of float64."""
     return np.dtype([(name, "f8") for name in names], align=True)

@@ -89,12 +89,12 @@ class Setting:
         self.flown = dataclasses.replace(scenario, law=commanded()) if flies else scenario
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
-        if self.scenario.stepper is not None:
+        if self.scenario.accelerates:
             raise ScenarioError(
                 "environments have no Stepper, whose queue the callback keeps: take another drive"
             )
-        for formula in self.scenario.formula_frictions:
-            name = type(formula).__name__
+        for part in [part for part in self.scenario.friction if part.force is not None]:
+            name = type(part).__name__
             raise ScenarioError(
                 f"friction {name} is a formula, which environments lack: give Coulomb or LuGre"
             )

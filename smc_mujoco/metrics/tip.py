@@ -24,7 +24,6 @@ import numpy as np
 from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import OWN, drive_ids, initial_pose, joint_ids, joint_names
-from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups
@@ -108,7 +107,7 @@ def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
     found = []
     for part in scenario.actuator:
-        if part.in_callback or part.delay or isinstance(part, Stepper) or not part.drives:
+        if part.in_callback or part.delay or part.accelerates or not part.drives:
             found.append(part)
     return found
 

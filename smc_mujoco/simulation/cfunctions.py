@@ -42,15 +42,16 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import head_at, measurement_at
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.mechanisms.hardware.moments import JointState, Reach, Sight, part_at
+from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import SEEN, Plant
 from smc_mujoco.simulation.signals import Signal
-from smc_mujoco.simulation.state import FRICTION_INPUT, INSTANT
+from smc_mujoco.simulation.state import INSTANT, simulation_at
 
 SERIES = floats(("address", "count"))  # of a series' points; they follow its parameters
-instant_at, friction_input_at, seen_at, series_at = map(
-    record_at, (INSTANT, FRICTION_INPUT, SEEN, SERIES)
-)
+instant_at, seen_at, series_at = map(record_at, (INSTANT, SEEN, SERIES))
+# Functions of a part on one joint, with what they read and how many numbers they return.
+OF_JOINTS = {"force": (JointState, 1), "stage_force": (JointState, 2), "read": (Sight, 2)}
 
 
 @functools.cache
@@ -170,17 +171,40 @@ def _compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
 
 
 @functools.cache
-def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
-    """Compile a friction by a formula: v, motor, load -> sliding friction, and both bounds of the
-    static friction.
-    """
+def _compile_part(function: Callable, kind: str, names: tuple[str, ...], memory: int) -> Function:
+    """Compile what a part does on one joint, one of OF_JOINTS."""
+    record, count = OF_JOINTS[kind]
     body = jit(function)
+    inputs = loader(record)
     values = loader(named(names))
-    attempt = attempting(3)
+    attempt = attempting(count)
 
     def native(y, p, m, out):
-        friction = friction_input_at(y, 0)
-        return attempt(body, (friction.v, friction.motor, friction.load, values(p)), out)
+        return attempt(body, (inputs(y), values(p), carray(pointer(m), (memory,))), out)
+
+    return _stored(native, function)
+
+
+@functools.cache
+def _compile_act(function: Callable) -> Function:
+    """Compile what a part does at a stage: of the record of the run, and its PART."""
+    body = njit(error_model="numpy")(function)
+
+    def native(address, part, _, __):
+        sim = simulation_at(address, 0)
+        at = sim.reach
+        reach = Reach(
+            pointer(at.qpos),
+            pointer(at.qvel),
+            pointer(at.ctrl),
+            pointer(at.xfrc_applied),
+            pointer(at.qfrc_applied),
+            pointer(at.actuator_force),
+            at.actuator_user,
+            at.body_user,
+        )
+        body(sim, reach, part_at(part, 0))
+        return 0
 
     return _stored(native, function)
 
@@ -265,9 +289,14 @@ def compile_nominal(plant: Plant) -> Function:
     return _compile(name, _compile_nominal, plant.nominal, tuple(plant.parameters))
 
 
-def compile_friction(f: Sliding) -> Function:
-    """Return the formula of a friction as a C function; raises as `compile_component`."""
-    return _compile(type(f).__name__, _compile_friction, type(f).value, f.names)
+def compile_part(part: Part, kind: str) -> Function:
+    """Return a function of a part, see hardware/moments.py, as a C function; raises as
+    `compile_component`.
+    """
+    name = type(part).__name__
+    if kind in OF_JOINTS:
+        return _compile(name, _compile_part, getattr(part, kind), kind, part.names, part.memory)
+    return _compile(name, _compile_act, getattr(part, kind))
 
 
 def _compile(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:

@@ -2,14 +2,13 @@
 
 At the first stage of a control sample, for each channel:
 
-    sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
+    sensors -> noise -> `read` -> velocity estimator -> law -> saturation -> delay buffer
 
 A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of
 the sample before. At the first stage of a physics step, the command whose delay has passed goes to
-ctrl, through lags and rate limits. At every stage, disturbance(t) goes to xfrc_applied. Then a
-friction by a formula goes to ctrl; its steps have one stage. Dry friction on joints that move alone
-goes to qfrc_applied, at every stage of RK4. Each sample is logged with the mean forces since the
-last one.
+ctrl, or to the drive that a part is. At every stage, disturbance(t) goes to xfrc_applied. Each
+sample is logged with the mean forces since the last one. At every stage the parts act last, see
+hardware/moments.py: the controller knows none of them.
 
 The controller counts its calls, because mjData.time does not tell the last stage of a step from the
 start of the next: RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
@@ -25,35 +24,31 @@ mjData. Those that can fail return a failure code of state.py, unless they say o
 import math
 from collections import namedtuple
 
-import numpy as np
 from numba import njit
 
-from smc_mujoco.common.jit import call, integers, pointer
+from smc_mujoco.common.jit import call, integers, place, pointer
 from smc_mujoco.common.mjcb import slots
 from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms import rotation
-from smc_mujoco.mechanisms.hardware import drives, stepper
-from smc_mujoco.mechanisms.hardware.drives import rippled
-from smc_mujoco.mechanisms.hardware.friction import dry_step
-from smc_mujoco.mechanisms.hardware.rotors import DRAG_AXES, rotor_at, speed_for, spun, thrust_at
-from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
+from smc_mujoco.mechanisms.hardware.moments import (
+    PART,
+    channel_at,
+    function_at,
+    generalised_disturbance,
+    part_at,
+    state_at,
+    torque,
+)
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.signals import after_pauses
-from smc_mujoco.simulation.state import (
-    channel_at,
-    disturbance_at,
-    function_at,
-    log_at,
-    motor_at,
-    state_at,
-)
+from smc_mujoco.simulation.state import disturbance_at, log_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
 LAST_STAGE = 1.0 - 1e-8
 OTHER_CALLBACKS = len(slots())
-FAST_ROTOR = 12.0  # time constants in a step: with more, a rotor has no lag
+PART_BYTES = PART.itemsize
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
@@ -83,7 +78,12 @@ def control(address, sim, data):  # noqa: PLR0912
     failure = record.FINE
     if _interfered(sim):
         failure = record.INTERRUPTED
-    _remove_exact_friction(sim, data)
+    _clear_joints(sim, data)
+    if sim.reaches != 0:
+        _keep_reach(sim.reach, data)
+    sim.stage = stage
+    sim.now = step
+    sim.arrived = 0
     if stage == 0:
         _sum_forces(sim, data)
         if _diverged(sim, data):
@@ -92,11 +92,7 @@ def control(address, sim, data):  # noqa: PLR0912
             failure = record.INTERRUPTED
         elif failure == record.FINE:
             failure = _sample(address, sim, data, k, within)
-        _actuate(sim, data, step)
-    elif sim.drive_step.rise_first != 0.0:
-        _give_moment(sim, data, stage)
-    if sim.rotors != 0:
-        _fly(sim, data, step, stage)
+        _arrive(sim, data, step)
     if sim.disturbance_count != 0 and failure == record.FINE:
         if stage == 0:
             fraction = 0.0
@@ -106,28 +102,15 @@ def control(address, sim, data):  # noqa: PLR0912
         failure = _apply_disturbances(
             address, sim, data, k * sim.period + (within + fraction) * sim.step, sample
         )
-    # bristles, whose integrator has one stage
-    if sim.frictions != 0 and sim.exact_friction == 0 and failure == record.FINE:
-        failure = _apply_friction(address, sim, data)
     if failure == record.FINE:
         if stage == 0 and within == 0:
             _log(sim, data, k)
-        failure = _apply_to_joints(address, sim, data, stage)
+        if sim.part_count != 0:
+            failure = _act(address, sim, data)
     if failure != record.FINE:
         sim.failure = failure
         sim.failed_step = step
-        _remove_exact_friction(sim, data)
         _zero_inputs(sim, data)
-
-
-@njit(error_model="numpy", inline="always")
-def _apply_to_joints(address, sim, data, stage):
-    """Give the joints what stepper motors and exact friction exert at a stage."""
-    if sim.motors != 0:
-        _apply_steppers(sim, data, stage)
-    if sim.exact_friction != 0:
-        return _apply_exact_friction(address, sim, data, stage)
-    return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
@@ -212,24 +195,28 @@ def _call(function, i, inputs, outputs):
 
 
 @njit(error_model="numpy", inline="always")
-def _read_sensor(sim, state, i, x, v, j, hinge):
-    """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and
-    loss.
+def _read_sensor(address, sim, i, j, hinge):
+    """Give reading j of channel i its noise, and what the sensor makes of it. Return 1 if that
+    raised, or 0.
     """
+    reading = sim.reading
     if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
         z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
-        x, v = x + sim.sigma_x * z[0], v + sim.sigma_v * z[1]
-    if sim.bias != 0.0:
-        x += sim.bias
-    if sim.counts != 0.0:
-        quantum = (2.0 * math.pi if hinge else 1.0) / sim.counts
-        x = quantum * np.floor(x / quantum + 0.5)
-    if sim.dropout != 0.0:
-        if j > 0 and philox.uniform(sim.seed, i, philox.DROPOUT, j) < sim.dropout:
-            return state.last_x, state.last_v
-        state.last_x = x
-        state.last_v = v
-    return x, v
+        reading.x += sim.sigma_x * z[0]
+        reading.v += sim.sigma_v * z[1]
+    if sim.read.address == 0:
+        return 0
+    sight = sim.sight
+    sight.x = reading.x
+    sight.v = reading.v
+    sight.j = j
+    sight.hinge = hinge
+    sight.chance = philox.uniform(sim.seed, i, philox.DROPOUT, j)
+    if _call(sim.read, i, address + record.AT.sight, address + record.AT.raw) != 0:
+        return 1
+    reading.x = sim.raw.x
+    reading.v = sim.raw.v
+    return 0
 
 
 @njit(error_model="numpy", inline="always")
@@ -280,24 +267,17 @@ def _measure(address, sim, data, k, t):
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
-        position = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
-        velocity = data.sensordata[channel.v_sensor] + v_error
-        reading.x, reading.v = _read_sensor(
-            sim,
-            state,
-            i,
-            position,
-            velocity,
-            j,
-            channel.hinge_body >= 0,
-        )
+        reading.x = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
+        reading.v = data.sensordata[channel.v_sensor] + v_error
         sim.seen.i = i
+        if _read_sensor(address, sim, i, j, channel.hinge_body >= 0) != 0:
+            return record.RAISED
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
         if sim.other_forces != 0:
             pointer(sim.other_forces)[i] = (
-                _generalised_disturbance(data, channel) + state.reaction / sim.steps
+                generalised_disturbance(data, channel) + state.reaction / sim.steps
             )
     return record.FINE
 
@@ -455,7 +435,7 @@ def _measure_channel(address, sim, k, t, i):
     y.g = sim.drive_gain * model.g
     if sim.other_forces != 0:
         y.f += pointer(sim.other_forces)[i] * model.g
-    if sim.motors != 0:  # u is the acceleration x''
+    if sim.accelerates != 0:  # u is the acceleration x''
         y.gq /= y.g
         y.fq -= y.gq * y.f
         y.f = 0.0
@@ -579,193 +559,18 @@ def _separate_equations(address, sim, M, h, g):
 
 
 @njit(error_model="numpy", inline="always")
-def _actuate(sim, data, step):
-    """Give the actuators the command whose delay has passed at this physics step, if there is
-    one.
+def _arrive(sim, data, step):
+    """Give the actuators, or the drives, the command whose delay has passed at this physics step,
+    if there is one.
     """
     past = step - sim.delay
     if past >= 0 and past % sim.steps == _late(sim, past // sim.steps):
+        sim.arrived = 1
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
             state_at(sim.states, i).delayed = buffer[i]
             if sim.has_drives == 0 and i < (sim.driven if sim.mixer == 0 else sim.actuators):
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
-            if sim.motors != 0 and i < sim.driven:
-                _command_stepper(_motor_at(sim, i), sim.stepper, buffer[i], step * sim.step)
-    if sim.motors != 0:
-        for i in range(sim.driven):
-            motor = _motor_at(sim, i)
-            queue = pointer(_queue_of(sim, i))
-            _advance_stepper(motor, sim.stepper, queue, step * sim.step, (step + 1) * sim.step)
-            _turn_field(motor, sim.stepper, queue, step * sim.step, (step + 1) * sim.step)
-        return
-    if sim.has_drives != 0:
-        for i in range(sim.driven):
-            channel = channel_at(sim.channels, i)
-            v = data.qvel[channel.shaft]
-            V = sim.scale * _step_drives(sim.drive_step, state_at(sim.states, i), v)
-            if sim.drive_step.ripple != 0.0:
-                V = _rippled(sim.drive_step, V, data.qpos[channel.qpos], v)
-            if sim.drive_step.rise_first != 0.0:
-                state = state_at(sim.states, i)
-                state.middle = V
-                state.rise *= sim.scale
-                V -= state.rise
-            data.ctrl[channel.ctrl] = V
-
-
-_command_stepper, _advance_stepper, _turn_field, _stepper_torque = map(
-    njit(error_model="numpy"), (stepper.command, stepper.advance, stepper.field, stepper.torque)
-)
-
-
-@njit(error_model="numpy", inline="always")
-def _motor_at(sim, i):
-    """Return the stepper motor of a channel."""
-    return motor_at(sim.motors + i * sim.motor_stride, 0)
-
-
-@njit(error_model="numpy", inline="always")
-def _queue_of(sim, i):
-    """Return the address of the queue of a channel's stepper motor."""
-    return sim.motors + i * sim.motor_stride + record.MOTOR_BYTES
-
-
-@njit(error_model="numpy")
-def _apply_steppers(sim, data, stage):
-    """Give every motor its torque at a stage, in the field whose stages have its mean and moment
-    over the step.
-    """
-    for i in range(sim.driven):
-        channel = channel_at(sim.channels, i)
-        state = state_at(sim.states, i)
-        motor = _motor_at(sim, i)
-        moved = motor.middle
-        weight = 1.0
-        if sim.stages > 1:  # RK4
-            if stage == 3:
-                moved += motor.rise
-            else:
-                moved += -motor.rise if stage == 0 else 0.0
-            weight = 6.0 if stage % 3 == 0 else 3.0
-        force = _stepper_torque(motor, sim.stepper, data.qpos[channel.shaft_qpos], moved)
-        data.ctrl[channel.ctrl] = force
-        state.force += force / weight
-
-
-@njit(error_model="numpy", inline="always")
-def _give_moment(sim, data, stage):
-    """Give the later stages of an RK4 step the force that has its mean and first moment, see
-    `drives._rise`.
-    """
-    for i in range(sim.driven):
-        channel = channel_at(sim.channels, i)
-        state = state_at(sim.states, i)
-        if stage == 3:
-            data.ctrl[channel.ctrl] = state.middle + state.rise
-        else:
-            data.ctrl[channel.ctrl] = state.middle
-        if stage == 3:  # what the actuators did in the stage before, with the mean force
-            state.force += data.actuator_force[channel.force]
-
-
-@njit(error_model="numpy", inline="always")
-def _step_drives(factors, state, v):
-    """Advance a channel's drives by a physics step, see DriveStep.
-
-    Return the mean force. v: speed of the drive.
-    """
-    u = state.delayed
-    second = state.second
-    a = state.first - u
-    b = second - u
-    force = u + factors.force_first * a
-    state.first = u + factors.first_left * a
-    state.rise = factors.rise_first * a
-    if factors.voltage != 0.0:
-        bound = factors.voltage
-        torque = second - factors.drag * v
-        mean = min(max(force, -bound), bound)
-        end = min(max(u + factors.second_first * a, -bound), bound)
-        state.second = end + factors.second_left * (torque - end) - factors.second_drag * v
-        return mean + factors.force_second * (torque - mean) - factors.force_drag * v
-    if factors.reach == 0.0:
-        state.second = u + factors.second_first * a + factors.second_left * b
-        return force + factors.force_second * b
-    reach = factors.reach
-    state.second = min(max(state.first, second - reach), second + reach)
-    if state.second != state.first:
-        return 0.5 * (second + state.second)
-    gap = min(max(u + factors.lagged * a - second, -reach), reach)
-    return force - 0.5 * gap * abs(gap) / reach
-
-
-_rippled = njit(error_model="numpy", inline="always")(rippled)
-
-
-@njit(error_model="numpy")
-def _fly(sim, data, step, stage):
-    """Give a free body its rotors' thrust, their gyroscopic torque and its drag at a stage, see
-    hardware/rotors.py.
-    """
-    if stage == 0:
-        lifted = 0.0
-        for j in range(sim.actuators):
-            rotor = rotor_at(data.actuator_user, j)
-            state = state_at(sim.states, j)
-            if step > 0:
-                state.first = spun(rotor, state.first, state.second, sim.step)[0]
-            lifted += thrust_at(rotor, state.first)
-        lifted = _command_rotors(sim, data, lifted)
-        _command_rotors(sim, data, lifted)
-        for j in range(sim.actuators):
-            rotor = rotor_at(data.actuator_user, j)
-            state = state_at(sim.states, j)
-            if min(rotor.rise, rotor.fall) * sim.step > FAST_ROTOR:
-                state.first = state.second
-    passed = sim.step * (0.5 if sim.stages == 1 else 0.5 * ((stage + 1) // 2))
-    momentum = 0.0
-    change = 0.0
-    for j in range(sim.actuators):
-        rotor = rotor_at(data.actuator_user, j)
-        state = state_at(sim.states, j)
-        W, rate = spun(rotor, state.first, state.second, passed)
-        data.ctrl[channel_at(sim.channels, j).ctrl] = thrust_at(rotor, W)
-        momentum += rotor.inertia * rotor.spin * W
-        change += rotor.inertia * rotor.spin * rate
-    dof = channel_at(sim.channels, 0).qvel
-    v = data.qvel
-    drag = _drag(sim, data, data.qvel[dof], data.qvel[dof + 1], data.qvel[dof + 2])
-    for i in range(3):
-        data.qfrc_applied[dof + i] = -drag[i]
-    data.qfrc_applied[dof + 3] = -v[dof + 4] * momentum
-    data.qfrc_applied[dof + 4] = v[dof + 3] * momentum
-    data.qfrc_applied[dof + 5] = -change
-
-
-@njit(error_model="numpy")
-def _command_rotors(sim, data, lifted):
-    """Tell the rotors their speeds while all of them give the thrust `lifted`, N, and return what
-    they then give in the middle of the step.
-    """
-    after = 0.0
-    for j in range(sim.actuators):
-        rotor = rotor_at(data.actuator_user, j)
-        state = state_at(sim.states, j)
-        state.second = speed_for(rotor, state.delayed) * max(0.0, 1.0 - rotor.sag * lifted)
-        after += thrust_at(rotor, spun(rotor, state.first, state.second, 0.5 * sim.step)[0])
-    return after
-
-
-@njit(error_model="numpy")
-def _drag(sim, data, x, y, z):
-    """Return R diag(drag) R' times a velocity (x, y, z) in the axes of the world, N."""
-    place = channel_at(sim.channels, 0)
-    first = channel_at(sim.channels, 3).qpos
-    q = data.qpos[first], data.qpos[first + 1], data.qpos[first + 2], data.qpos[first + 3]
-    along = rotation.rotate_inverse(q, x, y, z)
-    drag = pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6))
-    return rotation.turned(q, drag[0] * along[0], drag[1] * along[1], drag[2] * along[2])
 
 
 @njit(error_model="numpy", inline="always")
@@ -811,11 +616,12 @@ def _apply_pushes(address, sim, data):
 
 
 @njit(error_model="numpy")
-def _apply_wind(address, sim, data):
-    """Apply the force of the air that moves past a free body with drag."""
-    x = 0.0
-    y = 0.0
-    z = 0.0
+def _apply_wind(address, sim):
+    """Let the part that has drag push by the wind, whose signals have an axis in each channel."""
+    wind = sim.wind
+    wind.x = 0.0
+    wind.y = 0.0
+    wind.z = 0.0
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         sim.instant.stream = signal.stream
@@ -826,11 +632,11 @@ def _apply_wind(address, sim, data):
                 != 0
             ):
                 return record.RAISED
-            part = sim.motion.value * signal.peak[i]
-            x, y, z = x + part * (i == 0), y + part * (i == 1), z + part * (i == 2)
-    force = _drag(sim, data, x, y, z)
-    for i in range(3):
-        data.xfrc_applied[channel_at(sim.channels, i).xfrc] += force[i]
+            speed = sim.motion.value * signal.peak[i]
+            wind.x += speed * (i == 0)
+            wind.y += speed * (i == 1)
+            wind.z += speed * (i == 2)
+    call(sim.push.function.address, address, address + record.AT.push, 0, 0)
     return record.FINE
 
 
@@ -880,7 +686,7 @@ def _apply_disturbances(address, sim, data, t, k):
     instant.seed = sim.seed
     if _apply_pushes(address, sim, data) != record.FINE:
         return record.RAISED
-    if sim.rotors != 0 and _apply_wind(address, sim, data) != record.FINE:
+    if sim.push.function.address != 0 and _apply_wind(address, sim) != record.FINE:
         return record.RAISED
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
@@ -922,209 +728,82 @@ def _apply_disturbances(address, sim, data, t, k):
 
 
 @njit(error_model="numpy", inline="always")
-def lever(channel, xipos, xanchor, xaxis):
-    """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force).
-
-    All are flat arrays.
-    """
-    j = channel.axis + 1
-    k = (channel.axis + 2) % 3
-    arm_j = xipos[channel.hinge_body + j] - xanchor[channel.anchor + j]
-    arm_k = xipos[channel.hinge_body + k] - xanchor[channel.anchor + k]
-    return xaxis[channel.anchor + j] * arm_k - xaxis[channel.anchor + k] * arm_j
-
-
-@njit(error_model="numpy", inline="always")
-def _generalised_disturbance(data, channel):
-    """Return the generalised force on a channel's joint of the disturbances that act on its
-    body.
-    """
-    if channel.qfrc >= 0:
-        return data.qfrc_applied[channel.qfrc]
-    d = channel.sign * data.xfrc_applied[channel.xfrc]
-    if channel.hinge_body >= 0:
-        d += (
-            lever(channel, data.xipos, data.xanchor, data.xaxis)
-            * data.xfrc_applied[channel.horizontal]
-        )
-    return d
-
-
-@njit(error_model="numpy", inline="always")
-def _evaluate_friction(address, sim, i):
-    """Write the friction by a formula of channel i into the record: 0 without one. Return 1 if it
-    raised, or 0.
-    """
-    sim.seen.i = i
-    function = function_at(sim.frictions, i)
-    if function.address == 0:
-        sim.friction_output.f = 0.0
-        sim.friction_output.low = 0.0
-        sim.friction_output.high = 0.0
-        return 0
-    at = record.AT
-    return _call(function, 0, address + at.friction_input, address + at.friction_output)
-
-
-@njit(error_model="numpy")
-def _apply_friction(address, sim, data):
-    """Give every joint its friction by a formula for a physics step, see hardware/sliding.py."""
-    inputs = sim.friction_input
-    outputs = sim.friction_output
-    for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        if channel.friction_ctrl < 0:
-            continue
-        state = state_at(sim.states, i)
-        x = data.qpos[channel.qpos]
-        v = data.qvel[channel.qvel]
-        joint = channel.qvel
-        inputs.v = v
-        inputs.motor = data.actuator_force[channel.force] if channel.force >= 0 else 0.0
-        inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
-        inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
-        if _evaluate_friction(address, sim, i) != 0:
-            return record.RAISED
-        f = outputs.f
-        low = outputs.low
-        high = outputs.high
-        bristle = pointer(function_at(sim.frictions, i).memory)
-        if state.stuck == 0.0:
-            slows = abs(v) < STICKING_SPEED and abs(v) <= abs(state.speed)
-            if slows or v * state.speed < 0.0:
-                state.stuck = 1.0
-                state.stuck_at = x
-                if state.speed != 0.0:  # it stops, else it is at rest from the start
-                    state.stuck_at -= min(max(inputs.motor + inputs.load, low), high) / bristle[0]
-        if state.stuck != 0.0:
-            spring = bristle[0] * (x - state.stuck_at)
-            if low <= spring <= high and low < high:
-                f = min(max(spring + bristle[1] * v, low), high)
-            else:
-                state.stuck = 0.0
-        state.speed = v
-        data.ctrl[channel.friction_ctrl] = -f
-    return record.FINE
-
-
-@njit(error_model="numpy", inline="always")
-def _remove_exact_friction(sim, data):
-    """Take the friction of the last stage from the joints."""
-    for i in range(sim.n if sim.exact_friction != 0 else 0):
+def _clear_joints(sim, data):
+    """Take what parts exerted at the last stage from the joints."""
+    for i in range(sim.n if sim.exerts != 0 else 0):
         data.qfrc_applied[channel_at(sim.channels, i).qvel] = 0.0
+        state_at(sim.states, i).exerted = 0.0
 
 
-_dry_step = njit(error_model="numpy")(dry_step)
-_torque = njit(error_model="numpy", inline="always")(drives.torque)
+@njit(error_model="numpy", inline="always")
+def _keep_reach(reach, data):
+    """Keep where the arrays are that `act` and `push` reach."""
+    reach.qpos = place(data.qpos)
+    reach.qvel = place(data.qvel)
+    reach.ctrl = place(data.ctrl)
+    reach.xfrc_applied = place(data.xfrc_applied)
+    reach.qfrc_applied = place(data.qfrc_applied)
+    reach.actuator_force = place(data.actuator_force)
+    reach.actuator_user = data.actuator_user
+    reach.body_user = data.body_user
 
 
 @njit(error_model="numpy")
-def _apply_exact_friction(address, sim, data, stage):
-    """Give every joint its dry friction at a stage of RK4: by its formula while it slides, else the
-    moments of `dry_step`.
-
-    While it holds the joint, it takes up what the other forces change within the step, too.
-    """
-    for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        state = state_at(sim.states, i)
-        joint = channel.qvel
-        v = data.qvel[joint]
-        drive = _torque(sim.torque, data.ctrl[channel.ctrl], v) if channel.ctrl >= 0 else 0.0
-        others = (
-            data.qfrc_passive[joint]
-            - data.qfrc_bias[joint]
-            + _generalised_disturbance(data, channel)
-        )
-        if sim.frictions != 0:
-            inputs = sim.friction_input
-            inputs.v = v
-            inputs.motor = drive
-            inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
-            inputs.load += _generalised_disturbance(data, channel)
-        if stage == 0:
-            state.smooth = others + (state.middle if sim.drive_step.rise_first != 0.0 else drive)
-            if _begin_friction(address, sim, data, i) != 0:
-                return record.RAISED
-        if state.slides != 0.0:
-            if _evaluate_friction(address, sim, i) != 0:
-                return record.RAISED
-            force = -sim.friction_output.f
-        else:
-            holding = state.friction - state.holding * (others + drive - state.smooth)
-            force = min(max(holding, state.low), state.high)
-        weight = 3.0
-        if stage % 3 == 0:  # the first stage, or the last
-            if stage == 0:
-                force += -state.friction_rise
-            else:
-                force += state.friction_rise
-            weight = 6.0
-        data.qfrc_applied[joint] += force
-        state.reaction += force / weight
+def _act(address, sim, data):
+    """Let the parts act at a stage, in their order."""
+    for j in range(sim.part_count):
+        part = part_at(sim.parts, j)
+        if part.acts != 0:
+            call(part.function.address, address, sim.parts + PART_BYTES * j, 0, 0)
+        elif (part.staged != 0 or sim.stage == 0) and _exert(address, sim, data, part) != 0:
+            return record.RAISED
+    for i in range(sim.n if sim.exerts != 0 else 0):
+        data.qfrc_applied[channel_at(sim.channels, i).qvel] += state_at(sim.states, i).exerted
     return record.FINE
 
 
 @njit(error_model="numpy")
-def _begin_friction(address, sim, data, i):
-    """Decide what the dry friction of channel i does in a step, under `smooth`, the other forces.
-
-    Return 1 if its formula raised, or 0.
-    """
+def _exert(address, sim, data, part):
+    """Give a joint the force of a part. Return 1 if that raised or is no number, or 0."""
+    i = part.channel
     channel = channel_at(sim.channels, i)
     state = state_at(sim.states, i)
-    v = data.qvel[channel.qvel]
-    mobility = data.qLDiagInv[channel.qvel]
-    smooth = state.smooth
-    state.slides = 0.0
-    if sim.frictions == 0:
-        high = data.dof_frictionloss[channel.qvel]
-        low = -high
-        sliding = -math.copysign(high, v)
-        starting = -math.copysign(high, smooth)
-    else:
-        inputs = sim.friction_input
-        found = sim.friction_output
-        if _evaluate_friction(address, sim, i) != 0:
-            return 1
-        low = found.low
-        high = found.high
-        sliding = -found.f
-        slow = abs(v) < STICKING_SPEED and (state.stuck != 0.0 or abs(v) <= abs(state.speed))
-        state.speed = v
-        stops = abs(v) <= -math.copysign(sim.step * mobility, v) * (smooth + sliding)
-        if not low < high or not (slow or stops or v == 0.0):
-            state.slides = 1.0
-            state.stuck = 0.0
-            state.friction_rise = 0.0
-            return 0
-        if slow:
-            sliding = -high if v > 0.0 else -low
-        else:
-            inputs.v = 0.5 * v
-            if _evaluate_friction(address, sim, i) != 0:
-                return 1
-            sliding = -found.f
-        inputs.v = math.copysign(STICKING_SPEED, smooth)
-        if _evaluate_friction(address, sim, i) != 0:
-            return 1
-        starting = -found.f
-        # friction that holds less than it exerts in motion would start no joint
-        if smooth * (smooth + starting) <= 0.0:
-            low = min(low, smooth)
-            high = max(high, smooth)
-    state.friction, state.friction_rise, held = _dry_step(
-        v, smooth, sliding, starting, low, high, mobility, sim.step
-    )
-    slid = 1.0 - held / sim.step
-    if held > 0.0:
-        state.holding = 1.0 - slid * slid
-    else:
-        state.holding = 0.0
-    state.held += held
-    state.low = min(-high, sliding, starting)
-    state.high = max(-low, sliding, starting)
-    state.stuck = held
+    joint = channel.qvel
+    y = sim.joint_state
+    pushed = generalised_disturbance(data, channel)
+    y.t = sim.now * sim.step
+    y.h = sim.step
+    y.x = data.qpos[channel.qpos]
+    y.v = data.qvel[joint]
+    y.u = state.delayed
+    y.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
+    y.load += data.qfrc_constraint[joint] + pushed
+    y.motor = 0.0
+    weight = 1.0
+    if part.staged != 0:
+        y.stage = sim.stage
+        if channel.ctrl >= 0:
+            y.motor = torque(sim.torque, data.ctrl[channel.ctrl], y.v)
+        y.mean = state.middle if sim.sums_force != 0 else y.motor
+        y.others = data.qfrc_passive[joint] - data.qfrc_bias[joint] + pushed
+        y.level = data.dof_frictionloss[joint]
+        y.mobility = data.qLDiagInv[joint]
+        weight = 6.0 if sim.stage % 3 == 0 else 3.0  # the first stage, or the last
+    elif channel.force >= 0:
+        y.motor = data.actuator_force[channel.force]
+    sim.seen.i = i
+    out = sim.exerted
+    if _call(part.function, 0, address + record.AT.joint_state, address + record.AT.exerted) != 0:
+        return 1
+    if sim.stage == 0 and not abs(out.force) < MAX_CONTROL:
+        return 1
+    if part.ctrl >= 0:
+        data.ctrl[part.ctrl] = out.force
+        return 0
+    state.exerted += out.force
+    state.reaction += out.force / weight
+    if part.staged != 0:
+        state.held += out.held
     return 0
 
 
@@ -1136,7 +815,7 @@ def _sum_forces(sim, data):
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
-        if channel.force >= 0 and sim.drive_step.rise_first == 0.0 and sim.motors == 0:
+        if channel.force >= 0 and sim.sums_force == 0:
             state.force += data.actuator_force[channel.force]
         if channel.gathered >= 0:
             state.force += data.qfrc_actuator[channel.gathered]
@@ -1157,7 +836,7 @@ def _log(sim, data, k):
         if channel.ctrl < 0:
             sample.applied = 0.0
         elif sim.mixer != 0:
-            if sim.rotors != 0:
+            if sim.has_drives != 0:
                 sample.applied = state.delayed
             else:
                 sample.applied = data.ctrl[channel.ctrl]
@@ -1169,7 +848,7 @@ def _log(sim, data, k):
                 sample.applied = min(max(applied, -limit), limit)
             else:
                 sample.applied = state.delayed
-        sample.d = _generalised_disturbance(data, channel)
+        sample.d = generalised_disturbance(data, channel)
         sample.force = state.force / sim.steps
         sample.reaction = state.reaction / sim.steps
         sample.held = state.held

@@ -21,6 +21,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware import encoder
+from smc_mujoco.mechanisms.hardware.moments import CHANNEL
 from smc_mujoco.mechanisms.hardware.part import (
     BASE,
     PASSIVE,
@@ -38,7 +39,6 @@ from smc_mujoco.mechanisms.hardware.part import (
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
-from smc_mujoco.simulation.state import CHANNEL
 
 USERDATA = 2  # numbers in mjData.userdata: callback.MAGIC and the address of the record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail

@@ -9,13 +9,12 @@ What does not compile is called in Python; `prepared.why_not` says what.
 
 import contextlib
 import dataclasses
-import itertools
+import functools
 import math
 import re
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
@@ -28,16 +27,13 @@ from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.part import joint_names
-from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
+from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, PART, Run
+from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import cfunctions, philox, state
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
-    field_values,
     keeps_torques,
     mechanism,
     mixer,
@@ -148,8 +144,10 @@ def _compile(s: Resolved) -> None:
         cfunctions.compile_nominal(s.plant)
     for signal in signals:
         cfunctions.compile_signal(signal)
-    for formula in s.formula_frictions:
-        cfunctions.compile_friction(formula)
+    for part, kind in s.acting:
+        cfunctions.compile_part(part, kind)
+    if s.sensor is not None:
+        cfunctions.compile_part(s.sensor, "read")
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -181,7 +179,7 @@ class Packed:
     disturbances: np.ndarray  # (m,) DISTURBANCE
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     references: np.ndarray  # (referenced,) FUNCTION; (0,) if all channels have the same
-    frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
+    parts: np.ndarray  # that act, on each of their joints, (p,) PART
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
     python: list[Any]  # the PythonFunctions that are called
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
@@ -201,7 +199,8 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     tables = _tables(prepared, buffer)
     values = _shared_functions(s, nominal, buffer)
     values |= _settings(s)
-    values |= _arrays(s, mechanism.model, buffer)
+    values |= _moments(prepared, tables["parts"], buffer)
+    values |= _arrays(s, buffer)
     if s.law.joint:
         values |= _joint_measurement(s, nominal, values, buffer)
     for name, shared in (("laws", "law"), ("references", "reference")):
@@ -214,6 +213,8 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
         kind = state.FUNCTION
         if name == "disturbances":
             kind = state.DISTURBANCE
+        elif name == "parts":
+            kind = PART
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {
@@ -229,9 +230,9 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
         rows = mixer(s.plant)
         values |= {"actuators": len(rows), "mixer": state.address(rows)}
     values["keeps_torques"] = keeps_torques(rows)
-    values |= {"rotors": has_rotors(mechanism.model)}
     values |= {"slots": state.address(mjcb.slots())}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
+    values["part_count"] = len(arrays["parts"])
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(
         numbers,
@@ -276,9 +277,12 @@ class Functions(state.Buffer):
         """Return a nominal model that is not MuJoCo's."""
         return self._made(cfunctions.compile_nominal, "of_nominal", plant)
 
-    def friction(self, formula: Sliding) -> Any:
-        """Return a friction by a formula."""
-        return self._made(cfunctions.compile_friction, "of_friction", formula)
+    def part(self, part: Part, kind: str) -> Any:
+        """Return a function of a part, see hardware/moments.py."""
+        if kind not in cfunctions.OF_JOINTS:
+            return cfunctions.compile_part(part, kind)
+        compiler = functools.partial(cfunctions.compile_part, kind=kind)
+        return self._made(compiler, "of_part", part, kind)
 
     def _made(self, compiler: Callable, caller: str, thing: Any, *arguments: Any) -> Any:
         if not self.called:
@@ -308,7 +312,7 @@ def _function(
 
 
 def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, Any]]]:
-    """Return the laws, references and frictions of the channels, and the disturbances, as fields of
+    """Return the laws and references of the channels, the disturbances, and the parts, as fields of
     records.
     """
     s = prepared.scenario.resolved
@@ -340,7 +344,7 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
     return {
         "laws": laws,
         "references": [_signal(signal, buffer) for signal in references(s)],
-        "frictions": _frictions(prepared, buffer),
+        "parts": _parts(prepared, buffer),
         "disturbances": disturbances,
     }
 
@@ -371,7 +375,6 @@ def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, i
 def _settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, sensor and drives."""
     sensor = s.sensor or IDEAL_SENSOR
-    drives = s.drive_step
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
         "steps": s.steps,
@@ -385,17 +388,11 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "missed": s.clock.missed,
         "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
-        "has_drives": drives is not None or s.stepper is not None,
-        "drive_step": drives._asdict() if drives else {},
-        "stepper": pulsing(s.stepper)._asdict() if s.stepper else {},
-        "exact_friction": s.exact_friction,
+        "accelerates": s.accelerates,
         "torque": s.torque._asdict(),
         "seed": s.seed,
         "sigma_x": s.noise.position,
         "sigma_v": s.noise.velocity,
-        "bias": sensor.bias,
-        "counts": 0.0 if sensor.counts == math.inf else sensor.counts,
-        "dropout": sensor.dropout,
         "read_period": sensor.period or 0.0,
         "read_delay": sensor.delay,
         "uses_model": s.model != "none",
@@ -404,7 +401,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
     }
 
 
-def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, Any]:
+def _arrays(s: Resolved, buffer: Functions) -> dict[str, Any]:
     """Return the arrays of a record in which the callback keeps measurements, commands and
     states.
     """
@@ -412,24 +409,13 @@ def _arrays(s: Resolved, model: mujoco.MjModel, buffer: Functions) -> dict[str, 
     width = s.plant.n if s.law.joint else 1
     late = not s.clock.regular  # a late command may take effect after the next sample began
     slots = s.delay_steps // s.steps + 1 + late
-    states = np.zeros(n, state.CHANNEL_STATE)  # at the start of a run
-    motors = {}
-    if s.stepper is not None:
-        queue = [0.0] * (2 * s.stepper.queued)
-        rows = [[*motor.values(), *queue] for motor in motors_at_start(s)]
-        motors = {"motors": buffer.put(itertools.chain(*rows)), "motor_stride": 8 * len(rows[0])}
-    if s.drive_step is not None:
-        states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
-    if has_rotors(model):
-        speeds = speeds_at_start(model, field_values(model, s, 0)["actuator_user"])
-        states["first"][: len(speeds)] = states["second"][: len(speeds)] = speeds
-    return motors | {
+    return {
         "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
         "a": buffer.reserve(n),
         "other_forces": buffer.reserve(n) if s.model == "true" else 0,
         "width": width,
         "commands": buffer.reserve(2 * width),
-        "states": buffer.put(states.view(float).tolist()),
+        "states": buffer.reserve(n * len(CHANNEL_STATE.names or ())),
         "limits": buffer.put([*s.limits, *[0.0] * s.plant.free]),
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
@@ -452,16 +438,6 @@ def pause_phase(s: Resolved) -> int:
     """
     samples = s.clock.pauses(s.control_period, s.physics_step)[1]
     return int(philox.random_words(s.seed, 0, philox.PAUSE, 0)[0] * 2.0**-53 * samples)
-
-
-def motors_at_start(s: Resolved) -> list[dict[str, float]]:
-    """Return each stepper motor at the start of a run: at rest, with its field at its joint."""
-    zero = dict.fromkeys(GENERATOR, 0.0) | {"stepped": -math.inf, "until": math.inf}
-    phases = (
-        philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53
-        for i in range(s.plant.driven)
-    )
-    return [zero | {"phase": phase, "origin": s.x0[i]} for i, phase in enumerate(phases)]
 
 
 def _joint_measurement(
@@ -497,27 +473,68 @@ def _native_nominal(s: Resolved) -> Native | None:
     return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest)
 
 
-def _frictions(prepared: Prepared, buffer: Functions) -> list[dict[str, int]]:
-    """Return the FUNCTIONs of frictions by a formula, one for each channel: all 0 without one.
-
-    Their numbers go into the buffer.
-    """
-    s = prepared.scenario
-    if not s.formula_frictions:
-        return []
-    names = joint_names(s.plant)
-    functions: list[dict[str, int]] = []
-    for _ in names:
-        functions.append({"address": 0, "parameters": 0, "memory": 0})
+def run_of(prepared: Prepared, part: Part) -> Run:
+    """Return what the numbers of a part may depend on."""
+    s = prepared.scenario.resolved
     shared = prepared.mechanism
-    inertia = with_values(shared.model, s).dof_M0[shared.channels["qvel"]]
-    for friction in s.formula_frictions:
-        compiled = buffer.friction(friction)
-        for place, joint in enumerate(friction.joint_names(s.plant)):
-            i = names.index(joint)
-            functions[i] = {
-                "address": compiled.address,
-                "parameters": buffer.put(friction.parameters(place)),
-                "memory": buffer.put(friction.bristle(i, inertia[i])),
-            }
-    return functions
+    joints = [i for i in part.channels(s.plant) if i >= 0]
+
+    def draw() -> list[float]:
+        return [philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53 for i in joints]
+
+    return Run(
+        n=len(joints),
+        driven=s.plant.driven,
+        step=s.physics_step,
+        rk4=s.integrator == "RK4",
+        x0=[s.x0[i] for i in joints],
+        v0=[s.v0[i] for i in joints],
+        dofs=shared.channels["qvel"][joints].tolist(),
+        load=functools.partial(with_values, shared.model, prepared.scenario),
+        draw=draw,
+    )
+
+
+def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
+    """Return the PARTs of the parts that act, one for each of their joints. Their numbers go into
+    the buffer.
+    """
+    s = prepared.scenario.resolved
+    channels = prepared.mechanism.channels
+    rows = []
+    for part, kind in s.acting:
+        run = run_of(prepared, part)
+        numbers = [buffer.put(row) for row in part.numbers(run)]
+        memories = [buffer.put(row) for row in part.start(run)]
+        compiled = buffer.part(part, kind)
+        for place, i in enumerate(part.channels(s.plant)):
+            ctrl = -1
+            if kind == "force" and part.is_drive:
+                ctrl = channels["ctrl"][i]
+            elif kind == "force" and part.brakes:
+                ctrl = channels["friction_ctrl"][i]
+            function = {"address": compiled.address, "memory": memories[place]}
+            function["parameters"] = numbers[place if len(numbers) > 1 else 0]
+            row = {"function": function, "channel": i, "ctrl": ctrl}
+            rows.append(row | {"acts": kind == "act", "staged": kind == "stage_force"})
+    return rows
+
+
+def _moments(prepared: Prepared, rows: list[dict[str, Any]], buffer: Functions) -> dict[str, Any]:
+    """Return the fields of a record that say what the parts of these PARTs do, and the sensor."""
+    s = prepared.scenario.resolved
+    acting = [part for part, _ in s.acting]
+    fields: dict[str, Any] = {
+        "exerts": any(not row["acts"] and row["ctrl"] < 0 for row in rows),
+        "reaches": any(row["acts"] for row in rows),
+        "has_drives": any(part.is_drive for part in acting),
+        "sums_force": any(part.sums_force for part in acting),
+    }
+    for part in acting:
+        if part.push is not None:
+            fields["push"] = {"function": {"address": buffer.part(part, "push").address}}
+    if (sensor := s.sensor) is not None:
+        numbers = sensor.numbers(run_of(prepared, sensor))[0]
+        compiled = buffer.part(sensor, "read")
+        fields["read"] = _function(compiled, numbers, buffer, sensor.memory, s.plant.n)
+    return fields

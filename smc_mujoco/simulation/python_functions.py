@@ -1,5 +1,5 @@
 """The functions of a run, called in Python: laws, estimators, surfaces, signals, nominal models and
-frictions.
+parts.
 
 What does not compile becomes a C function that calls Python through ctypes, in some microseconds.
 The callback calls it as a compiled one. `Controller`, by which agents act, calls the same functions
@@ -22,7 +22,8 @@ from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement, measurement_of, stored_dtype
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
+from smc_mujoco.mechanisms.hardware.part import Actuator, Part
 from smc_mujoco.mechanisms.plant import SEEN, Plant, Values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Signal
@@ -222,25 +223,6 @@ def evaluate_nominal(
     return called(name, "the two numbers f, g", 2, plant.nominal, *inputs)
 
 
-def evaluate_friction(
-    formula: Sliding, numbers: tuple, v: float, motor: float, load: float
-) -> list[float]:
-    """Return the sliding friction by a formula, with its numbers in a channel, and its bounds at
-    rest.
-    """
-    name = f"friction {type(formula).__name__}"
-    return called(
-        name,
-        "a force and two bounds",
-        3,
-        type(formula).value,
-        v,
-        motor,
-        load,
-        numbers,
-    )
-
-
 class PythonFunction:
     """A C function that calls body(inputs, parameters, memory), which returns its outputs.
 
@@ -400,12 +382,30 @@ def pointer(address: int) -> Any:
     return ctypes.cast(address, DOUBLES)
 
 
-def of_friction(formula: Sliding) -> PythonFunction:
-    """Return a friction by a formula."""
-    record = jit.named(formula.names)
-    count = len(record._fields)
+def of_part(part: Part, kind: str) -> PythonFunction:
+    """Return what a part does on one joint."""
+    role = "actuator" if isinstance(part, Actuator) else "friction"
+    if kind == "read":
+        role = "sensor"
+    name = f"{role} {type(part).__name__}"
+    function = rebuild(getattr(part, kind), lambda inner: inner)
+    numbers = jit.named(part.names)
+    count = len(numbers._fields)
+    record = Sight if kind == "read" else JointState
+    memories = Memories(part.memory)
 
-    def body(inputs, parameters, _):
-        return evaluate_friction(formula, record(*parameters[:count]), *inputs[:3])
+    def body(inputs, parameters, memory):
+        y = record(*inputs[: len(record._fields)])
+        try:
+            out = function(y, numbers(*parameters[:count]), memories[memory])
+        except USER_EXCEPTIONS as error:
+            raise failure_of(name, error, channel=0) from error
+        if kind == "force":
+            values = as_floats(name, [out], "a force", 1)
+        else:
+            values = as_floats(name, out, "two numbers", 2)
+        if kind == "force" and not math.isfinite(values[0]):
+            raise Failure(f"{name} returned {values[0]:g}", channel=0)
+        return values
 
     return PythonFunction(body)

@@ -28,27 +28,24 @@ from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, joint_catalogue, suits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.written import StateFeedback
-from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.drives import (
-    DCMotor,
     DriveStep,
-    Lag,
-    Torque,
+    Series,
     drive_step,
 )
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
+from smc_mujoco.mechanisms.hardware.friction import DryFriction, LuGre
+from smc_mujoco.mechanisms.hardware.moments import Torque
 from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
     Friction,
     NominalDrive,
+    Part,
     joint_names,
     moves_alone,
 )
-from smc_mujoco.mechanisms.hardware.rotors import flies
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.hardware.stepper import Stepper
+from smc_mujoco.mechanisms.hardware.rotors import Rotors, flies
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
@@ -81,8 +78,6 @@ NOT_OF_FREE_BODIES = {
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 REALISTIC_STEP = 2.5e-4
-# s, with a Backlash; tests/mechanisms/hardware/test_play.py compares with plastic stops
-PLAY_STEP = 1.25e-4
 MIN_JITTER_STEPS = (
     4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more
 )
@@ -375,46 +370,69 @@ class Scenario:
         friction by a formula also behind a DC motor without cogging and ripple. In other scenarios
         Coulomb friction is MuJoCo's, and joints with a formula stick by bristles.
         """
-        dry = [part for part in self.friction if not isinstance(part, Viscous)]
-        if not (dry or self.plant.rubs) or self.integrator not in (None, "RK4"):
-            return False
-        by_formula = self.formula_frictions == tuple(dry) and not self.plant.rubs
-        if not by_formula and not all(isinstance(part, Coulomb) for part in dry):
-            return False
+        return bool(self.exact_parts)
+
+    @functools.cached_property
+    def exact_parts(self) -> tuple[Part, ...]:
+        """The parts that do this; () without `exact_friction`."""
+        dry = [part.exact for part in self.friction if not part.smooth]
+        if self.plant.rubs:
+            dry.append(DryFriction())
+        exact = tuple(dict.fromkeys(dry))
+        # the dry friction in the model is of all joints, and takes no formula beside it
+        if not exact or None in exact or (len(exact) > 1 and DryFriction() in exact):
+            return ()
         if self.contact or self.mechanism != "equation":
-            return False
+            return ()
+        if self.integrator not in (None, "RK4") or not moves_alone(self.plant):
+            return ()
         if any(isinstance(d, Push) for d in self.disturbance):
-            return False
-        for part in self.actuator:
-            even = isinstance(part, DCMotor) and part.even and bool(self.formula_frictions)
-            if not (part.in_callback or even):
-                return False
-        return moves_alone(self.plant)
+            return ()
+        for actuator in self.actuator:
+            if not all(part.behind(actuator) for part in exact):
+                return ()
+        return exact
+
+    @functools.cached_property
+    def acting(self) -> tuple[tuple[Part, str], ...]:
+        """The parts that the callback simulates, in the order in which they act, with what they do:
+        "act", "force" or "stage_force", see hardware/moments.py.
+        """
+        drives: list[Part] = [Rotors()] if flies(self.plant) else []
+        if (effect := self.drive_step) is not None:
+            drives.append(Series(effect))
+        acting = []
+        for part in (*drives, *self.actuator):
+            if part.act is not None:
+                acting.append((part, "act"))
+            elif part.force is not None:
+                acting.append((part, "force"))
+        for part in self.friction:
+            if part.force is not None and part not in self.exact_parts:
+                acting.append((part, "force"))
+        return (*acting, *((part, "stage_force") for part in self.exact_parts))
 
     @property
-    def voltage_motor(self) -> DCMotor | None:
-        """The DC motor that has its voltage as u; None if u is a force."""
-        for part in self.actuator:
-            if isinstance(part, DCMotor) and part.unit:
-                return part
-        return None
+    def voltage_motor(self) -> Actuator | None:
+        """The motor that has its voltage as u; None if u is no voltage."""
+        return next((part for part in self.actuator if part.unit), None)
 
     @property
-    def stepper(self) -> Stepper | None:
-        """The stepper motor, whose u is the joint's acceleration; None without one."""
-        return next((part for part in self.actuator if isinstance(part, Stepper)), None)
+    def accelerates(self) -> bool:
+        """Whether u is an acceleration."""
+        return any(part.accelerates for part in self.actuator)
 
     @property
     def force_command(self) -> bool:
         """Whether u is a force."""
-        return self.voltage_motor is None and self.stepper is None
+        return self.voltage_motor is None and not self.accelerates
 
     @property
     def efforts(self) -> tuple[str, ...]:
         """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
         acceleration.
         """
-        if self.stepper is not None:
+        if self.accelerates:
             return tuple(f"{unit}/s^2" for unit in self.plant.units)
         if self.voltage_motor is None:
             return self.plant.efforts
@@ -429,8 +447,9 @@ class Scenario:
         if not isinstance(bounds, tuple):
             bounds = (bounds,) * self.plant.driven
         if self.voltage_motor is not None:
-            return tuple(min(bound, self.voltage_motor.voltage) for bound in bounds)
-        if self.stepper is not None:  # the plant's limits are of a force
+            most = self.voltage_motor.bound or math.inf
+            return tuple(min(bound, most) for bound in bounds)
+        if self.accelerates:  # the plant's limits are of a force
             return bounds
         limits = self.plant.limits or bounds
         return tuple(min(bound, limit) for bound, limit in zip(bounds, limits, strict=True))
@@ -485,16 +504,11 @@ class Scenario:
         return math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
-    def formula_frictions(self) -> tuple[Sliding, ...]:
-        """The frictions by a formula, which the callback evaluates; at most one on a joint."""
-        return tuple(part for part in self.friction if isinstance(part, Sliding))
-
-    @property
     def torque(self) -> Torque:
         """What MuJoCo's actuator makes of its control in a step with `exact_friction`."""
         for part in self.actuator:
-            if isinstance(part, DCMotor):
-                return part.torque(self.resolved.physics_step, True)
+            if part.even:
+                return part.mujoco_torque(self.resolved.physics_step, True)
         return Torque()
 
     @property
@@ -582,11 +596,8 @@ def _defaults(s: Scenario) -> dict[str, Any]:
 
 def _default_bound(s: Scenario) -> float | tuple[float, ...]:
     """Return the default of u_max: a motor's own, or what the plant suggests."""
-    if s.voltage_motor is not None:
-        return s.voltage_motor.voltage
-    if s.stepper is None:
-        return suggested_u_max(s.plant)
-    return s.stepper.ramp
+    own = [part.bound for part in s.actuator if part.bound is not None]
+    return own[0] if own else suggested_u_max(s.plant)
 
 
 def longest_step(s: Scenario) -> float:
@@ -599,13 +610,12 @@ def longest_step(s: Scenario) -> float:
     % in the fastest cycle of a sampled law, which lasts two samples. Cycles behind a long delay are
     slower: a step of half of it is enough. A force that follows u at once sets no limit.
     """
-    jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
-    if any(isinstance(part, Backlash) for part in s.actuator):
-        return min(PLAY_STEP, jitter)
-    if not (s.plain_equation or s.exact_friction) or s.stepper is not None:
-        return min(REALISTIC_STEP, jitter)
-    longest = min(MAX_STEP, jitter)
-    if len([part for part in s.actuator if part.drives]) == 1 and isinstance(s.actuator[0], Lag):
+    bounds = [s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP]
+    bounds += [part.longest_step for part in s.actuator]
+    if not (s.plain_equation or s.exact_friction):
+        return min(REALISTIC_STEP, *bounds)
+    longest = min(MAX_STEP, *bounds)
+    if len(s.actuator) == 1 and s.actuator[0].has_moment:
         return longest
     for part in s.actuator:
         if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited:
@@ -795,7 +805,7 @@ def check_law(s: Resolved) -> None:
     """Check that the law suits the plant, and the surface the law."""
     check_channels(s)
     check_free_body(s)
-    if s.model == "true" and (s.law.joint or s.jump or s.stepper or s.clock.jitter):
+    if s.model == "true" and (s.law.joint or s.jump or s.accelerates or s.clock.jitter):
         raise ScenarioError(
             "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave "
             "that out, or give model='nominal'"
@@ -944,19 +954,14 @@ def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
     at any time.
     """
-    states = [part for part in s.friction if part.bristles]
+    states = [part for part in s.friction if part.bristles or part.force is not None]
     if s.integrator == "RK4" and states and not s.exact_friction:
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the "
             "integrator out"
         )
     for part in s.actuator:
-        if isinstance(part, DCMotor) and part.ripple and len(s.actuator) > 1:
-            raise ScenarioError(
-                "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
-            )
-    if s.stepper is not None:
-        check_stepper(s)
+        part.suits(s)
     for part in s.friction:
         part.check(s.plant)
     for step in (0, s.samples * s.steps):
@@ -970,23 +975,6 @@ def check_mechanism(s: Resolved) -> None:
                     f"the obstacles of contact {kind!r} of {s.plant.name} are placed for "
                     f"{name} = {value:g}, and {name} is {present:g}: leave {name} as it is"
                 )
-
-
-def check_stepper(s: Resolved) -> None:
-    """Check that a stepper motor has the command itself, and a law of one channel or without a
-    model.
-    """
-    if len([part for part in s.actuator if part.drives]) > 1:
-        raise ScenarioError(
-            f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that "
-            "out"
-        )
-    if s.law.joint and s.model != "none":
-        raise ScenarioError(
-            f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a "
-            "Stepper's u is an acceleration: give model='none', a law of one channel, or another "
-            "actuator"
-        )
 
 
 @functools.lru_cache(maxsize=16)
@@ -1051,12 +1039,12 @@ def _doubts(s: Resolved) -> Iterator[str]:
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
                 fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
                 yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
-    for motor in [part for part in s.actuator if isinstance(part, DCMotor | Stepper)]:
+    for motor in [part for part in s.actuator if part.stall is not None]:
         for i, limit in enumerate(s.limits):
             with np.errstate(all="ignore"):
                 f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
             need = abs(f) / abs(g) if g else 0.0
-            if motor.stall < need and (need <= limit or not s.force_command):
+            if (motor.stall or 0.0) < need and (need <= limit or not s.force_command):
                 yield (
                     f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} "
                     f"at rest, and channel {i} of {s.plant.name} needs {need:.3g} to hold its "

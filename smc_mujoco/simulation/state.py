@@ -17,15 +17,21 @@ from smc_mujoco.common.jit import floats, record_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import ARRAYS, HANDLE
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware.drives import DriveStep, Torque
-from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, Pulsing
+from smc_mujoco.mechanisms.hardware.moments import (
+    FUNCTION,
+    PART,
+    REACH,
+    JointState,
+    Sight,
+    Torque,
+)
 from smc_mujoco.mechanisms.plant import SEEN
 
 # Inputs and outputs of functions.
 #   law: MEASUREMENT, or the numbers at JOINT_MEASUREMENT -> u and s, one or n of each
 #   surface: MEASUREMENT -> SLIDING; estimator: READING -> ESTIMATE; nominal model: SEEN -> MODEL
-# reference and disturbance: INSTANT -> MOTION; friction by a formula: FRICTION_INPUT ->
-# FRICTION_OUTPUT
+#   reference and disturbance: INSTANT -> MOTION; sensor: SIGHT -> RAW
+#   force of a part: JOINT_STATE -> EXERTED
 MEASUREMENT = floats(Measurement._fields)
 READING = floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream", "e", "de", "s"))
@@ -33,73 +39,13 @@ SLIDING = floats(("s", "v_eq"))
 ESTIMATE = floats(("v", "a"))
 MOTION = floats(("value", "rate", "acceleration"))
 MODEL = floats(("f", "g"))
-FRICTION_INPUT, FRICTION_OUTPUT = (
-    floats(("v", "motor", "load")),
-    floats(("f", "low", "high")),
-)  # see `Sliding.value`
-
-# Indices of a channel in arrays of mjData, -1 if there is none:
-# qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in
-# actuator_force
-#   shaft, shaft_qpos: in qvel and qpos, of what the actuator drives: the joint, or its rotor
-# xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which
-# d enters there
-# horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of
-# the world, 0 or 1
-#   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
-# friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the
-# callback computes it
-#   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
-#   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
-#   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
-CHANNEL = np.dtype(
-    [
-        (name, "i8")
-        for name in (
-            "qpos",
-            "qvel",
-            "x_sensor",
-            "v_sensor",
-            "ctrl",
-            "force",
-            "shaft",
-            "xfrc",
-            "sign",
-            "horizontal",
-            "axis",
-            "hinge_body",
-            "anchor",
-            "friction_force",
-            "friction_ctrl",
-            "qfrc",
-            "shaft_qpos",
-            "turn",
-            "gathered",
-        )
-    ]
-)
-
-# The state of a channel between calls:
-#   last_x, last_v: the last reading that was not lost; delayed: the command after its delay
-#   first, second: the states of the drives, see `DriveStep`
-#   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
-#   middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage,
-#     see `DriveStep`
-#   friction, friction_rise: mean of dry friction in a step of RK4, and its rise to the last stage
-#   low, high: bounds of that friction in the step
-#   slides: whether a formula gives it at every stage
-#   smooth, holding: the other forces for which these are right, and the share of their change that
-#     friction takes up
-#   held: s of a control period for which friction held the joint
-#   stuck, stuck_at, speed: above 0 if a friction by a formula sticks, where its bristle is unbent,
-#     and the speed at the step before
-DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
-RUBBED = "friction", "friction_rise", "smooth", "holding", "held", "low", "high", "slides"
-CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
-DRIVE_STEP = floats(DriveStep._fields)
+SIGHT = floats(Sight._fields)
+RAW = floats(("x", "v"))
+JOINT_STATE = floats(JointState._fields)
+EXERTED = floats(("force", "held"))
+WIND = floats(("x", "y", "z"))
 TORQUE = floats(Torque._fields)
-PULSING = floats(Pulsing._fields)
-MOTOR = floats(GENERATOR)
+
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
 # and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
@@ -111,11 +57,6 @@ LOG = floats(
     (*LOGGED, "held")
 )  # and the time for which `exact_friction` held its joint since the sample before, s
 
-# A compiled function: its address, those of its parameters and of its memory, and the bytes of
-# memory a channel has.
-FUNCTION = np.dtype(
-    [(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True
-)
 # A disturbance: its stream of random numbers (0: none, and then it is the same in every channel),
 # whether it is a horizontal force on the body instead of a force on the joint, and whether it sees
 # the loop. Of a `Push` also the index of its body in xfrc_applied, and its peak; body is -1 for
@@ -175,9 +116,6 @@ SIMULATION = np.dtype(
         ("actuators", "i8"),
         ("mixer", "i8"),
         ("keeps_torques", "i8"),
-        # whether these are rotors, see hardware/rotors.py; `first` and `second` are then their
-        # speeds and those told
-        ("rotors", "i8"),
         # the controller's timer: the largest delay of a sample in physics steps, the share of
         # samples that are missed
         ("jitter", "i8"),
@@ -187,25 +125,31 @@ SIMULATION = np.dtype(
         ("pause", "i8"),
         ("pause_samples", "i8"),
         ("pause_phase", "i8"),
-        # drives in the callback: whether there are, and what a physics step does to them
+        # the parts that act: how many, the address of their PARTs, whether these exert forces on
+        # joints; what pushes at a wind, and what the wind is, m/s
+        ("part_count", "i8"),
+        ("parts", "i8"),
+        ("exerts", "i8"),
+        ("push", PART),
+        ("wind", WIND),
+        # what they read of the callback: stage and physics step, whether a command arrived, and
+        # what they reach, if `reaches`
+        ("stage", "i8"),
+        ("now", "i8"),
+        ("arrived", "i8"),
+        ("reaches", "i8"),
+        ("reach", REACH),
+        # the drive: whether a part is it, whether that sums its force itself, whether u is an
+        # acceleration, and what MuJoCo makes of a control
         ("has_drives", "i8"),
-        ("drive_step", DRIVE_STEP),
-        # stepper motors: their numbers, the address of the first MOTOR, whose queue follows it, 0
-        # without any, and the bytes from one to the next
-        ("stepper", PULSING),
-        ("motors", "i8"),
-        ("motor_stride", "i8"),
-        # whether the callback gives the joints the moments of their dry friction, and what it knows
-        # of the actuator
-        ("exact_friction", "i8"),
+        ("sums_force", "i8"),
+        ("accelerates", "i8"),
         ("torque", TORQUE),
-        # the sensor: noise, encoder
+        # the sensor: noise, what it reads, and its times
         ("seed", "f8"),
         ("sigma_x", "f8"),
         ("sigma_v", "f8"),
-        ("bias", "f8"),
-        ("counts", "f8"),
-        ("dropout", "f8"),
+        ("read", FUNCTION),
         ("read_period", "f8"),
         ("read_delay", "f8"),
         ("position_error", FUNCTION),
@@ -224,9 +168,6 @@ SIMULATION = np.dtype(
         # they differ; 0: all have `law`, or `reference`
         ("laws", "i8"),
         ("references", "i8"),
-        # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and
-        # damping; 0: none
-        ("frictions", "i8"),
         # the drive as the nominal model knows it: force = gain u - drag v
         ("drive_gain", "f8"),
         ("drive_drag", "f8"),
@@ -251,29 +192,28 @@ SIMULATION = np.dtype(
         ("estimate", ESTIMATE),
         ("motion", MOTION),
         ("model", MODEL),
-        ("friction_input", FRICTION_INPUT),
-        ("friction_output", FRICTION_OUTPUT),
+        ("sight", SIGHT),
+        ("raw", RAW),
+        ("joint_state", JOINT_STATE),
+        ("exerted", EXERTED),
         ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
     ],
     align=True,
 )
 
 # How compiled code reads record i of an array at an address.
-simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at = map(
-    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION, MOTOR)
-)
+simulation_at, log_at, disturbance_at = map(record_at, (SIMULATION, LOG, DISTURBANCE))
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
 At = namedtuple(
     "At",
-    "y reading instant sliding estimate motion model seen handle friction_input friction_output",
+    "y reading instant sliding estimate motion model seen handle sight raw joint_state exerted "
+    "push",
 )
 AT = At(*(SIMULATION.fields[name][1] for name in At._fields))  # pyright: ignore[reportOptionalSubscript, reportArgumentType]
 
 # Values of `failure`. RAISED: another function than the law raised an exception.
 FINE, DIVERGED, NOT_FINITE, LAW_RAISED, RAISED, DISTURBANCE_NOT_FINITE, INTERRUPTED = range(7)
-
-MOTOR_BYTES = MOTOR.itemsize
 
 
 class Index(int):

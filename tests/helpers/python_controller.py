@@ -176,7 +176,7 @@ class Controller:
                 fq=float(fq),
                 gq=float(gq),
             )
-        if scenario.stepper is not None:  # u is the acceleration x''
+        if scenario.accelerates:  # u is the acceleration x''
             gq = y.gq / y.g
             y = y._replace(
                 f=0.0,

@@ -15,16 +15,17 @@ import numpy as np
 from helpers.python_controller import Controller
 from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
-from smc_mujoco.mechanisms.hardware.drives import rippled, torque
+from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.friction import dry_step
+from smc_mujoco.mechanisms.hardware.moments import torque
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
-from smc_mujoco.simulation.prepare import motors_at_start, pause_phase
-from smc_mujoco.simulation.python_functions import Failure, evaluate, evaluate_friction
+from smc_mujoco.simulation.prepare import pause_phase
+from smc_mujoco.simulation.python_functions import Failure, evaluate, failure_of
 from smc_mujoco.simulation.run import DISTURBANCE_NOT_FINITE, PLANT_DIVERGED
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push, Signal
@@ -43,6 +44,26 @@ def run(scenario: Scenario) -> Trace:
             if loop.failure:
                 break
     return from_log(scenario, loop.log, loop.failed_step, loop.failure)
+
+
+def motors_at_start(s: Scenario) -> list[dict[str, float]]:
+    """Return each stepper motor at the start of a run: at rest, with its field at its joint."""
+    zero = dict.fromkeys(stepper.GENERATOR, 0.0) | {"stepped": -math.inf, "until": math.inf}
+    motors = []
+    for i in range(s.plant.driven):
+        phase = philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53
+        motors.append(zero | {"phase": phase, "origin": s.resolved.x0[i]})
+    return motors
+
+
+def evaluate_friction(
+    formula: Sliding, numbers: tuple, i: int, v: float, motor: float, load: float
+) -> tuple[float, float, float]:
+    """Return the sliding friction of joint i by a formula, and its bounds at rest."""
+    try:
+        return type(formula).value(v, motor, load, numbers)
+    except Exception as error:
+        raise failure_of(f"friction {type(formula).__name__}", error, channel=i) from error
 
 
 class Motor:
@@ -111,8 +132,10 @@ class Loop:
         self.formulas: list[Sliding | None] = [None] * n
         self.bristles = [(0.0, 0.0)] * n
         self.numbers: list[tuple] = [()] * n
-        for formula in self.scenario.formula_frictions:
-            record = jit.named(formula.names)
+        for formula in self.scenario.friction:
+            if not isinstance(formula, Sliding):
+                continue
+            record = jit.named(formula.per_joint)
             for place, joint in enumerate(formula.joint_names(scenario.plant)):
                 i = names.index(joint)
                 self.formulas[i] = formula
@@ -125,9 +148,9 @@ class Loop:
         self.stuck = [False] * n
         self.held = np.zeros(n)
         self.motors = []
-        if scenario.stepper is not None:
-            for values in motors_at_start(self.scenario):
-                self.motors.append(Motor(scenario.stepper, values))
+        for part in scenario.actuator:
+            if isinstance(part, stepper.Stepper):
+                self.motors = [Motor(part, values) for values in motors_at_start(self.scenario)]
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -163,7 +186,7 @@ class Loop:
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.d = self.apply_disturbances(data, t)
-            if self.scenario.formula_frictions and not self.scenario.exact_friction:
+            if any(self.formulas) and not self.scenario.exact_friction:
                 self.apply_friction(data, d)
             if stage == 0 and within == 0:
                 x = data.qpos[self.channels["qpos"]]
@@ -390,7 +413,7 @@ class Loop:
         """Return the friction by a formula of joint i and its bounds at rest, 0 without one."""
         if (formula := self.formulas[i]) is None:
             return 0.0, 0.0, 0.0
-        return evaluate_friction(formula, self.numbers[i], v, motor, load)
+        return evaluate_friction(formula, self.numbers[i], i, v, motor, load)
 
     def apply_friction(self, data: mujoco.MjData, d: np.ndarray) -> None:
         """Give the joints their friction by a formula for a physics step; d are the disturbances,
@@ -465,7 +488,7 @@ class Loop:
         h = self.scenario.physics_step
         mobility = float(data.qLDiagInv[dof])
         v = float(data.qvel[dof])
-        if not self.scenario.formula_frictions:
+        if not any(self.formulas):
             high = float(self.model.dof_frictionloss[dof])
             low = -high
             sliding = -math.copysign(high, v)

@@ -35,8 +35,8 @@ import smc_mujoco as smc
 from smc_mujoco.common import fingerprint, numba_internals
 from smc_mujoco.common.jit import Key, compiled
 from smc_mujoco.control.law import Measurement, catalogue
+from smc_mujoco.mechanisms.hardware.moments import lever
 from smc_mujoco.simulation import callback, controller, philox, state
-from smc_mujoco.simulation.controller import lever
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key

@@ -465,7 +465,7 @@ def _task(
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
-    if first.stepper:
+    if first.accelerates:
         per_u = None
     else:
         per_u = first.nominal_drive.gain

@@ -160,8 +160,8 @@ def default_class(scenario: Scenario) -> Uncertainty:
 
 def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
-    if scenario.stepper:
-        return scenario.stepper.stall
+    if scenario.accelerates:
+        return min(part.stall for part in scenario.actuator if part.stall is not None)
     return min(scenario.limits) * scenario.nominal_drive.gain
 
 

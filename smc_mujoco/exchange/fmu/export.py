@@ -135,7 +135,7 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> dict[str, Any
         what = "a bound for each channel"
     elif s.feedforward is not None:
         what = "a feedforward"
-    elif s.stepper is not None:
+    elif s.accelerates:
         what = "a Stepper"
     if what:
         raise ScenarioError(

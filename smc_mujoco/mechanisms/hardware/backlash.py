@@ -35,6 +35,10 @@ MIN_ARM = (
 )
 
 
+# s; tests/mechanisms/hardware/test_play.py compares with plastic stops
+PLAY_STEP = 1.25e-4
+
+
 @dataclasses.dataclass(frozen=True)
 class Backlash(Actuator):
     """Play between a rotor, which the actuator drives, and the joint: |rotor - joint| <= gap/2.
@@ -52,6 +56,7 @@ class Backlash(Actuator):
     """
 
     drives = False
+    longest_step = PLAY_STEP
 
     gap: Natural
     rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3

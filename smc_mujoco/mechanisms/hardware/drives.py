@@ -18,24 +18,29 @@ exact for a speed that changes linearly there.
 # (a constant of the base class is a property here)
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
+from numba import njit
+from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Bound, Number, OneOf
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import floats, record_at
+from smc_mujoco.mechanisms.hardware.moments import Run, Torque, channel_at, state_at
 from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
     Natural,
     NominalDrive,
     Offset,
+    Part,
     Positive,
     drive_ids,
     drives,
 )
-from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 # Where a dcmotor's numbers lie in the compiled model:
 # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
@@ -65,6 +70,7 @@ class Lag(Actuator):
     """
 
     in_callback: ClassVar[bool] = True
+    has_moment: ClassVar[bool] = True
 
     tau: Natural
 
@@ -214,11 +220,16 @@ class DCMotor(Actuator):
         return min(self.voltage * self.constant / self.resistance, self.constant * self.current)
 
     @property
+    def bound(self) -> float | None:
+        """V, the supply, if u is the voltage."""
+        return self.voltage if self.unit else None
+
+    @property
     def even(self) -> bool:
         """Whether it has neither cogging nor ripple."""
         return not (self.cogging or self.ripple)
 
-    def torque(self, step: float, rk4: bool) -> "Torque":
+    def mujoco_torque(self, step: float, rk4: bool) -> Torque:
         """Return how MuJoCo computes the torque of an even motor in a physics step, s."""
         gain = self.constant / self.resistance
         share, voltage = self._share(step, rk4)
@@ -230,6 +241,12 @@ class DCMotor(Actuator):
             return winding_step(step / self.delay, rk4)[1], math.inf
         # `rippled` bounds it before the ripple
         return 1.0, math.inf if self.ripple else self.voltage
+
+    def suits(self, s: Any) -> None:
+        if self.ripple and len(s.actuator) > 1:
+            raise ScenarioError(
+                "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
+            )
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         kind = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE)
@@ -263,23 +280,6 @@ class DCMotor(Actuator):
         if self.inductance > MIN_WINDING_TIME * self.resistance:
             return self.inductance / self.resistance
         return 0.0
-
-
-class Torque(NamedTuple):
-    """How MuJoCo's actuator turns its control into a force on a joint. By default the control is
-    the force.
-    """
-
-    gain: float = 1.0
-    drag: float = 0.0  # N m s/rad (N s/m)
-    most: float = math.inf  # bound on the control
-    limit: float = math.inf  # N m (N)
-
-
-def torque(drive, control, v):
-    """Return the force of an actuator, N m (N), on a joint at the speed v, rad/s (m/s)."""
-    force = drive.gain * min(max(control, -drive.most), drive.most) - drive.drag * v
-    return min(max(force, -drive.limit), drive.limit)
 
 
 class DriveStep(NamedTuple):
@@ -355,6 +355,7 @@ class DriveStep(NamedTuple):
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 
 
+@register_jitable
 def rippled(motor, V, x, v):
     """Return the voltage at which an even motor has the torque of a motor with ripple, at V, x and
     v of its joint.
@@ -363,6 +364,92 @@ def rippled(motor, V, x, v):
     share = math.exp(motor.sharpness * (math.cos(motor.turns * x - motor.angle) - 1.0))
     share += math.exp(motor.sharpness_2 * (math.cos(motor.turns * x - motor.angle_2) - 1.0))
     return V + motor.ripple * share * (V - motor.constant * v)
+
+
+@njit(error_model="numpy", inline="always")
+def advanced(factors, state, u, v):
+    """Advance a joint's drives by a physics step at the command u and the speed v.
+
+    Return the mean force. `factors` is a DriveStep.
+    """
+    second = state.second
+    a = state.first - u
+    b = second - u
+    force = u + factors.force_first * a
+    state.first = u + factors.first_left * a
+    state.rise = factors.rise_first * a
+    if factors.voltage != 0.0:
+        bound = factors.voltage
+        torque = second - factors.drag * v
+        mean = min(max(force, -bound), bound)
+        end = min(max(u + factors.second_first * a, -bound), bound)
+        state.second = end + factors.second_left * (torque - end) - factors.second_drag * v
+        return mean + factors.force_second * (torque - mean) - factors.force_drag * v
+    if factors.reach == 0.0:
+        state.second = u + factors.second_first * a + factors.second_left * b
+        return force + factors.force_second * b
+    reach = factors.reach
+    state.second = min(max(state.first, second - reach), second + reach)
+    if state.second != state.first:
+        return 0.5 * (second + state.second)
+    gap = min(max(u + factors.lagged * a - second, -reach), reach)
+    return force - 0.5 * gap * abs(gap) / reach
+
+
+# What a joint keeps of its drives: both states of DriveStep, and the rise of the force from the
+# middle of a step of RK4 to its last stage.
+factors_at = record_at(floats(DriveStep._fields))
+kept_at = record_at(floats(("first", "second", "rise")))
+
+
+@dataclasses.dataclass(frozen=True)
+class Series(Part):
+    """The drives of a joint that the callback simulates."""
+
+    effect: DriveStep
+
+    is_drive = True
+    memory = 3
+    names = DriveStep._fields
+
+    @property
+    def sums_force(self) -> bool:
+        """Whether the stages of RK4 get a moment."""
+        return self.effect.rise_first != 0.0
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        return [self.effect]
+
+    def start(self, run: Run) -> list[Sequence[float]]:
+        return [[*states, 0.0] for states in self.effect.start(np.array(run.v0)).T.tolist()]
+
+    def channels(self, plant: Plant) -> Sequence[int]:
+        return range(plant.driven)
+
+    @staticmethod
+    def act(sim, data, part):
+        """Give a joint the mean force of a step, or the stages of RK4 its mean and first moment."""
+        i = part.channel
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
+        factors = factors_at(part.function.parameters, 0)
+        kept = kept_at(part.function.memory, 0)
+        if sim.stage == 0:
+            v = data.qvel[channel.shaft]
+            force = sim.scale * advanced(factors, kept, state.delayed, v)
+            if factors.ripple != 0.0:
+                force = rippled(factors, force, data.qpos[channel.qpos], v)
+            if factors.rise_first != 0.0:
+                state.middle = force
+                kept.rise *= sim.scale
+                force -= kept.rise
+            data.ctrl[channel.ctrl] = force
+        elif factors.rise_first != 0.0:
+            data.ctrl[channel.ctrl] = state.middle
+            if sim.stage == 3:
+                data.ctrl[channel.ctrl] = state.middle + kept.rise
+                # what the actuators did in the stage before, with the mean force
+                state.force += data.actuator_force[channel.force]
 
 
 def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveStep | None:

@@ -5,12 +5,15 @@ The controller reads a channel's position x as
     x_j = q round((x(t_j) + noise + bias) / q),    q = 2 pi / counts rad  or  1 / counts m,
 
 every `period`, each `delay` later; j counts the readings. If one is lost, the one before it stays.
-MuJoCo's sensors have the period and the delay; the callback rounds and drops readings. An encoder
+MuJoCo's sensors have the period and the delay; `read` rounds and drops readings. An encoder
 measures no velocity: by default the controller differentiates the positions.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
 import mujoco
@@ -18,6 +21,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Finite, Natural, Positive, Probability, Whole
 from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
 from smc_mujoco.mechanisms.plant import Field
 
@@ -63,6 +67,29 @@ class Encoder(Part):
             raise ScenarioError(
                 f"Encoder has period {self.period:g} and skew {self.skew:g} s: give one of them"
             )
+
+    memory = 2  # the last reading that was not lost
+    names = ("bias", "counts", "dropout")
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        return [[self.bias, 0.0 if self.counts == math.inf else self.counts, self.dropout]]
+
+    @staticmethod
+    def read(y, p, memory):
+        """Return position and velocity as read: with bias, rounded, or those of the reading before.
+
+        y is a Sight.
+        """
+        x = y.x
+        if p.bias != 0.0:
+            x += p.bias
+        if p.counts != 0.0:
+            quantum = (2.0 * math.pi if y.hinge != 0.0 else 1.0) / p.counts
+            x = quantum * np.floor(x / quantum + 0.5)
+        if p.dropout != 0.0 and y.j > 0.0 and y.chance < p.dropout:
+            return memory[0], memory[1]
+        memory[0], memory[1] = x, y.v
+        return x, y.v
 
     def quantum(self, hinge: bool) -> float:
         """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""

@@ -4,20 +4,25 @@ MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the brist
 actuator. Under RK4 the callback simulates dry friction on joints that move alone, see `dry_step`.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
 import dataclasses
 import math
 from collections.abc import Iterator
 
 import mujoco
 import numpy as np
+from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
     HARD_SOLREF,
     PASSIVE,
+    Actuator,
     Friction,
     Natural,
+    Part,
     Positive,
 )
 from smc_mujoco.mechanisms.plant import Field
@@ -36,6 +41,7 @@ class Viscous(Friction):
       b: N m s/rad, N s/m on a slide; 0 or more.
     """
 
+    smooth = True
     forces = ("b",)
 
     b: Natural
@@ -67,6 +73,10 @@ class Coulomb(Friction):
 
     level: Natural
 
+    @property
+    def exact(self) -> Part:
+        return DryFriction()
+
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         dofs = self.dofs(model)
         yield Field("dof_frictionloss", dofs, self.level, adds=True)
@@ -74,6 +84,7 @@ class Coulomb(Friction):
         yield Field("dof_solimp", dofs, HARD_SOLIMP)
 
 
+@njit(error_model="numpy")
 def dry_step(v, smooth, sliding, starting, low, high, mobility, h):
     """Return what dry friction does to a joint that moves alone, in a step of h s in which no other
     force changes.
@@ -117,6 +128,68 @@ def dry_step(v, smooth, sliding, starting, low, high, mobility, h):
     mean = mean / h
     moment = moment / (h * h)
     return mean, 6.0 * (0.5 * mean - moment), held
+
+
+# What a dry friction keeps within a step: its mean and its rise to the last stage; the other forces
+# for which these are right, and the share of their change that it takes up; its bounds
+FRICTION, RISE, SMOOTH, HOLDING, LOW, HIGH = range(6)
+
+
+@njit(error_model="numpy")
+def begin_step(y, memory, sliding, starting, low, high):
+    """Keep what `dry_step` says of a JointState at the first stage, and return how long friction
+    holds the joint, s.
+    """
+    smooth = y.others + y.mean
+    friction, rise, held = dry_step(y.v, smooth, sliding, starting, low, high, y.mobility, y.h)
+    slid = 1.0 - held / y.h
+    memory[FRICTION] = friction
+    memory[RISE] = rise
+    memory[SMOOTH] = smooth
+    memory[HOLDING] = 1.0 - slid * slid if held > 0.0 else 0.0
+    memory[LOW] = min(-high, sliding, starting)
+    memory[HIGH] = max(-low, sliding, starting)
+    return held
+
+
+@njit(error_model="numpy")
+def at_stage(y, memory):
+    """Return the friction at a stage of the step that `begin_step` began, N m (N).
+
+    While it holds the joint, it takes up what the other forces change within the step, too.
+    """
+    holding = memory[FRICTION] - memory[HOLDING] * (y.others + y.motor - memory[SMOOTH])
+    return with_rise(y, memory, min(max(holding, memory[LOW]), memory[HIGH]))
+
+
+@njit(error_model="numpy")
+def with_rise(y, memory, force):
+    """Return a force with the rise that gives RK4's stages its first moment."""
+    if y.stage == 0.0:
+        return force - memory[RISE]
+    return force + memory[RISE] if y.stage == 3.0 else force
+
+
+@dataclasses.dataclass(frozen=True)
+class DryFriction(Part):
+    """Dry friction, at every stage of RK4, of joints that move alone and whose level is in the
+    model: of a plant's own, and of Coulomb.
+    """
+
+    memory = HIGH + 1
+
+    def behind(self, actuator: Actuator) -> bool:
+        """Return whether it knows the force of a drive within a step."""
+        return actuator.in_callback
+
+    @staticmethod
+    def stage_force(y, p, memory):
+        held = 0.0
+        if y.stage == 0.0:
+            sliding = -math.copysign(y.level, y.v)
+            starting = -math.copysign(y.level, y.others + y.mean)
+            held = begin_step(y, memory, sliding, starting, -y.level, y.level)
+        return at_stage(y, memory), held
 
 
 @dataclasses.dataclass(frozen=True)

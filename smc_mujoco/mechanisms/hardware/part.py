@@ -2,8 +2,8 @@
 
 A part is frozen data. `edit` adds objects to an MjSpec, such as a rotor, a stop, or an actuator
 that acts as friction. `fields` yields the fields of the compiled model that the part's numbers set,
-so that simulations with different numbers share one model in a Batch. MuJoCo simulates the parts,
-without any code of this package.
+so that simulations with different numbers share one model in a Batch. What MuJoCo does not
+simulate, a part does itself by compiled functions, see moments.py.
 
 Names: an actuator `passive:<joint>` belongs to a part and takes no command. `rotor:<joint>` is the
 joint that a channel's actuator drives, if it is not the channel's joint itself.
@@ -11,7 +11,8 @@ joint that a channel's actuator drives, if it is not the channel's joint itself.
 
 import dataclasses
 import functools
-from collections.abc import Hashable, Iterator, Sequence
+import math
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import mujoco
@@ -22,6 +23,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import stated
 from smc_mujoco.mechanisms import rotation
+from smc_mujoco.mechanisms.hardware.moments import Run, Torque
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 PASSIVE = "passive:"
@@ -49,10 +51,38 @@ Positive = Annotated[float, Number(above=0.0, high=MAX_PARAMETER)]
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """Base of all parts."""
+    """Base of all parts.
+
+    What MuJoCo does not simulate is one of the functions here, see moments.py.
+    """
+
+    force: ClassVar[Callable[..., float] | None] = None
+    stage_force: ClassVar[Callable[..., tuple[float, float]] | None] = None
+    act: ClassVar[Callable[..., None] | None] = None
+    push: ClassVar[Callable[..., None] | None] = None
+    read: ClassVar[Callable[..., tuple[float, float]] | None] = None
+    # names of its numbers, by which these functions read a row of `numbers`
+    names: ClassVar[tuple[str, ...]] = ("unused",)
+    memory: ClassVar[int] = 0  # numbers that it keeps for each joint
+    is_drive: ClassVar[bool] = False  # whether its function gives the force of the drive
+    sums_force: ClassVar[bool] = False  # whether it then adds it to the sum of a channel's state
+    brakes: ClassVar[bool] = False  # whether its force is the control of an actuator `passive:`
 
     def __post_init__(self) -> None:
         constrain(self)
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        """Return the numbers of each joint, (n, names), or one row for all."""
+        del run
+        return [(0.0,)]
+
+    def start(self, run: Run) -> list[Sequence[float]]:
+        """Return the memory of each joint at the start of a run, (n, memory)."""
+        return [(0.0,) * self.memory] * run.n
+
+    def channels(self, plant: Plant) -> Sequence[int]:
+        """Return the channels on which its functions act; (-1,) if it acts on all at once."""
+        return range(plant.n)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Add the part's objects to a mechanism, for every channel."""
@@ -81,6 +111,7 @@ class Friction(Part):
     # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most
     # one friction may.
     bristles: ClassVar[bool] = False
+    smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
     on: tuple[str, ...] = dataclasses.field(default=(), kw_only=True)
@@ -105,6 +136,10 @@ class Friction(Part):
         named = [model.joint(name).dofadr[0] for name in self.on]
         return np.array(named or dof_ids(model)[: len(drive_ids(model))], int)
 
+    def channels(self, plant: Plant) -> Sequence[int]:
+        names = joint_names(plant)
+        return [names.index(name) for name in self.joint_names(plant)]
+
     def joint_names(self, plant: Plant) -> tuple[str, ...]:
         """Return the names of the plant's joints that it acts on."""
         return self.on or joint_names(plant)[: plant.driven]
@@ -124,6 +159,13 @@ class Friction(Part):
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""
+
+    @property
+    def exact(self) -> Any:
+        """The part that gives the stages of RK4 this dry friction of joints that move alone, with a
+        method `behind`; None if there is none.
+        """
+        return None
 
 
 class NominalDrive(NamedTuple):
@@ -147,8 +189,25 @@ class Actuator(Part):
         0.0  # s, time constant with which the force follows a held u; 0 for none
     )
     limited: ClassVar[bool] = False  # whether the rate of the force is limited
-    unit: ClassVar[str] = ""  # of u; "" for that of the joint's force
+    unit: ClassVar[str] = ""  # of u; "" for that of the joint's force, or of its acceleration
+    accelerates: ClassVar[bool] = False  # whether u is the acceleration of the joint
+    bound: ClassVar[float | None] = None  # on u, in its unit, if u is no force
+    stall: ClassVar[float | None] = None  # N m (N), the largest force at rest; None: any
+    has_moment: ClassVar[bool] = False  # whether RK4 gets the first moment of its force, too
+    even: ClassVar[bool] = False  # whether `mujoco_torque` is all that it does
+    longest_step: ClassVar[float] = math.inf  # s, of the default physics step
     nominal: ClassVar[NominalDrive] = NominalDrive()  # what the law's model knows of it
+
+    def channels(self, plant: Plant) -> Sequence[int]:
+        return range(plant.driven)
+
+    def mujoco_torque(self, step: float, rk4: bool) -> Torque:
+        """Return how MuJoCo computes its force in a physics step, s."""
+        del step, rk4
+        return Torque()
+
+    def suits(self, s: Any) -> None:
+        """Raise ScenarioError if it does not suit the other fields of a resolved scenario."""
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:

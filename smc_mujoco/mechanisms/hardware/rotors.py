@@ -25,16 +25,22 @@ A model has its numbers in `actuator_user` (ROTOR) and `body_user` (drag), where
 says so.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
+import dataclasses
 import functools
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.jit import floats, record_at
+from smc_mujoco.common.jit import floats, pointer, record_at
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.hardware.part import drive_ids
+from smc_mujoco.mechanisms import rotation
+from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
+from smc_mujoco.mechanisms.hardware.part import Part, drive_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 ROTORS_TEXT = "smc:rotors"  # name of a text in models whose actuators are rotors
@@ -57,7 +63,9 @@ ROTOR = floats(
     ]
 )
 DRAG_AXES = 3  # numbers in `body_user`: drag along the axes of the body, N s/m
+FAST_ROTOR = 12.0  # time constants in a step: with more, a rotor has no lag
 rotor_at = record_at(ROTOR)
+kept_at = record_at(floats(("first", "second")))  # a rotor's speed, and the speed that it is told
 
 
 def has_rotors(model: mujoco.MjModel) -> bool:
@@ -112,3 +120,88 @@ def speeds_at_start(model: mujoco.MjModel, numbers: np.ndarray) -> list[float]:
     `actuator_user`.
     """
     return [float(row.view(ROTOR)["start"][0]) for row in numbers[drive_ids(model)]]
+
+
+@njit(error_model="numpy")
+def _command(sim, data, part, lifted):
+    """Tell the rotors their speeds while all of them give the thrust `lifted`, N, and return what
+    they then give in the middle of the step.
+    """
+    after = 0.0
+    for j in range(sim.actuators):
+        rotor = rotor_at(data.actuator_user, j)
+        kept = kept_at(part.function.memory, j)
+        delayed = state_at(sim.states, j).delayed
+        kept.second = speed_for(rotor, delayed) * max(0.0, 1.0 - rotor.sag * lifted)
+        after += thrust_at(rotor, spun(rotor, kept.first, kept.second, 0.5 * sim.step)[0])
+    return after
+
+
+@njit(error_model="numpy")
+def drag_of(sim, data, x, y, z):
+    """Return R diag(drag) R' times a velocity (x, y, z) in the axes of the world, N."""
+    place = channel_at(sim.channels, 0)
+    first = channel_at(sim.channels, 3).qpos
+    q = data.qpos[first], data.qpos[first + 1], data.qpos[first + 2], data.qpos[first + 3]
+    along = rotation.rotate_inverse(q, x, y, z)
+    drag = pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6))
+    return rotation.turned(q, drag[0] * along[0], drag[1] * along[1], drag[2] * along[2])
+
+
+@dataclasses.dataclass(frozen=True)
+class Rotors(Part):
+    """The rotors and the drag of a free body whose model has them."""
+
+    is_drive = True
+    memory = 2
+
+    def start(self, run: Run) -> list[Sequence[float]]:
+        speeds = speeds_at_start(run.model, run.model.actuator_user)
+        return [(speed, speed) for speed in speeds]
+
+    def channels(self, plant: Plant) -> Sequence[int]:
+        return (-1,)
+
+    @staticmethod
+    def act(sim, data, part):
+        """Give the body its rotors' thrust, their gyroscopic torque and its drag at a stage."""
+        if sim.stage == 0:
+            lifted = 0.0
+            for j in range(sim.actuators):
+                rotor = rotor_at(data.actuator_user, j)
+                kept = kept_at(part.function.memory, j)
+                if sim.now > 0:
+                    kept.first = spun(rotor, kept.first, kept.second, sim.step)[0]
+                lifted += thrust_at(rotor, kept.first)
+            lifted = _command(sim, data, part, lifted)
+            _command(sim, data, part, lifted)
+            for j in range(sim.actuators):
+                rotor = rotor_at(data.actuator_user, j)
+                kept = kept_at(part.function.memory, j)
+                if min(rotor.rise, rotor.fall) * sim.step > FAST_ROTOR:
+                    kept.first = kept.second
+        passed = sim.step * (0.5 if sim.stages == 1 else 0.5 * ((sim.stage + 1) // 2))
+        momentum = 0.0
+        change = 0.0
+        for j in range(sim.actuators):
+            rotor = rotor_at(data.actuator_user, j)
+            kept = kept_at(part.function.memory, j)
+            W, rate = spun(rotor, kept.first, kept.second, passed)
+            data.ctrl[channel_at(sim.channels, j).ctrl] = thrust_at(rotor, W)
+            momentum += rotor.inertia * rotor.spin * W
+            change += rotor.inertia * rotor.spin * rate
+        dof = channel_at(sim.channels, 0).qvel
+        v = data.qvel
+        drag = drag_of(sim, data, data.qvel[dof], data.qvel[dof + 1], data.qvel[dof + 2])
+        for i in range(3):
+            data.qfrc_applied[dof + i] = -drag[i]
+        data.qfrc_applied[dof + 3] = -v[dof + 4] * momentum
+        data.qfrc_applied[dof + 4] = v[dof + 3] * momentum
+        data.qfrc_applied[dof + 5] = -change
+
+    @staticmethod
+    def push(sim, data, part):
+        """Apply the force of the wind."""
+        force = drag_of(sim, data, sim.wind.x, sim.wind.y, sim.wind.z)
+        for i in range(3):
+            data.xfrc_applied[channel_at(sim.channels, i).xfrc] += force[i]

@@ -33,47 +33,54 @@ holds it at rest. Rigid dry friction would hold. With M at the pose and D the in
 to 13, so a sudden load in that mode tears a joint loose from 71 % of its limit on. A load that
 rises within 0.5 s does not, up to 97 %.
 
-The callback writes the bristles' friction as the control of an actuator `passive:<joint>`, held
-over each physics step.
+The bristles' friction is the control of an actuator `passive:<joint>`, held over each physics step.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
 import dataclasses
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import mujoco
+from numba import njit
 
 from smc_mujoco.common.constraints import Each, Number
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
-from smc_mujoco.common.text import counted
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joint_names
-from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.friction import HIGH, RISE, at_stage, begin_step, with_rise
+from smc_mujoco.mechanisms.hardware.joint_force import JointForce, PerJoint
+from smc_mujoco.mechanisms.hardware.moments import Run
+from smc_mujoco.mechanisms.hardware.part import PASSIVE, Actuator
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
 # rad/s, natural, of a stuck joint, critically damped: chosen, two steps of 1 ms resolve it
 BRISTLE_FREQUENCY = 200.0
 MAX_EXPONENT = 700.0  # exp of more overflows
 
-PerJoint = float | Sequence[float]  # one number for all joints, or one for each
 NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETER))]
 PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
 
+# What a joint keeps: of bristles whether it sticks, where they are unbent, and the speed at the
+# step before; at stages of RK4 the same speed, whether it was held, and whether it slides.
+STUCK, STUCK_AT, SPEED = range(3)
+STAGE_SPEED, WAS_HELD, SLIDES = range(HIGH + 1, HIGH + 4)
+
 
 @dataclasses.dataclass(frozen=True)
-class Sliding(Friction):
-    """Base of frictions by a formula.
-
-    A class states its numbers as fields. Each is one number for all joints that it acts on, or a
-    sequence with one for each of them. With a number for each channel, it acts on all of them.
-    """
+class Sliding(JointForce):
+    """Base of frictions by a formula."""
 
     bristles = True  # of joints that do not move alone
+    brakes = True
+    memory = SLIDES + 1
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The fields, which the formula reads as p."""
-        return tuple(field.name for field in dataclasses.fields(self) if field.name != "on")
+        """The fields, which the formula reads as p, and the numbers of the bristles."""
+        return (*self.per_joint, "bristle_stiffness", "bristle_damping")
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
@@ -86,28 +93,21 @@ class Sliding(Friction):
         """
         raise NotImplementedError
 
-    def check(self, plant: Plant) -> None:
-        """Raise ScenarioError if it acts on a joint that is no channel of the plant, or a field is
-        a sequence and does not have one number for each joint.
-        """
-        joints = self.joint_names(plant)
-        for joint in joints:
-            if joint not in (known := joint_names(plant)):
-                raise unknown(f"joint of {type(self).__name__} on {plant.name}", joint, known)
-        for name in self.names:
-            value = getattr(self, name)
-            if isinstance(value, tuple) and len(value) != len(joints):
-                raise ScenarioError(
-                    f"{type(self).__name__}'s {name} is {shown(value)}, and acts on "
-                    f"{counted(len(joints), 'joint')} of {plant.name}: give one number, or "
-                    f"{len(joints)}"
-                )
+    @property
+    def force(self) -> Callable:
+        """The friction that is held over a step."""
+        return _by_bristles(type(self).value)
 
-    def parameters(self, i: int) -> tuple[float, ...]:
-        """Return the numbers of its joint i that `value` reads as p; NaN for None."""
-        return tuple(
-            math.nan if (x := _of(getattr(self, name), i)) is None else x for name in self.names
-        )
+    @property
+    def stage_force(self) -> Callable:
+        """The friction at a stage of RK4."""
+        return _at_stages(type(self).value)
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        rows = []
+        for i, row in enumerate(super().numbers(run)):
+            rows.append([*row, *self.bristle(i, run.inertia[i])])
+        return rows
 
     def bristle(self, i: int, inertia: float) -> tuple[float, float]:
         """Return stiffness and critical damping of channel i when it sticks.
@@ -123,6 +123,14 @@ class Sliding(Friction):
         stiffness = inertia * BRISTLE_FREQUENCY**2
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
 
+    @property
+    def exact(self) -> "Sliding":
+        return self
+
+    def behind(self, actuator: Actuator) -> bool:
+        """Return whether it knows the force of a drive within a step."""
+        return actuator.in_callback or actuator.even
+
     def edit(self, spec: mujoco.MjSpec) -> None:
         for joint in self.joints(spec):
             brake = spec.add_actuator(
@@ -131,9 +139,73 @@ class Sliding(Friction):
             brake.set_to_motor()
 
 
-def _of(value: Any, i: int) -> Any:
-    """Return the value of joint i, from one value for all or a tuple with one for each."""
-    return value[i] if isinstance(value, tuple) else value
+@functools.cache
+def _by_bristles(formula: Callable) -> Callable:
+    """Return the force on a joint that slides by a formula, or sticks by a bristle."""
+    formula = njit(formula)
+
+    def force(y, p, memory):
+        f, low, high = formula(y.v, y.motor, y.load, p)
+        stuck = memory[STUCK]
+        if stuck == 0.0:
+            slows = abs(y.v) < STICKING_SPEED and abs(y.v) <= abs(memory[SPEED])
+            if slows or y.v * memory[SPEED] < 0.0:
+                stuck = 1.0
+                memory[STUCK_AT] = y.x
+                if memory[SPEED] != 0.0:  # it stops, else it is at rest from the start
+                    load = min(max(y.motor + y.load, low), high)
+                    memory[STUCK_AT] -= load / p.bristle_stiffness
+        if stuck != 0.0:
+            spring = p.bristle_stiffness * (y.x - memory[STUCK_AT])
+            if low <= spring <= high and low < high:
+                f = min(max(spring + p.bristle_damping * y.v, low), high)
+            else:
+                stuck = 0.0
+        memory[STUCK], memory[SPEED] = stuck, y.v
+        return -f
+
+    return force
+
+
+@functools.cache
+def _at_stages(formula: Callable) -> Callable:
+    """Return the force at a stage of RK4 on a joint that slides by a formula, or stops or rests in
+    the step.
+    """
+    formula = njit(formula)
+
+    def stage_force(y, p, memory):
+        held = 0.0
+        if y.stage == 0.0:
+            smooth = y.others + y.mean
+            f, low, high = formula(y.v, y.motor, y.load, p)
+            sliding = -f
+            before = memory[STAGE_SPEED]
+            slow = abs(y.v) < STICKING_SPEED and (
+                memory[WAS_HELD] != 0.0 or abs(y.v) <= abs(before)
+            )
+            memory[STAGE_SPEED] = y.v
+            stops = abs(y.v) <= -math.copysign(y.h * y.mobility, y.v) * (smooth + sliding)
+            if not low < high or not (slow or stops or y.v == 0.0):
+                memory[SLIDES], memory[WAS_HELD], memory[RISE] = 1.0, 0.0, 0.0
+            else:
+                if slow:
+                    sliding = -high if y.v > 0.0 else -low
+                else:
+                    sliding = -formula(0.5 * y.v, y.motor, y.load, p)[0]
+                start = math.copysign(STICKING_SPEED, smooth)
+                starting = -formula(start, y.motor, y.load, p)[0]
+                # friction that holds less than it exerts in motion would start no joint
+                if smooth * (smooth + starting) <= 0.0:
+                    low = min(low, smooth)
+                    high = max(high, smooth)
+                held = begin_step(y, memory, sliding, starting, low, high)
+                memory[SLIDES], memory[WAS_HELD] = 0.0, held
+        if memory[SLIDES] != 0.0:
+            return with_rise(y, memory, -formula(y.v, y.motor, y.load, p)[0]), held
+        return at_stage(y, memory), held
+
+    return stage_force
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,25 +4,29 @@ field that steps.
     u, in rad/s^2 -> speed -> rate of steps -> queue of steps
       -> the motor's field -> torque ~ sin(field - shaft)
 
-Three functions simulate it, compiled in the callback:
 `command` is the firmware's part at a control sample, `advance` fills the queue, and `field` turns
 the field. They know no MuJoCo. g, the state of one motor, is a record of GENERATOR; p is a
 `Pulsing`; the queue has two numbers for a step, its time and its direction.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
 import dataclasses
 import math
-from collections.abc import Iterator
-from typing import Annotated, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, NamedTuple
 
 import mujoco
 from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Number, Whole
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.jit import floats, pointer, record_at
+from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
 from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive, drive_ids, drives
 from smc_mujoco.mechanisms.plant import Field
 
+LONGEST_STEP = 2.5e-4  # s, of physics; chosen
 MAX_QUEUED = 100_000  # steps of one motor; chosen, 1.6 MB
 MAX_RATE = 1e7  # steps/s; chosen, drivers take 1e6 or so
 MIN_REFILL = 1e-5  # s between two looks of the generator; chosen, that a run ends
@@ -82,6 +86,11 @@ class Stepper(Actuator):
         50 Hz.
     """
 
+    accelerates = True
+    is_drive = True
+    sums_force = True
+    longest_step = LONGEST_STEP
+
     steps: Annotated[float, Whole(low=1, high=10**9, infinite=True)] = 1600
     teeth: Positive = 50.0
     torque: Positive = 0.4
@@ -133,6 +142,24 @@ class Stepper(Actuator):
         """The largest torque that the field holds at rest, N m (N)."""
         return self.gear * self.torque
 
+    @property
+    def bound(self) -> float:
+        """The default of u_max, rad/s^2 (m/s^2)."""
+        return self.ramp
+
+    def suits(self, s: Any) -> None:
+        if len([part for part in s.actuator if part.drives]) > 1:
+            raise ScenarioError(
+                f"a Stepper is behind {shown(s.actuator[0])}, and its firmware takes numbers, no "
+                "force: leave that out, or give input_delay"
+            )
+        if s.law.joint and s.model != "none":
+            raise ScenarioError(
+                f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, "
+                "and a Stepper's u is an acceleration: give model='none', a law of one channel, or "
+                "another actuator"
+            )
+
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in drives(spec):
             actuator.set_to_motor()
@@ -142,6 +169,56 @@ class Stepper(Actuator):
         driven = model.jnt_dofadr[model.actuator_trnid[drive_ids(model), 0]]
         yield Field("dof_armature", driven, self.gear**2 * self.rotor_inertia, adds=True)
         yield Field("dof_damping", driven, self.gear**2 * self.damping, adds=True)
+
+    @property
+    def memory(self) -> int:
+        """Numbers of a motor and its queue."""
+        return len(GENERATOR) + 2 * self.queued
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return Pulsing._fields
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        return [pulsing(self)]
+
+    def start(self, run: Run) -> list[Sequence[float]]:
+        """Return each motor at rest, with its field at its joint, and an empty queue."""
+        rows = []
+        for phase, x in zip(run.phases, run.x0, strict=True):
+            motor = dict.fromkeys(GENERATOR, 0.0) | {"phase": phase, "origin": x}
+            motor |= {"stepped": -math.inf, "until": math.inf}
+            rows.append([*motor.values(), *[0.0] * (2 * self.queued)])
+        return rows
+
+    @staticmethod
+    def act(sim, data, part):
+        """Give a motor its torque at a stage, in the field whose stages have its mean and moment
+        over the step.
+        """
+        channel = channel_at(sim.channels, part.channel)
+        state = state_at(sim.states, part.channel)
+        p = pulsing_at(part.function.parameters, 0)
+        motor = motor_at(part.function.memory, 0)
+        queue = pointer(part.function.memory + MOTOR_BYTES)
+        if sim.stage == 0:
+            start = sim.now * sim.step
+            end = (sim.now + 1) * sim.step
+            if sim.arrived != 0:
+                command(motor, p, state.delayed, start)
+            advance(motor, p, queue, start, end)
+            field(motor, p, queue, start, end)
+        moved = motor.middle
+        weight = 1.0
+        if sim.stages > 1:  # RK4
+            if sim.stage == 3:
+                moved += motor.rise
+            else:
+                moved += -motor.rise if sim.stage == 0 else 0.0
+            weight = 6.0 if sim.stage % 3 == 0 else 3.0
+        force = torque(motor, p, data.qpos[channel.shaft_qpos], moved)
+        data.ctrl[channel.ctrl] = force
+        state.force += force / weight
 
 
 class Pulsing(NamedTuple):
@@ -192,6 +269,11 @@ GENERATOR = (
 )
 
 
+MOTOR_BYTES = 8 * len(GENERATOR)
+motor_at = record_at(floats(GENERATOR))
+pulsing_at = record_at(floats(Pulsing._fields))
+
+
 def pulsing(stepper: Stepper) -> Pulsing:
     """Return a Stepper as its functions read it."""
     unit = stepper.per_unit
@@ -211,6 +293,7 @@ def pulsing(stepper: Stepper) -> Pulsing:
     )
 
 
+@register_jitable
 def command(g, p, u, t):
     """Give the firmware a command u at time t, s."""
     g.speed = min(max(g.speed + p.per_unit * u * (t - g.commanded), -p.top), p.top)
@@ -224,6 +307,7 @@ def command(g, p, u, t):
         g.rate = size
 
 
+@register_jitable
 def advance(g, p, queue, start, end):
     """Queue the steps of all looks of the generator from `start` to before `end`, s."""
     while p.steady == 0.0:
@@ -276,6 +360,7 @@ def next_step(g, p):
     return g.direction
 
 
+@register_jitable
 def field(g, p, queue, start, end):
     """Turn the field from `start` to `end`, s, and keep its mean, and its rise as `drives._rise`
     defines it.
@@ -322,6 +407,7 @@ def field(g, p, queue, start, end):
     g.rise = 6.0 * (0.5 * mean - moment)
 
 
+@register_jitable
 def torque(g, p, x, moved):
     """Return the torque on a joint at x, when the field is at `moved`."""
     return p.torque * math.sin(p.sharpness * (g.origin + moved / p.per_unit - x))

@@ -125,7 +125,7 @@ def by_tiny_steps(friction, motor, kp, kd, sine, duration):
     h = PERIOD / parts
     p = smc.plant("inverted_pendulum").values({})
     inertia = p.m * p.l**2
-    numbers = SimpleNamespace(**dict(zip(friction.names, friction.parameters(0), strict=True)))
+    numbers = SimpleNamespace(**dict(zip(friction.per_joint, friction.parameters(0), strict=True)))
     gain = 1.0
     voltage = math.inf
     drag = 0.0

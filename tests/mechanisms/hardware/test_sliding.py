@@ -387,7 +387,7 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
             }[model]
             friction = smc.hardware.servo(name, model).friction
             numbers = SimpleNamespace(
-                **dict(zip(friction.names, friction.parameters(0), strict=True))
+                **dict(zip(friction.per_joint, friction.parameters(0), strict=True))
             )
             speeds = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0]
             torques = np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]

@@ -14,7 +14,6 @@ import smc_mujoco as smc
 from smc_mujoco.hardware import Stepper
 from smc_mujoco.simulation import model
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.prepare import motors_at_start
 
 PERIOD = 5e-3  # s, of the control
 MOTOR = Stepper(
@@ -240,10 +239,12 @@ def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
 def by_events(one):
     """Steps of a scenario's motor by events, with the commands of its run's samples."""
     s = one.resolved
-    motor = one.stepper
+    motor = one.actuator[0]
     trace = smc.run(one)
     commands = list(zip(trace.t, trace.u[:, 0], strict=True))
-    return trace, steps_by_events(motor, commands[:-1], motors_at_start(s)[0]["phase"], trace.t[-1])
+    return trace, steps_by_events(
+        motor, commands[:-1], reference.motors_at_start(s)[0]["phase"], trace.t[-1]
+    )
 
 
 def looped(one):

@@ -1,0 +1,225 @@
+"""What parts see of a run, and the moments at which they act.
+
+A callback is a stage of a physics step. At each, in this order:
+
+    stage 0: the sums of the step before; at a sample the readings (`read`), law and delay buffer;
+      the command whose delay has passed arrives
+    every stage: disturbances, and what a part makes of the wind (`push`); at a sample, the log
+    every stage: the parts act, actuators in their order, then frictions: `act`, `force` or
+      `stage_force`
+
+A part acts by compiled functions:
+
+    force(y, p, memory) -> force on one joint, N m (N), once a physics step, and held over it
+    stage_force(y, p, memory) -> the force on one joint at a stage of RK4, and for how many s it
+      holds the joint at rest in this step
+    read(y, p, memory) -> position and velocity that a sensor gives for a Sight
+    act(sim, data, part), push(sim, data, part) -> nothing, once a stage
+
+y is a JointState. p has the part's numbers of the joint by name. The memory is the joint's own.
+These functions are checked as laws are: one that raises, or writes beyond its memory, ends the run.
+`act` and `push` are for this package's own parts and have no checks. They get the run's record, see
+simulation/state.py, the Reach of its mjData, and their PART. They write ctrl, and sum what they
+exert in the channel's state.
+"""
+
+import dataclasses
+import functools
+import math
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from smc_mujoco.common.jit import floats, record_at
+
+# Indices of a channel in arrays of mjData, -1 if there is none:
+# qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in
+# actuator_force
+#   shaft, shaft_qpos: in qvel and qpos, of what the actuator drives: the joint, or its rotor
+# xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which
+# d enters there
+# horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of
+# the world, 0 or 1
+#   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
+# friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the
+# callback computes it
+#   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
+#   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
+#   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
+CHANNEL = np.dtype(
+    [
+        (name, "i8")
+        for name in (
+            "qpos",
+            "qvel",
+            "x_sensor",
+            "v_sensor",
+            "ctrl",
+            "force",
+            "shaft",
+            "xfrc",
+            "sign",
+            "horizontal",
+            "axis",
+            "hinge_body",
+            "anchor",
+            "friction_force",
+            "friction_ctrl",
+            "qfrc",
+            "shaft_qpos",
+            "turn",
+            "gathered",
+        )
+    ]
+)
+
+# The state of a channel between calls:
+#   delayed: the command after its delay
+#   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
+#   middle: the force of a drive in the middle of a step of RK4, if the drive sums its force itself
+#   exerted: what frictions exert on the joint at this stage
+#   held: s of a control period for which friction held the joint
+CHANNEL_STATE = floats(("delayed", "force", "reaction", "middle", "exerted", "held"))
+
+# A compiled function: its address, those of its parameters and of its memory, and the bytes of
+# memory a channel has.
+FUNCTION = np.dtype(
+    [(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True
+)
+# What a part does on one joint, or as a whole (channel -1): its function, whether this is `act`,
+# whether a force is of every stage, and where in ctrl a force goes (-1: to qfrc_applied).
+PART = np.dtype(
+    [
+        ("function", FUNCTION),
+        ("channel", "i8"),
+        ("acts", "i8"),
+        ("staged", "i8"),
+        ("ctrl", "i8"),
+    ],
+    align=True,
+)
+
+# What `act` reaches of an mjData, as pointers to numbers; of its mjModel the addresses of what
+# rotors and drag have.
+Reach = namedtuple(
+    "Reach",
+    "qpos qvel ctrl xfrc_applied qfrc_applied actuator_force actuator_user body_user",
+)
+REACH = np.dtype([(name, "i8") for name in Reach._fields])  # their addresses
+
+channel_at, state_at, function_at, part_at = map(
+    record_at, (CHANNEL, CHANNEL_STATE, FUNCTION, PART)
+)
+
+
+@njit(error_model="numpy", inline="always")
+def lever(channel, xipos, xanchor, xaxis):
+    """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force).
+
+    All are flat arrays.
+    """
+    j = channel.axis + 1
+    k = (channel.axis + 2) % 3
+    arm_j = xipos[channel.hinge_body + j] - xanchor[channel.anchor + j]
+    arm_k = xipos[channel.hinge_body + k] - xanchor[channel.anchor + k]
+    return xaxis[channel.anchor + j] * arm_k - xaxis[channel.anchor + k] * arm_j
+
+
+@njit(error_model="numpy", inline="always")
+def generalised_disturbance(data, channel):
+    """Return the generalised force on a channel's joint of the disturbances that act on its
+    body.
+    """
+    if channel.qfrc >= 0:
+        return data.qfrc_applied[channel.qfrc]
+    d = channel.sign * data.xfrc_applied[channel.xfrc]
+    if channel.hinge_body >= 0:
+        d += (
+            lever(channel, data.xipos, data.xanchor, data.xaxis)
+            * data.xfrc_applied[channel.horizontal]
+        )
+    return d
+
+
+class JointState(NamedTuple):
+    """What the force of a part on a joint may depend on, in SI units.
+
+    It is of the start of a physics step, or of a stage if the force is given at every stage.
+    """
+
+    t: float  # time
+    h: float  # physics step
+    x: float  # position
+    v: float  # velocity
+    u: float  # the command of its channel after its delay; 0 without an actuator
+    motor: float  # force of the joint's drive: in the step before, or at this stage
+    # the other forces: gravity, gyration, springs, disturbances; contacts of the step before
+    load: float
+    # the rest is only of joints that move alone, for forces at every stage
+    stage: float = 0.0  # 0 to 3
+    others: float = 0.0  # `load` with the joint's damping, and without contacts
+    mean: float = 0.0  # force of the drive in the middle of the step
+    level: float = 0.0  # dry friction of the model
+    mobility: float = 0.0  # 1/inertia
+
+
+class Sight(NamedTuple):
+    """What a sensor may give: the true state with noise, and the reading's random number 0 .. 1."""
+
+    x: float  # rad (m)
+    v: float
+    j: float  # index of the reading, from 0
+    hinge: float  # 1 on a hinge, 0 on a slide
+    chance: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """What a part's numbers may depend on. Lists are of the joints that it acts on."""
+
+    n: int  # these joints
+    driven: int  # channels that have an actuator
+    step: float  # physics step, s
+    rk4: bool
+    x0: Sequence[float]
+    v0: Sequence[float]
+    dofs: Sequence[int]
+    load: Callable[[], Any]
+    draw: Callable[[], list[float]]
+
+    @functools.cached_property
+    def model(self) -> Any:
+        """The MjModel with the scenario's values."""
+        return self.load()
+
+    @functools.cached_property
+    def inertia(self) -> list[float]:
+        """Inertia of each joint at the start, alone, kg m^2 (kg)."""
+        return self.model.dof_M0[self.dofs].tolist()
+
+    @functools.cached_property
+    def phases(self) -> list[float]:
+        """Random numbers 0 .. 1 of the joints."""
+        return self.draw()
+
+
+class Torque(NamedTuple):
+    """How MuJoCo's actuator turns its control into a force on a joint. By default the control is
+    the force.
+    """
+
+    gain: float = 1.0
+    drag: float = 0.0  # N m s/rad (N s/m)
+    most: float = math.inf  # bound on the control
+    limit: float = math.inf  # N m (N)
+
+
+@register_jitable
+def torque(drive, control, v):
+    """Return the force of an actuator, N m (N), on a joint at the speed v, rad/s (m/s)."""
+    force = drive.gain * min(max(control, -drive.most), drive.most) - drive.drag * v
+    return min(max(force, -drive.limit), drive.limit)
