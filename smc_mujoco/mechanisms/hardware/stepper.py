@@ -177,6 +177,7 @@ class Stepper(Actuator):
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The fields of a Pulsing."""
         return Pulsing._fields
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
