@@ -392,7 +392,8 @@ def find(name: str) -> Path:
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
         raise ScenarioError(
-            f"no scene file {name}: give the path of a .py file, or a name from smc-mujoco list"
+            f"no scene file {name}: give the path of a .py file, or a name from smc-mujoco list; "
+            "for a model of yours give smc-mujoco compare FILE.xml:joint --law pid"
         )
     return lookup("scene", name, scenes())
 

@@ -40,7 +40,7 @@ RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 CURES = {  # words of MuJoCo's message on a file -> what to do
-    "Error opening file": "put that file there",
+    "Error opening file": "put that file there, seen from the model's folder",
     "ASCII": "save that file as a binary STL",
     "mass and inertia": "give that body a mass and an inertia (<inertial>)",
     "not found Element 'plugin'": "load its library before (mujoco.mj_loadPluginLibrary)",

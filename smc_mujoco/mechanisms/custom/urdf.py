@@ -119,6 +119,7 @@ def _found(name: str, meshdir: Path, folder: Path) -> Path | None:
     """
     _, package, rest = name.rpartition("://")
     places = [meshdir / rest, meshdir / Path(rest).name, folder / rest]
+    rest = rest.lstrip("/")
     for above in (folder, *folder.parents) if package else ():
         places += [above / rest, above / rest.partition("/")[2]]
     for place in places:

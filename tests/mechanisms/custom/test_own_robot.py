@@ -95,7 +95,7 @@ def tetrahedron(size):
 MESH = '<{0}><geometry><mesh filename="{1}"/></geometry></{0}>'
 MESHES = {  # name in the URDF -> where the file lies, below the folder above the package
     "package://arm_description/meshes/link.stl": "arm_description/meshes/link.stl",
-    "package://other/link.STL": "other/link.STL",
+    "package:///other/link.STL": "other/link.STL",
     "../meshes/link.stl": "arm_description/meshes/link.stl",
     "link.stl": "arm_description/urdf/link.stl",
     "package://away/meshes/link.stl": "arm_description/urdf/link.stl",
@@ -150,6 +150,7 @@ def test_files_of_one_name_in_two_folders_are_two_meshes(tmp_path):
     assert np.ptp(model.mesh_vert[model.mesh_vertadr[solid[0]] :][:4], axis=0).max() < 0.2
 
 
+PARTS = ("motor.xml", "robot.xml")
 INERTIA = 'ixx="0.01" iyy="0.01" izz="0.001"'
 INERTIAL = re.findall("<inertial>.*?</inertial>", ARM, re.DOTALL)[1]
 CHANGED = {  # what differs from the URDF, and the words of the one sentence on it
@@ -196,3 +197,29 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path):
     follower, leader = data.joint("j1").qpos[0], data.joint("j2").qpos[0]
     assert abs(leader) > 0.02
     assert follower == pytest.approx(0.1 - 2.0 * leader, abs=2e-2)
+
+
+@pytest.mark.parametrize(
+    "compiler", ["", '<compiler meshdir="parts"/>', '<compiler assetdir="a"/>']
+)
+@pytest.mark.parametrize("included", [False, True])
+def test_a_missing_mesh_and_a_part_are_refused_with_cures_that_work(tmp_path, compiler, included):
+    asset = f'{compiler}<asset><mesh name="m" file="sub/m.stl"/></asset>'
+    (tmp_path / "robot.xml").write_text(
+        f"""<mujoco>{asset}<worldbody><body><joint name="j"/><geom type="mesh" mesh="m"/></body>
+        </worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
+    )
+    (tmp_path / "scene.xml").write_text(f'<mujoco><include file="{PARTS[included]}"/></mujoco>')
+    (tmp_path / "motor.xml").write_text(
+        '<mujoco><default><joint damping="1"/></default><actuator><motor joint="k"/></actuator></mujoco>'
+    )
+    file = tmp_path / ("scene.xml" if included else "robot.xml")
+    with pytest.raises(smc.ScenarioError, match="put that file there, seen from") as caught:
+        smc.plant_from(file, ["j"])
+    place = tmp_path / re.search(r"file '(.*?)'", str(caught.value))[1]
+    place.parent.mkdir(parents=True)
+    place.write_bytes(tetrahedron(0.1))
+    assert smc.plant_from(file, ["j"]).n == 1
+    if not included:
+        with pytest.raises(smc.ScenarioError, match=r"give scene.xml, which includes it"):
+            smc.plant_from(tmp_path / "motor.xml", ["k"])
