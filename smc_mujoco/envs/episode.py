@@ -4,9 +4,11 @@ environments.
 The physics are those of `smc.run`. An action is the command u of each driven channel, divided by
 the channel's limit and held for one control period; it saturates outside [-1, 1]. The limit is
 u_max, or that of the channel's own motor. An environment has no law, no noise, delay or encoder,
-and no disturbances, contacts or jumps.
+and no disturbances or jumps. With contacts an episode begins from the first drawn start that is
+clear of them.
 """
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -28,6 +30,7 @@ from smc_mujoco.simulation.python_functions import Failure, evaluate
 from smc_mujoco.simulation.scenario import Resolved, Scenario, stepped_by_mujoco
 from smc_mujoco.simulation.signals import PerChannel
 
+MAX_DRAWS = 100  # of a start that is clear of contacts
 FIELDS = (  # of a Scenario, that an environment accepts
     "duration",
     "control_period",
@@ -39,6 +42,7 @@ FIELDS = (  # of a Scenario, that an environment accepts
     "reference",
     "mismatch",
     "friction",
+    "contact",
     "mechanism",
     "actuator",
 )
@@ -186,6 +190,12 @@ class Setting:
         x0 and v0.
         """
         x = random.uniform(self.low, self.high)
+        if self.scenario.contact and "x0" not in (options or {}):
+            for _ in range(MAX_DRAWS):
+                with contextlib.suppress(ScenarioError):
+                    self.check_start(x)
+                    break
+                x = random.uniform(self.low, self.high)
         v = np.array(self.scenario.v0)
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
@@ -196,7 +206,14 @@ class Setting:
             else:
                 check_ranges(self.scenario.plant.name, self.scenario.plant.ranges, state)
                 x = state
+        if self.scenario.contact:
+            self.check_start(x)
         return x, v
+
+    def check_start(self, x: np.ndarray) -> None:
+        """Raise ScenarioError for positions in an obstacle, or beyond one."""
+        begun = dataclasses.replace(self.scenario, x0=tuple(x.tolist()))
+        models.check_path(self.model, begun)
 
     def reference(self, k: Any) -> np.ndarray:
         """Return all r, r' and r'' at sample k, (..., 3 m), as a copy."""

@@ -100,7 +100,8 @@ def tip_error(trace: Trace) -> np.ndarray:
 
 def knows_contacts(scenario: Scenario) -> bool:
     """Return whether a scenario has contacts whose forces follow from a trace."""
-    return bool(scenario.contact) and not _with_hidden_state(scenario)
+    meets = any(part.solid for part in scenario.contact)
+    return meets and not _with_hidden_state(scenario)
 
 
 def _with_hidden_state(scenario: Scenario) -> list:

@@ -416,11 +416,11 @@ def check_start(shared: Mechanism, scenario: Scenario) -> None:
         return
     model = copy.copy(shared.model)
     put_values(model, shared.model, scenario, 0)
-    _check_path(model, scenario)
+    check_path(model, scenario)
     shared.free_starts.add(inputs)
 
 
-def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
+def check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
     """Check that the path from the plant's default start, or from 0 if that is not free, crosses no
     obstacle.
     """

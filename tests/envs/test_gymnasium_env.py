@@ -3,6 +3,7 @@ are found.
 """
 
 import copy
+import dataclasses
 import pickle
 
 import numpy as np
@@ -22,6 +23,8 @@ from mujoco.batch import Batch, SimulationError  # noqa: E402
 
 from smc_mujoco.envs.gymnasium_env import PlantEnv  # noqa: E402
 from smc_mujoco.envs.vector_env import BatchEnv  # noqa: E402
+
+PENDULUM = dataclasses.replace(smc.plant("inverted_pendulum"), x0=(0.2,))
 
 # the physics are the benchmark's
 
@@ -79,6 +82,35 @@ def test_friction_and_drives_hold_in_a_batch_too(drives):
         for _ in range(100):
             o, *_ = many.step([[1.0], [0.0]])
             assert np.abs(o[0] - single.step([1.0])[0]).max() < 1e-12
+
+
+OBSTACLES = {
+    "stops": smc.Stops({"hinge": (-0.3, 0.3)}),
+    "wall": smc.Wall("pendulum", direction=(1, 0, 0), gap=0.01),
+    "ball": smc.Ball("pendulum", mass=0.3, height=0.001, radius=0.3),
+}
+
+
+@pytest.mark.parametrize("kind", OBSTACLES)
+def test_episodes_begin_clear_of_obstacles_and_meet_them_as_runs_do(kind):
+    part = OBSTACLES[kind]
+    changes = {"contact": part, "duration": 0.3}
+    many = BatchEnv(PENDULUM, 2, changes=changes)
+    single = PlantEnv(PENDULUM, changes=changes)
+    for seed in range(4):
+        many.reset(seed=seed)
+        o, _ = single.reset(seed=seed)
+        assert not part.meets(PENDULUM, o[:1])
+    for _ in range(299):
+        copies, *_ = many.step([[1.0], [1.0]])
+        o, *_ = single.step([1.0])
+    assert np.abs(copies[0] - o).max() < 1e-12
+    placed = PlantEnv(PENDULUM, changes=changes | {"x0": 0.2, "v0": 3.0})
+    trace = smc.run(run_of(placed.setting, LAW))
+    assert np.abs(trace.reaction).max() > 1.0
+    assert np.abs(driven_by_gym(placed, smc.envs.agent(LAW, placed)) - columns(trace)).max() < 1e-9
+    with pytest.raises(smc.ScenarioError, match="x0"):
+        single.reset(options={"x0": 2.0} if kind != "ball" else {"x0": 0.1})
 
 
 class Giving(Batch):

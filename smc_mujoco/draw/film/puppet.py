@@ -11,7 +11,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.states import shapes
-from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
+from smc_mujoco.mechanisms.hardware.part import OWN, ROTOR, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -120,6 +120,8 @@ class Puppet:
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
                 "give its bodies geoms, or its links <visual>"
             )
+        loose = ~links & ~plane & ~fixed
+        falling = np.array([model.body(i).name.startswith(OWN) for i in model.geom_bodyid])
         moved = []
         others = []
         for share in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
@@ -132,7 +134,8 @@ class Puppet:
             for x in places:
                 world = scene.boxes(*self.posed(track, data, x, float(trace.t[sample])))
                 moved.append(world[links].reshape(-1, 3))
-            others.append(world[~links & ~plane & ~fixed])
+            others.append(world[loose])
+            loose = loose & ~falling  # later it is anywhere
         sides = np.ptp(np.concatenate(moved), axis=0)
         points = np.concatenate([*moved, *self.lines(track, data, sides)])
         groups = model.geom_group.copy()
@@ -145,7 +148,7 @@ class Puppet:
         low = points.min(axis=0)
         high = points.max(axis=0)
         size = (high - low).max()
-        loose = np.concatenate(others)
+        around = np.concatenate(others)
         if not self.scenario.plant.on_stage:
             far = MAX_FIXED_SIZE * size
 
@@ -153,13 +156,13 @@ class Puppet:
                 inside = ((boxes < high + far) & (boxes > low - far)).all(axis=(1, 2))
                 return boxes[inside & (np.ptp(boxes, axis=1).max(axis=1) < far)]
 
-            loose = close(loose)
+            around = close(around)
             standing = close(standing)
             beside = NEAR_SHARE * size
             standing[..., :2] = standing[..., :2].clip(low[:2] - beside, high[:2] + beside)
         stand = STAND_SHARE * size
         standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
-        return np.concatenate([points, loose.reshape(-1, 3), standing.reshape(-1, 3)])
+        return np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
 
     def lines(
         self, track: MachineTrack, data: Sequence[mujoco.MjData], sides: np.ndarray

@@ -72,6 +72,7 @@ class Obstacle(Part):
     """Base of what a mechanism may touch."""
 
     loose: ClassVar[bool] = False  # whether it moves by itself
+    solid: ClassVar[bool] = True  # whether geoms meet it
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if the plant cannot have it."""

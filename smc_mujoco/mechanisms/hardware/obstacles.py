@@ -33,6 +33,7 @@ Placed = tuple[mujoco.MjModel, np.ndarray, list[int], int]
 # m per m/s (rad per rad/s) of a blow: chosen, so that 2 m/s goes 4 mm deep and leaves again within
 # 15 ms, in which the machine hardly moves, and in which MuJoCo's steps of 0.25 ms meet e within 5 %
 BLOW_DEPTH = 0.002
+INK = (0.16, 0.17, 0.20, 1.0)
 STEEL = (0.70, 0.72, 0.75, 1.0)
 RED = (0.85, 0.30, 0.20, 1.0)
 # m, chosen: of the slab that shows a wall, and of the ball that shows a stop
@@ -56,6 +57,8 @@ class Stops(Obstacle):
         without a channel.
       restitution: ratio of the speeds after and before a blow, 0 .. 0.98.
     """
+
+    solid = False
 
     limits: Mapping[str, Pair]
     restitution: Restitution = 0.3
@@ -86,7 +89,7 @@ class Stops(Obstacle):
             joint.solimp_limit[:2] = FIRM_IMPEDANCE
         for name, place in _posts(self, plant):
             before = spec.joint(name).parent.parent
-            _ball(before, "", POST_RADIUS, pos=place, rgba=STEEL, mass=0.0)
+            _ball(before, "", POST_RADIUS, pos=place, rgba=INK, mass=0.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         for name, ends in self.limits.items():
