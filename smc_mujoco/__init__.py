@@ -19,9 +19,8 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
         Backlash, DCMotor, Lag, Stops, Wall, Ball
     Compare: compare, which, tune, margins, grid, study, leaderboard, Table
     More to run and to look at: stream, scores, Scene, play, ScenarioError
-    Surfaces, estimators, policies: surface, surface_function, estimator, estimator_function,
-        policy
-    Signals and time: Signal, Jump, Clock
+    Surfaces, estimators, policies: surface, estimator, estimator_function, policy
+    Signals and time: Signal, Jump, Fault, Clock
     Analyse: worst_case, sensitivity, Uncertainty
     Benchmark: problem, results, rig
 

@@ -21,7 +21,6 @@ from smc_mujoco.control.from_text import law as law
 from smc_mujoco.control.law import law_function as law_function
 from smc_mujoco.control.law import laws as laws
 from smc_mujoco.control.surface import surface as surface
-from smc_mujoco.control.surface import surface_function as surface_function
 from smc_mujoco.draw.dot_plot import plot as plot
 from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import film as film
@@ -53,6 +52,7 @@ from smc_mujoco.simulation.run import stream as stream
 from smc_mujoco.simulation.scenario import Scenario as Scenario
 from smc_mujoco.simulation.signals import Clock as Clock
 from smc_mujoco.simulation.signals import Constant as Constant
+from smc_mujoco.simulation.signals import Fault as Fault
 from smc_mujoco.simulation.signals import Jump as Jump
 from smc_mujoco.simulation.signals import Noise as Noise
 from smc_mujoco.simulation.signals import Signal as Signal

@@ -1,5 +1,5 @@
-"""Gains from theory, and what to expect of a law: a linearised plant, chattering, a region of
-attraction.
+"""Gains from theory, surfaces of your own, and what to expect of a law: a linearised plant,
+chattering, a region of attraction.
 """
 
 from smc_mujoco.analysis.chattering import chattering
@@ -7,5 +7,6 @@ from smc_mujoco.analysis.harmonics import describing_function
 from smc_mujoco.analysis.region_of_attraction import basin
 from smc_mujoco.analysis.regulator import lqr
 from smc_mujoco.analysis.state_space import state_space
+from smc_mujoco.control.surface import surface_function
 
-__all__ = ["basin", "chattering", "describing_function", "lqr", "state_space"]
+__all__ = ["basin", "chattering", "describing_function", "lqr", "state_space", "surface_function"]

@@ -1,5 +1,5 @@
-"""Margins: the largest delay, disturbance, friction, mass ratio, noise and jitter that a law
-tolerates on a plant.
+"""Margins: the largest delay, disturbance, friction, mass ratio, noise, jitter and lost gain that a
+law tolerates on a plant.
 
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its
 scale (`conventions`). As a run starts at the scale, its envelope has then shrunk, which the paper's
@@ -41,7 +41,7 @@ from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Constant, Noise
+from smc_mujoco.simulation.signals import Constant, Fault, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
@@ -163,6 +163,7 @@ class Kind:
             base.friction,
             base.mismatch,
             base.jump,
+            base.fault,
             base.sensor,
             base.feedforward,
             not base.clock.regular,
@@ -228,6 +229,11 @@ def _with_missed(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, clock=dataclasses.replace(base.clock, missed=level))
 
 
+def _with_lost_gain(base: Scenario, level: float) -> Scenario:
+    """Return the scenario with a share of the actuators' gain lost from its start on."""
+    return dataclasses.replace(base, fault=Fault(at=0.0, gain=1.0 - level))
+
+
 MARGIN_KINDS: dict[str, Kind] = {
     "delay": Kind(
         label="input delay",
@@ -262,6 +268,12 @@ MARGIN_KINDS: dict[str, Kind] = {
         unit="1",
         levels=tuple(i / 10 for i in range(1, 10)),
         put=_with_missed,
+    ),
+    "gain": Kind(
+        label="share of the actuator's gain that is lost",
+        unit="1",
+        levels=tuple(i / 10 for i in range(1, 10)),
+        put=_with_lost_gain,
     ),
 }
 # those of the report, and the default
@@ -310,8 +322,9 @@ def margins(
 
     Args:
       plants, laws: names, or your own plants and laws, one or several.
-      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise", "jitter" and
-        "missed"; the last two, of the controller's clock, are left out by default.
+      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "jitter"
+        and "missed", of the controller's clock, and "gain", the share of its gain that every
+        actuator has lost from the start on, which are left out by default.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first
         look.

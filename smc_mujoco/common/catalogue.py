@@ -39,7 +39,7 @@ KINDS = {  # group of entry points -> what an entry is, and how one makes it
         "law of many joints",
         "a function decorated with smc.law_function(joint=True)",
     ),
-    "smc_mujoco.surfaces": ("surface", "a function decorated with smc.surface_function"),
+    "smc_mujoco.surfaces": ("surface", "a function decorated with smc.design.surface_function"),
     "smc_mujoco.estimators": (
         "velocity estimator",
         "a function decorated with smc.estimator_function",

@@ -110,6 +110,8 @@ def figure(
     traces = list(map(finite, traces))
     if panels is None:
         chosen = _default(traces, width)
+        if traces[0].scenario.tracks == "speed":  # x is x', which has no portrait
+            chosen = [name for name in chosen if name != "phase"]
         if size == "slide":
             chosen = [name for name in chosen if name in SLIDE_PANELS]
     else:

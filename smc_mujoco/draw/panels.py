@@ -145,9 +145,14 @@ class Panel(NamedTuple):
         plant = self.traces[0].scenario.plant
         unit = self.scale[1]
         single = len(group.channels) == 1
+        speed = group.unit.endswith("/s")
+        if name == "settling" and speed:
+            return f"|v − r′|{unit}"
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
         letter = WORDS.get(name, name)
+        if speed:
+            letter = {"x": "v", "e": "v − r′"}.get(name, letter)
         if not group.driven:
             letter = {"x": "q", "v": "q′"}.get(name, letter)
         if single and plant.pose and name == "u" and group.unit == "m":  # of an actuator
@@ -157,6 +162,8 @@ class Panel(NamedTuple):
         if name in WORDS or (name == "s" and plant.mixed):  # mixed plants have low panels
             return letter + ("" if group.driven else " on q") + unit
         kind = "position" if group.unit == "m" else "angle"
+        if speed:
+            kind = "speed"
         if not group.driven:
             kind = f"free {kind}"
         return f"{KINDS.get(name, kind)} {letter}{unit}"
@@ -386,6 +393,8 @@ def horizon(traces: Sequence[Trace]) -> float:
             last = max(last, *times[-1:], trace.diverged_at or 0.0)
             if trace.scenario.jump:
                 last = max(last, trace.scenario.jump.time)
+            if trace.scenario.fault:
+                last = max(last, trace.scenario.fault.at)
     if 0.0 < ZOOM * last < MAX_ZOOMED * whole:
         return ZOOM * last
     return whole

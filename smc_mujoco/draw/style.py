@@ -32,7 +32,7 @@ from smc_mujoco.metrics.conventions import Group, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Jump, Push
+from smc_mujoco.simulation.signals import Fault, Jump, Push
 from smc_mujoco.simulation.trace import Trace
 
 INK = "#1F2429"
@@ -370,8 +370,8 @@ def _setting(name: str, value: object) -> str:
     words = name.replace("_", " ")
     if name == "condition":
         return str(value).replace("_", " ")
-    if isinstance(value, Jump):
-        return f"jump at {value.time:g} s"
+    if isinstance(value, Jump | Fault):
+        return value.text
     if value is True:
         return words
     if value in (None, False, ()) and not isinstance(value, int | float):
@@ -426,6 +426,8 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
         events = set()
         if jump := trace.scenario.jump:
             events.add((jump.time, trace.scenario.plant.change(jump.factors)))
+        if fault := trace.scenario.fault:
+            events.add((fault.at, fault.words))
         for push in pushes([trace]) if blows else ():
             size = short(math.hypot(push.x, push.y, push.z))
             events.add((push.time, f"blow of {size} N for {1e3 * push.width:.3g} ms"))
@@ -543,7 +545,8 @@ def units(group: Group) -> dict[str, str]:
     x = group.unit
     u = group.effort.replace(" ", "·")
     force = EFFORT[x].replace(" ", "·")
-    return {"x": x, "v": f"{x}/s", "u": u, "s": f"{x}/s", "force": force}
+    speed = f"{x.removesuffix('/s')}/s"
+    return {"x": x, "v": speed, "u": u, "s": speed, "force": force}
 
 
 def plant_name(plant: Plant | str, short: bool = False) -> str:

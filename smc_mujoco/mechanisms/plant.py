@@ -25,7 +25,8 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
-EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
+# unit of a force, from that of x, or of x' in a speed loop
+EFFORT = {"rad": "N m", "m": "N", "rad/s": "N m", "m/s": "N"}
 # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 MAX_EXCESS = 1e-3
 TINY = 1e-12  # SI units; least value of a parameter above 0 that is neither a mass nor a length

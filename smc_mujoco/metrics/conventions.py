@@ -33,6 +33,8 @@ project:
 - travelling: r of a channel is a straight line throughout the last part and does not rest, as in a
   speed loop. Such a run has no settling time, and it arrives by its speed: |v - r'| is at most 10 %
   of the largest |r'|.
+- tracked: with tracks="speed" of the scenario, x and r stand for x' and r' in all of this, and
+  units of x for those of a speed.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
 - approach: the part of one channel's run towards one reference. It begins at t[0], and again at
   each sample at which r has jumped by more than the settling band; the side it comes from is the
@@ -96,10 +98,8 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
 
     A scenario's u may be a voltage.
     """
-    if isinstance(machine, Plant):
-        plant = machine
-    else:
-        plant = machine.plant
+    plant = machine if isinstance(machine, Plant) else machine.plant
+    rate = "/s" if getattr(machine, "tracks", "") == "speed" else ""
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -111,9 +111,21 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
             name += f" {unit}"
         effort = machine.efforts[channels[0]]
         found.append(
-            Group(name=name, unit=unit, effort=effort, driven=driven, channels=tuple(channels))
+            Group(
+                name=name, unit=unit + rate, effort=effort, driven=driven, channels=tuple(channels)
+            )
         )
     return tuple(found)
+
+
+def reference_rates(trace: Trace) -> np.ndarray:
+    """Return r' of all channels, (K+1, n); NaN where r is."""
+    from smc_mujoco.simulation.python_functions import evaluate
+
+    rates = np.where(np.isnan(trace.r), np.nan, 0.0)
+    for i, signal in enumerate(trace.scenario.references):
+        rates[:, i] += [evaluate(signal, t)[1] for t in trace.t.tolist()]
+    return rates
 
 
 def group_trace(trace: Trace, group: Group) -> Trace:
@@ -121,10 +133,12 @@ def group_trace(trace: Trace, group: Group) -> Trace:
 
     Its scenario has all channels.
     """
-    if len(group.channels) == trace.x.shape[1]:
-        return trace
     plant = trace.scenario.plant
     whole = trace.arrays()
+    if trace.scenario.tracks == "speed" and trace.x.shape[1] == plant.n:
+        whole |= {"x": trace.v, "r": reference_rates(trace)}
+    if len(group.channels) == trace.x.shape[1]:
+        return dataclasses.replace(trace, **whole) if whole["x"] is trace.v else trace
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
     columns = []
@@ -347,6 +361,8 @@ def last_part(trace: Trace) -> slice:
 
 def travels(trace: Trace) -> bool:
     """Return whether a channel's reference travels, see the module's conventions."""
+    if trace.scenario.tracks == "speed":  # r is a speed
+        return False
     steps = np.abs(np.diff(trace.r[last_part(trace)], axis=0))
     if len(steps) < 2:  # one step may be a jump
         return False
@@ -358,6 +374,8 @@ def resolution(scenario: Scenario, group: Group) -> float:
     """Return what the sensor of a group tells apart: the standard deviation of its noise, or half a
     count if that is larger.
     """
+    if scenario.tracks == "speed":
+        return scenario.noise.velocity
     if scenario.sensor is None:
         return scenario.noise.position
     return max(scenario.noise.position, scenario.sensor.quantum(group.unit == "rad") / 2)

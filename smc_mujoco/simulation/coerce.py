@@ -92,10 +92,12 @@ def _component(kind: str, value: object) -> Component:
     field = "velocity" if kind == "estimator" else kind
     if callable(value):
         made = ""
+        home = "design." if kind == "surface" else ""
         if kind == "law":
             made = ", or smc.law_from(function) for a policy of an observation"
         raise ScenarioError(
-            f"{field} is a bare {type(value).__name__}: give smc.{kind}_function(function){made}"
+            f"{field} is a bare {type(value).__name__}: "
+            f"give smc.{home}{kind}_function(function){made}"
         )
     raise ScenarioError(
         f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name"

@@ -64,6 +64,7 @@ from smc_mujoco.simulation.scenario import (
 from smc_mujoco.simulation.signals import (
     Clock,
     Constant,
+    Fault,
     Jump,
     Noise,
     OrnsteinUhlenbeck,
@@ -326,7 +327,7 @@ def _kinds() -> dict[str, Any]:
     from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
     from smc_mujoco.simulation import time_series  # noqa: F401
 
-    kinds: list[type] = [Noise, Jump, Clock, *subclasses(Part), *subclasses(Signal)]
+    kinds: list[type] = [Noise, Jump, Fault, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
     return {kind.__name__: kind for kind in kinds}
@@ -337,7 +338,7 @@ def _as_text(value: Any, defaults: bool = True) -> str:
     if isinstance(value, Component):
         gains = ", ".join(f"{gain}={number!r}" for gain, number in value.gains.items())
         return f"{value.name}({gains})"
-    if isinstance(value, Part | Signal | Noise | Jump | Clock):
+    if isinstance(value, Part | Signal | Noise | Jump | Fault | Clock):
         texts = []
         for name, content in stated(value, defaults).items():
             texts.append(f"{name}={_as_text(content, defaults)}")

@@ -564,13 +564,21 @@ def _arrive(sim, data, step):
     if there is one.
     """
     past = step - sim.delay
-    if past >= 0 and past % sim.steps == _late(sim, past // sim.steps):
+    arrives = past >= 0 and past % sim.steps == _late(sim, past // sim.steps)
+    faulty = step >= sim.fault_step
+    if faulty and sim.stuck != 0:
+        return
+    if arrives or step == sim.fault_step:  # a fault begins on what is held
         sim.arrived = 1
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
-            state_at(sim.states, i).delayed = buffer[i]
+            state = state_at(sim.states, i)
+            u = buffer[i] if arrives else state.delayed
+            if faulty:
+                u = sim.fault_gain * u + sim.fault_bias
+            state.delayed = u
             if sim.has_drives == 0 and i < (sim.driven if sim.mixer == 0 else sim.actuators):
-                data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
+                data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * u
 
 
 @njit(error_model="numpy", inline="always")

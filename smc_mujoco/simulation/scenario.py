@@ -54,6 +54,7 @@ from smc_mujoco.simulation.signals import (
     Clock,
     Constant,
     Dryden,
+    Fault,
     Impulse,
     Jump,
     Noise,
@@ -152,6 +153,9 @@ class Scenario:
         `plant.added`, such as a payload in kg, the value is added instead. `mass` is the plant's
         mass.
       jump: a change of the true plant's parameters in mid-run, or None.
+      fault: a Fault of the actuators in mid-run: less gain, a bias, or stuck. Or None.
+      tracks: "position", or "speed" for a speed loop: then x' is scored and drawn against r', so
+        that settling time, overshoot and bounds are of the speed. The law reads the same.
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
         also behind a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
@@ -216,6 +220,8 @@ class Scenario:
     velocity: Estimator | None = field(coerce.velocity, None)
     mismatch: Mapping[str, float] = field(coerce.mismatch, None)
     jump: Jump | None = field(coerce.instance(Jump, "smc.Jump(time=..., factors=...)"), None)
+    fault: Fault | None = field(coerce.instance(Fault, "smc.Fault(at=..., gain=...)"), None)
+    tracks: Annotated[str, OneOf(names=("position", "speed"))] = "position"
     seed: Seed = 0
     integrator: Annotated[str, OneOf(names=coerce.INTEGRATORS)] | None = None
     friction: tuple[Friction, ...] = field(coerce.friction, None)
@@ -249,6 +255,8 @@ class Scenario:
             velocity: Estimator | Template | str | None = None,
             mismatch: Mapping[str, float] | None = None,
             jump: Jump | None = None,
+            fault: Fault | None = None,
+            tracks: str = "position",
             seed: int = 0,
             integrator: str | None = None,
             friction: coerce.Frictions | None = None,
@@ -497,6 +505,13 @@ class Scenario:
         return round(self.input_delay / self.resolved.physics_step)
 
     @property
+    def fault_step(self) -> int:
+        """The first physics step with the fault; beyond all steps without one."""
+        if self.fault is None:
+            return 2**62
+        return math.ceil(self.fault.at / self.resolved.physics_step - 1e-6)
+
+    @property
     def jump_step(self) -> int:
         """The first physics step with the parameters of the jump; -1 without a jump."""
         if self.jump is None:
@@ -723,6 +738,11 @@ def check_clock(s: Resolved) -> None:
             f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s: give "
             "an earlier time"
         )
+    if s.fault is not None and s.fault.at >= s.duration:
+        raise ScenarioError(
+            f"fault at {s.fault.at:g} s comes after the end of the run at {s.duration:g} s: give "
+            "an earlier time"
+        )
     if s.sensor is not None:
         s.sensor.check(s.physics_step)
     s.clock.check(s.control_period, s.physics_step)
@@ -897,6 +917,10 @@ def check_free_body(s: Resolved) -> None:
     """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three
     numbers.
     """
+    if s.plant.pose and s.tracks == "speed":
+        raise ScenarioError(
+            f"{s.plant.name} is a free body, which tracks a pose: leave tracks='speed' out"
+        )
     if s.plant.base >= 0 and s.sensor is not None:
         raise ScenarioError(
             f"the base of {s.plant.name} is measured, and an Encoder is of joints: leave sensor out"

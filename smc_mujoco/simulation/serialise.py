@@ -21,12 +21,14 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.coerce import EVERY
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import Clock, Jump, Noise, PerChannel, Signal, Sum
+from smc_mujoco.simulation.signals import Clock, Fault, Jump, Noise, PerChannel, Signal, Sum
 
 FOLDERS = (
     "smc_mujoco.mechanisms.hardware",
     "smc_mujoco.simulation",
 )  # of the parts and signals of this package
+# Fields that older records lack -> their defaults, which are not written either
+LATER = {"fault": None, "tracks": "position"}
 RESOLVED = tuple(
     Resolved.__annotations__
 )  # fields that are None if left out, with a default that `resolved` has
@@ -35,7 +37,11 @@ RESOLVED = tuple(
 def describe(scenario: Scenario) -> dict:
     """Return a scenario as plain data that JSON represents without loss."""
     resolved = scenario.resolved
-    return {name: _data(getattr(resolved, name)) for name in Scenario.fields()} | {
+    fields = {name: _data(getattr(resolved, name)) for name in Scenario.fields()}
+    for name, default in LATER.items():
+        if fields[name] == default:
+            del fields[name]
+    return fields | {
         "versions": dict(_versions()),
         "source": scenario.law.source.about(),
         "condition": scenario.condition,
@@ -67,7 +73,7 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
                 "module": type(value).__module__,
                 "values": values,
             }
-        case Noise() | Clock() | Jump():
+        case Noise() | Clock() | Jump() | Fault():
             return {name: _data(item) for name, item in vars(value).items() if item is not None}
         case Mapping():
             return dict(value)
@@ -94,7 +100,8 @@ def restore(data: dict, plant: Plant | None = None) -> Scenario:
     `plant`: that of the scenario, if it is known; one that a script defines cannot be found by its
     name.
     """
-    fields = {name: data[name] for name in Scenario.fields()} | ({"plant": plant} if plant else {})
+    fields = {name: (LATER | data)[name] for name in Scenario.fields()}
+    fields |= {"plant": plant} if plant else {}
     its = {name: value for name, value in fields.items() if value and value is not plant}
     fields |= {name: RESTORERS.get(name, _restored)(value) for name, value in its.items()}
     fields["law"] = components.law(data["law"], data.get("source"))
@@ -168,4 +175,5 @@ RESTORERS: Mapping[str, Callable[[Any], Any]] = {  # field -> inverse of `_data`
     "noise": lambda data: Noise(**{name: _restored(item) for name, item in data.items()}),
     "clock": lambda data: Clock(**data),
     "jump": lambda data: Jump(**data),
+    "fault": lambda data: Fault(**data),
 }

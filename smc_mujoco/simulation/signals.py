@@ -23,7 +23,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from smc_mujoco.common.constraints import Natural, Number, Positive, constrain
+from smc_mujoco.common.constraints import Boolean, Natural, Number, Positive, constrain
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation import philox
@@ -708,6 +708,50 @@ class Jump:
     def __post_init__(self):
         constrain(self)
         object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
+
+    @property
+    def text(self) -> str:
+        """When it is, in words."""
+        return f"jump at {self.time:g} s"
+
+
+@dataclasses.dataclass(frozen=True)
+class Fault:
+    """A fault of the actuators that begins at time `at`, s, and stays.
+
+    Each gives `gain` times its command plus `bias`, N m, N or the unit of u; or, if `stuck`, what
+    it was told last. The law does not know. Drives come after it: behind a Lag the force follows.
+    """
+
+    at: Natural
+    gain: Annotated[float, Number(low=-10.0, high=10.0)] = 1.0
+    bias: Annotated[float, Number(low=-1e9, high=1e9)] = 0.0
+    stuck: Boolean = False
+
+    def __post_init__(self):
+        constrain(self)
+        if self.stuck and (self.gain, self.bias) != (1.0, 0.0):
+            raise ScenarioError(
+                f"Fault is stuck with gain {self.gain:g} and bias {self.bias:g}: leave those out, "
+                "as what is stuck keeps its last command"
+            )
+
+    @property
+    def words(self) -> str:
+        """What it does, such as "actuator × 0.5"."""
+        if self.stuck:
+            return "actuator stuck"
+        said = []
+        if self.gain != 1.0:
+            said.append(f"actuator × {self.gain:g}")
+        if self.bias:
+            said.append(f"actuator {'−' if self.bias < 0.0 else '+'} {abs(self.bias):g}")
+        return ", ".join(said) or "no fault"
+
+    @property
+    def text(self) -> str:
+        """What it does and when, in words."""
+        return f"{self.words} at {self.at:g} s"
 
 
 def parameter_factors(name: str, value: object) -> Frozen[float]:

@@ -168,7 +168,7 @@ import smc_mujoco as smc
 @smc.law_function(joint=True, gains={"k": 2.0})
 def many_joint(y, gains, memory):
     return -gains.k * y.e, y.e
-@smc.surface_function(gains={"k": 2.0})
+@smc.design.surface_function(gains={"k": 2.0})
 def many_surface(y, gains, memory):
     return y.de + gains.k * y.e, -gains.k * y.de
 @smc.estimator_function(gains={"k": 2.0})
@@ -277,7 +277,7 @@ def broken(install):
         "bad",
         {"laws": {name: value for name, (value, _) in BROKEN.items()} | {"good": "bad_good:good"}},
         bad_law=LAW.replace("NAME", "renamed")
-        + "number = 3\nflat = smc.surface_function(lambda y, gains, memory: (y.e, 0.0))",
+        + "number = 3\nflat = smc.design.surface_function(lambda y, gains, memory: (y.e, 0.0))",
         bad_raises="1 / 0",
         bad_shy="class Shy(Exception):\n    def __str__(self):\n        raise self\nraise Shy",
         bad_exits="raise SystemExit(3)",

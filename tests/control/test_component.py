@@ -124,7 +124,9 @@ def test_a_gain_may_have_any_name(gain):
 
 @pytest.mark.parametrize("value", [5, "k", 2.5, np.float64(3.0), {"a": 5}], ids=str)
 @pytest.mark.parametrize("option", ["positive", "nonnegative", "plants", "conditions", "advice"])
-@pytest.mark.parametrize("kind", [smc.law_function, smc.surface_function, smc.estimator_function])
+@pytest.mark.parametrize(
+    "kind", [smc.law_function, smc.design.surface_function, smc.estimator_function]
+)
 def test_an_option_of_another_type_is_refused_at_the_decorator(kind, option, value, refused):
     if option == "plants" and (kind is not smc.law_function or isinstance(value, dict)):
         return

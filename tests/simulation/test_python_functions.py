@@ -66,7 +66,7 @@ def of_joints(y, gains, memory):
     return forces - gains.lam * np.tanh(s / 0.1) - memory[:, 0], s
 
 
-@smc.surface_function(gains={"c": 2.0})
+@smc.design.surface_function(gains={"c": 2.0})
 def sliding(y, gains, memory):
     """A surface."""
     return in_python(y.de) + gains.c * y.e, -gains.c * y.e

@@ -523,7 +523,7 @@ class SourNoise(smc.Signal):
             "estimator 'sour_estimator' raised ValueError (sour)",
         ),
         (
-            {"surface": smc.surface_function(sour_surface)()},
+            {"surface": smc.design.surface_function(sour_surface)()},
             "surface 'sour_surface' raised ValueError (sour)",
         ),
         ({"reference": Sour()}, "Sour raised ValueError (sour)"),

@@ -41,6 +41,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = ()) -> str:
         "it has a sensor": s.sensor is not None,
         f"its integrator is {s.integrator}": s.integrator != "RK4",
         "a law of many joints": s.law.joint,
+        "an actuator fails": s.fault is not None,
         "a disturbance acts on a body": any(
             d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
         ),

@@ -148,6 +148,10 @@ class Stepper(Actuator):
         return self.ramp
 
     def suits(self, s: Any) -> None:
+        if s.fault is not None:
+            raise ScenarioError(
+                "a Stepper takes an acceleration, and a Fault is of a force: leave one of them out"
+            )
         if len([part for part in s.actuator if part.drives]) > 1:
             raise ScenarioError(
                 f"a Stepper is behind {shown(s.actuator[0])}, and its firmware takes numbers, no "

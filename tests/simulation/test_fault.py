@@ -1,0 +1,95 @@
+"""Faults of actuators in mid-run, against closed forms of a mass that a constant force moves."""
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+
+MASS = 2.0  # kg
+SLIDE = f"""<mujoco model="mass"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
+<geom size=".1" mass="{MASS}" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="slide" ctrlrange="-50 50"/></actuator></mujoco>"""
+
+
+@smc.law_function(gains={"rate": 3.0})
+def ramp(y, gains, memory):
+    """A force that grows with time, held between samples."""
+    return gains.rate * y.t, y.e
+
+
+def ran(fault, law=ramp, **fields):
+    plant = smc.plant_from(SLIDE, ["slide"])
+    return smc.run(smc.Scenario(plant=plant, law=law, duration=1.0, fault=fault, **fields))
+
+
+def impulse(t, at, gain, bias, stuck, period):
+    """Integral of the faulty force up to each sample, N s, in sums over short steps."""
+    h = period / 400.0
+    times = (np.arange(round(t[-1] / h)) + 0.5) * h
+    told = 3.0 * np.floor(times / period + 1e-9) * period
+    last = 3.0 * np.floor((at - 1e-9) / period) * period
+    force = np.where(times < at, told, last if stuck else gain * told + bias)
+    total = np.concatenate([[0.0], np.cumsum(force) * h])
+    return total[np.round(t / h).astype(int)]
+
+
+@pytest.mark.parametrize(
+    ("gain", "bias", "stuck"),
+    [(0.5, 0.0, False), (0.0, 0.0, False), (1.0, -0.7, False), (0.4, 1.1, False), (1, 0, True)],
+)
+@pytest.mark.parametrize("at", [0.0, 0.5, 0.3125], ids=["start", "at a sample", "between"])
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+def test_the_speed_is_the_integral_of_the_faulty_force(gain, bias, stuck, at, integrator):
+    fault = smc.Fault(at=at, gain=gain, bias=bias, stuck=stuck)
+    trace = ran(fault, control_period=5e-3, physics_step=2.5e-4, integrator=integrator)
+    expected = impulse(trace.t, at, gain, bias, stuck, 5e-3) / MASS
+    if not (stuck and at == 0.0):  # nothing was told before
+        assert np.allclose(trace.v[:, 0], expected, rtol=0.0, atol=2e-5)
+    assert np.allclose(trace.u[:, 0], 3.0 * trace.t)  # the law does not know
+
+
+@pytest.mark.parametrize("gain", [0.5, 0.2])
+def test_behind_a_lag_the_force_follows_the_faulty_command(gain):
+    trace = ran(smc.Fault(at=0.5, gain=gain), actuator=smc.Lag(0.02))
+    late = trace.t >= 0.7
+    lagged = gain * 3.0 * (trace.t[late] - 0.02)
+    assert np.allclose(trace.force[late, 0], lagged, atol=0.01)
+
+
+def test_a_fault_is_kept_told_and_part_of_a_condition(tmp_path):
+    fault = smc.Fault(at=0.5, gain=0.5)
+    trace = ran(fault)
+    assert smc.load(trace.save(tmp_path / "a.npz")).scenario.fault == fault
+    named = smc.condition("half", fault=fault)
+    assert smc.run(smc.grid("duffing", "pid", [named], duration=1.0))[0].scenario.fault == fault
+    titles = []
+    for ax in smc.figure(trace).axes:
+        titles += [text.get_text() for text in ax.texts]
+    assert any("0.5" in title for title in titles)
+
+
+@pytest.mark.parametrize("kp", [15.0, 40.0])
+@pytest.mark.parametrize("x0", [0.5, 0.8])
+def test_the_gain_that_may_be_lost_is_what_holds_the_start(kp, x0):
+    @smc.law_function(gains={"kp": 15.0, "kd": 5.0})
+    def pd(y, gains, memory):
+        return -gains.kp * y.e - gains.kd * y.de, y.e
+
+    weight = 0.5 * 9.81 * 0.5
+    found = smc.margins("inverted_pendulum", pd(kp=kp), "gain", starts=smc.starts(x0=x0))
+    held = 1.0 - weight * np.sin(x0) / 6.0  # u_max is 6 N m
+    assert found[0].value == pytest.approx(held, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"at": -1.0}, {"at": 0.1, "gain": np.nan}, {"at": 0.1, "stuck": True, "gain": 0.5}],
+)
+def test_faults_that_make_no_sense_are_refused(fields):
+    with pytest.raises(smc.ScenarioError, match="Fault"):
+        smc.Fault(**fields)
+
+
+def test_a_fault_after_the_end_is_refused():
+    with pytest.raises(smc.ScenarioError, match="earlier"):
+        ran(smc.Fault(at=3.0))
