@@ -94,6 +94,12 @@ class Loop:
                 "chattering is not predicted for a Stepper, whose queue is no lag: measure it in "
                 "a run"
             )
+        for part in s.actuator:
+            if part.force is not None:
+                raise ScenarioError(
+                    f"chattering is not predicted behind {type(part).__name__}, whose force is a "
+                    "function of your own: measure it in a run"
+                )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 raise ScenarioError(

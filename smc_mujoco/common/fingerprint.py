@@ -19,6 +19,7 @@ import math
 import pickle
 import struct
 import sys
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
@@ -51,6 +52,7 @@ VERSIONED = {
     "scipy",
     "mujoco",
 }  # identified by their version
+LOCKS = type(threading.Lock()), type(threading.RLock())  # which no result depends on
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
 
@@ -177,6 +179,8 @@ class _CodePickler(pickle._Pickler):
         obj = _as_written(obj)
         if isinstance(obj, ModuleType):
             return f"module {obj.__name__}"
+        if isinstance(obj, LOCKS):
+            return "lock"
         if isinstance(obj, AtAddress):
             return f"machine code {obj.digest}"
         if _versioned(obj):

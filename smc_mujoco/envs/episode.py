@@ -97,11 +97,12 @@ class Setting:
             raise ScenarioError(
                 "environments have no Stepper, whose queue the callback keeps: take another drive"
             )
-        for part in [part for part in self.scenario.friction if part.force is not None]:
-            name = type(part).__name__
-            raise ScenarioError(
-                f"friction {name} is a formula, which environments lack: give Coulomb or LuGre"
-            )
+        for part in (*self.scenario.friction, *self.scenario.actuator):
+            if part.force is not None:
+                raise ScenarioError(
+                    f"{type(part).__name__} is a function that the callback evaluates, which "
+                    "environments lack: give Coulomb, LuGre or another drive"
+                )
         if math.inf in self.scenario.limits:
             raise ScenarioError(
                 "u_max is inf: give a finite one, because actions are fractions of it"

@@ -25,7 +25,7 @@ from typing import Annotated, Any
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.text import counted
-from smc_mujoco.mechanisms.hardware.moments import JointState, Run
+from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
@@ -150,7 +150,7 @@ def _made(
     function: Callable,
 ) -> Any:
     name = function.__name__
-    taken = set(dir(base)) | set(JointState._fields)
+    taken = set(dir(base))
     fields = []
     for key, value in numbers.items():
         if not (isinstance(key, str) and key.isidentifier()) or key in taken:

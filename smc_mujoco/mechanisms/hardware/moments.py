@@ -24,7 +24,6 @@ exert in the channel's state.
 """
 
 import dataclasses
-import functools
 import math
 from collections import namedtuple
 from collections.abc import Callable, Sequence
@@ -191,17 +190,17 @@ class Run:
     load: Callable[[], Any]
     draw: Callable[[], list[float]]
 
-    @functools.cached_property
+    @property
     def model(self) -> Any:
-        """The MjModel with the scenario's values."""
+        """The MjModel with the scenario's values, a new copy."""
         return self.load()
 
-    @functools.cached_property
+    @property
     def inertia(self) -> list[float]:
         """Inertia of each joint at the start, alone, kg m^2 (kg)."""
         return self.model.dof_M0[self.dofs].tolist()
 
-    @functools.cached_property
+    @property
     def phases(self) -> list[float]:
         """Random numbers 0 .. 1 of the joints."""
         return self.draw()

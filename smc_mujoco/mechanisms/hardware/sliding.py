@@ -104,10 +104,8 @@ class Sliding(JointForce):
         return _at_stages(type(self).value)
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
-        rows = []
-        for i, row in enumerate(super().numbers(run)):
-            rows.append([*row, *self.bristle(i, run.inertia[i])])
-        return rows
+        inertia = run.inertia
+        return [(*self.parameters(i), *self.bristle(i, inertia[i])) for i in range(run.n)]
 
     def bristle(self, i: int, inertia: float) -> tuple[float, float]:
         """Return stiffness and critical damping of channel i when it sticks.
