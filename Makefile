@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build report gains gallery bench lock setup
+.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build report gains gallery bench gpu lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -81,11 +81,17 @@ gallery: setup ## the clips that README shows
 bench: ## speed, beside bare MuJoCo and other packages
 	@./setup.sh requirements-bench.lock
 	$(BIN)/python benchmarks/speed.py
+	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/realistic.py
 	$(BIN)/python benchmarks/laws.py
 	$(BIN)/python benchmarks/study.py --quick
 	$(BIN)/python benchmarks/memory.py
 	$(BIN)/python benchmarks/agents.py --quick
+
+gpu: ## the fast engine on a CUDA device, beside the processor; "no device" elsewhere
+	@test -x $(BIN)/python || ./setup.sh
+	@! command -v nvidia-smi >/dev/null || $(BIN)/python -c "import numba_cuda" || $(BIN)/python -m pip install --quiet -e ".[gpu]"
+	$(BIN)/python benchmarks/engine.py --cuda
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }

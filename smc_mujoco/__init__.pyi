@@ -42,7 +42,6 @@ from smc_mujoco.mechanisms.hardware.obstacles import Stops as Stops
 from smc_mujoco.mechanisms.hardware.obstacles import Wall as Wall
 from smc_mujoco.mechanisms.plant import plant as plant
 from smc_mujoco.mechanisms.plant import plants as plants
-from smc_mujoco.metrics.catalogue import score as score
 from smc_mujoco.metrics.catalogue import scores as scores
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.grid import grid as grid
@@ -63,6 +62,7 @@ from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.scene import Scene as Scene
+from smc_mujoco.studies.score import score as score
 from smc_mujoco.studies.sensitivity import sensitivity as sensitivity
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table

@@ -186,7 +186,8 @@ class Table:
             counted(len(set(self.column(name).tolist())), name)
             for name in ("plant", "law", "condition")
         )
-        return f"Table({len(self)} runs: {', '.join(counts)})"
+        checked = (self.data.schema.metadata or {}).get(b"checked", b"").decode()
+        return f"Table({len(self)} runs: {', '.join(counts)}{checked and '; '}{checked})"
 
     def _repr_html_(self) -> str:
         names = []
@@ -260,6 +261,8 @@ class Table:
         """Return the scenario of row i."""
         if not isinstance(i, int | np.integer) or not -len(self) <= i < len(self):
             raise ScenarioError(f"the table has no row {shown(i)}: it has {len(self)}, from 0 on")
+        if "scenario" not in self.data.column_names:
+            raise ScenarioError("this table has scores alone: take row i of the scenarios it is of")
         row = self.data.slice(int(i) % len(self), 1)
         if known := self.known.get(row["hash"][0].as_py()):
             return known

@@ -8,7 +8,10 @@ import numpy as np
 
 from smc_mujoco.analysis.engine.form import (
     ACTIVE,
+    FAILED_STEP,
+    FAILURE,
     PARAMETERS,
+    SCORES,
     STREAM,
     Form,
     Part,
@@ -21,8 +24,10 @@ from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND
 from smc_mujoco.simulation.prepare import known_values, pause_phase, references
+from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
+from smc_mujoco.simulation.state import FINE
 
 TRANSIENT = 0.25  # of the run, which rms_error leaves out
 
@@ -129,6 +134,26 @@ class Group:
             self._fill(row, s)
         self.tables = np.concatenate([*self._points, np.zeros(1)])
 
+    def run(self, rows: np.ndarray, threads: int | None = None, device: str = "cpu") -> np.ndarray:
+        """Return the scores of rows, (runs, SCORES + metrics); NaN after a failure."""
+        if device == "cpu":
+            from smc_mujoco.analysis.engine import cpu
+
+            return cpu.run(self.form, rows, self.tables, cores(threads))
+        from smc_mujoco.analysis.engine import gpu
+
+        return gpu.run(self.form, rows, self.tables)
+
+    def scored(self, device: str, threads: int | None) -> list[tuple[list[float], float | None]]:
+        """Return the metrics of every scenario, and the time of its failure, s, or None."""
+        found = []
+        for s, scores in zip(self.scenarios, self.run(self.rows, threads, device), strict=True):
+            time = None
+            if scores[FAILURE] != FINE:
+                time = float(scores[FAILED_STEP] * s.physics_step)
+            found.append((scores[SCORES:].tolist(), time))
+        return found
+
     def _put(self, row: np.ndarray, name: str, values: Any) -> None:
         first = self.places.at[name]
         row[first : first + np.size(values)] = values
@@ -155,7 +180,7 @@ class Group:
             "missed": s.clock.missed,
             "pause": pause,
             "pause_samples": pause_samples,
-            "pause_phase": pause_phase(s),
+            "pause_phase": pause_phase(s) if pause else 0,
             "band": SETTLING_BAND * (start or 1.0),
             "early": np.searchsorted(t, TRANSIENT * (1.0 - ROUNDING) * t[-1]),
             "late": np.searchsorted(t, t[-1] - LAST_PART * (1 + ROUNDING) * t[-1]),

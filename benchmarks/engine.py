@@ -1,0 +1,139 @@
+"""Runs a second of the fast engine: on the processor, beside MuJoCo, and on a CUDA device.
+
+    python benchmarks/engine.py          # "no device" where there is none
+    python benchmarks/engine.py --cuda   # the checks of the device alone: make gpu
+
+Each case is one law on one plant for 10 s, with noise: runs differ in their starts and seeds. The
+device's scores are compared with the processor's on 1,000 runs, and the processor's with MuJoCo's
+on 20. Ratios are of times in one run of this script.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES
+from smc_mujoco.analysis.engine.group import Group
+from smc_mujoco.metrics import catalogue
+from smc_mujoco.simulation.run import cores
+
+METRICS = ("settling_time", "itae", "tv_rate")
+LAW = smc.law("super_twisting", k1=8.0, k2=10.0, c=3.0)
+NOISE = smc.Noise(1e-3, 5e-3)
+CASES = {  # and how many runs a second an H100 should make
+    "pendulum": (1_000_000, {"plant": "inverted_pendulum"}),
+    "five pendulums": (300_000, {"plant": "inverted_pendulum_network"}),
+    "delay, Levant's estimator, a sine": (
+        200_000,
+        {
+            "plant": "inverted_pendulum",
+            "input_delay": 3e-3,
+            "velocity": "levant",
+            "disturbance": smc.Sine(0.2, 5.0),
+        },
+    ),
+}
+COMPARED = 1000
+AT_ONCE = 2**20  # on the device
+BY_MUJOCO = 20
+DURATION = 10.0
+
+
+def scenario(fields: dict, seed: int = 0) -> smc.Scenario:
+    return smc.Scenario(law=LAW, noise=NOISE, duration=DURATION, u_max=6.0, seed=seed, **fields)
+
+
+def rows_of(group: Group, count: int) -> np.ndarray:
+    """Rows of runs that differ in seed and start."""
+    rows = np.repeat(group.rows[:1], count, axis=0)
+    x0, band, seed = group.places.of("x0", "band", "seed")
+    n = group.form.n
+    starts = np.random.default_rng(1).uniform(0.2, 0.6, (count, n))
+    rows[:, x0 : x0 + n] = starts
+    rows[:, band] = 0.02 * starts.max(axis=1)
+    rows[:, seed] = np.arange(count)
+    return rows
+
+
+def rate(run: Callable[[], object], count: int) -> float:
+    """Runs a second."""
+    began = time.perf_counter()
+    run()
+    return count / (time.perf_counter() - began)
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Relative differences of scores, of each run the largest, ascending; inf equals inf."""
+    alike = (one == other) | (np.isnan(one) & np.isnan(other))
+    with np.errstate(invalid="ignore"):
+        differences = np.abs(one - other) / np.maximum(np.abs(other), 1e-12)
+    return np.sort(np.where(alike, 0.0, differences)[:, SCORES:].max(axis=1))
+
+
+def on_processor(fields: dict) -> str:
+    """Runs a second in all threads, how they scale, MuJoCo's, and how far apart the scores are."""
+    group = Group([scenario(fields, seed) for seed in range(BY_MUJOCO)], METRICS)
+    rows = rows_of(group, COMPARED)
+    found = group.run(group.rows)
+    in_one = rate(lambda: group.run(rows, threads=1), COMPARED)
+    in_all = rate(lambda: group.run(rows), COMPARED)
+    traces = []
+    by_mujoco = rate(lambda: traces.extend(smc.run(group.scenarios)), BY_MUJOCO)
+    expected = found.copy()
+    for row, trace in zip(expected, traces, strict=True):
+        row[SCORES:] = [getattr(catalogue, metric)(trace) for metric in METRICS]
+    return (
+        f"{in_all:9,.0f}  {in_all / in_one:5.2f}x  {by_mujoco:8,.0f}  {in_all / by_mujoco:5.1f}x  "
+        f"{apart(found, expected)[-1]:.0e}"
+    )
+
+
+def on_device(fields: dict, wanted: int) -> str:
+    """Runs a second on the device, beside the processor, and how far apart the scores are."""
+    group = Group([scenario(fields)], METRICS)
+    few = rows_of(group, COMPARED)
+    many = rows_of(group, AT_ONCE)
+    found = group.run(few, device="cuda")
+    expected = group.run(few)
+    by_processor = rate(lambda: group.run(few), COMPARED)
+    by_device = rate(lambda: group.run(many, device="cuda"), AT_ONCE)
+    alike = (found[:, FAILURE] == expected[:, FAILURE]).mean()
+    differences = apart(found, expected)
+    return (
+        f"{by_processor:9,.0f}  {by_device:11,.0f}  {wanted:9,}  {by_device / by_processor:5.0f}x  "
+        f"{100 * alike:5.1f} %  {differences[COMPARED // 2]:.0e}  {differences[-1]:.0e}"
+    )
+
+
+def main() -> None:
+    device = _device()
+    print(f"{device or 'no device'}; {cores(None)} threads; runs of {DURATION:g} s a second")
+    cuda = "--cuda" in sys.argv
+    if cuda and not device:
+        return
+    if cuda:
+        print("case, threads, device, wanted, ratio; fail alike, scores apart: median, largest")
+    else:
+        print("case, threads, to one thread, MuJoCo, ratio; scores apart")
+    for name, (wanted, fields) in CASES.items():
+        cells = on_device(fields, wanted) if cuda else on_processor(fields)
+        print(f"{name:34}{cells}", flush=True)
+
+
+def _device() -> str:
+    """The name of the CUDA device, or ""."""
+    try:
+        from smc_mujoco.analysis.engine import gpu
+    except ImportError:
+        return ""
+    if not gpu.cuda.is_available():
+        return ""
+    name = gpu.cuda.get_current_device().name
+    return name.decode() if isinstance(name, bytes) else name
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""The loop of a form on a CUDA device, a thread a run.
+
+It needs the package numba-cuda: `pip install 'smc-mujoco[gpu]'`.
+"""
+
+# pyright: reportMissingImports=false, reportCallIssue=false, reportAttributeAccessIssue=false
+import functools
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.extras import MissingPackageError, missing
+
+if sentence := missing("gpu", "device 'cuda'", "numba_cuda"):
+    raise MissingPackageError(sentence)
+if not hasattr(np, "row_stack"):  # numba-cuda 0.30 asks for it, and numpy 2.5 has none
+    setattr(np, "row_stack", np.vstack)  # noqa: B010
+
+from numba import cuda, float64, njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
+from smc_mujoco.analysis.engine.loop import simulation
+
+THREADS = 128  # in a block
+PIECE = 2**18  # runs in a call of the device: they fill an H100, and Ctrl-C waits for them
+ARGUMENTS = types.void(float64[:, ::1], float64[::1], float64[:, ::1])
+
+
+@intrinsic
+def _pointer(typingctx, array):
+    """Return a pointer to the numbers of an array."""
+
+    def codegen(context, builder, signature, args):
+        return cgutils.create_struct_proxy(array)(context, builder, args[0]).data
+
+    return types.CPointer(types.float64)(array), codegen
+
+
+def kernel(form: Form) -> Any:
+    """Return the kernel of a form in Python, (rows, tables, scores)."""
+    simulate = simulation(form, njit(error_model="numpy"))
+    row_size = row_places(form).size
+    work_size = work_places(form).size
+    score_size = SCORES + len(form.metrics)
+
+    def runs(rows, tables, scores):
+        run = cuda.grid(1)
+        if run >= len(rows):
+            return
+        row = cuda.local.array(row_size, float64)
+        work = cuda.local.array(work_size, float64)
+        kept = cuda.local.array(score_size, float64)
+        for i in range(row_size):
+            row[i] = rows[run, i]
+        for i in range(score_size):
+            kept[i] = np.nan
+        simulate(_pointer(row), _pointer(tables), _pointer(work), _pointer(kept), _pointer(kept))
+        for i in range(score_size):
+            scores[run, i] = kept[i]
+
+    return runs
+
+
+def ptx(form: Form, capability: tuple[int, int] = (9, 0)) -> str:
+    """Return the code of a form for devices of a compute capability. No device is needed."""
+    return cuda.compile_ptx(kernel(form), ARGUMENTS, cc=capability)[0]
+
+
+@functools.lru_cache(maxsize=64)
+def compiled(form: Form) -> Any:
+    """Return the compiled kernel of a form, for the device of this machine."""
+    if not cuda.is_available():
+        raise ScenarioError("this machine has no CUDA device: give device 'cpu'")
+    return cuda.jit(ARGUMENTS)(kernel(form))
+
+
+def run(form: Form, rows: np.ndarray, tables: np.ndarray) -> np.ndarray:
+    """Return the scores of runs, as `cpu.run` does."""
+    made = compiled(form)
+    scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)
+    points = cuda.to_device(tables)
+    for first in range(0, len(rows), PIECE):
+        part = cuda.to_device(np.ascontiguousarray(rows[first : first + PIECE]))
+        found = cuda.device_array((len(part), scores.shape[1]))
+        made[-(-len(part) // THREADS), THREADS](part, points, found)
+        scores[first : first + PIECE] = found.copy_to_host()
+    return scores

@@ -1,0 +1,63 @@
+"""The fast engine's code for CUDA, which libnvvm makes without a device."""
+
+import importlib.util
+import types
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.engine import group
+from smc_mujoco.analysis.engine.scores import METRICS
+from smc_mujoco.control.law import catalogue
+
+HERE = importlib.util.find_spec("numba_cuda") is not None
+with_cuda = pytest.mark.skipif(
+    not HERE, reason="numba-cuda is missing: pip install 'smc-mujoco[gpu]'"
+)
+PLANTS = ("duffing", "inverted_pendulum", "van_der_pol", "pendulum_network")
+LAWS = [name for name in catalogue() if not catalogue()[name].plants]
+FULL = {
+    "noise": smc.Noise(1e-3, 5e-3),
+    "input_delay": 3e-3,
+    "velocity": "levant",
+    "disturbance": (smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.1, 0.1)),
+    "clock": smc.Clock(missed=0.1),
+    "jump": smc.Jump(0.5, {"mass": 2.0}),
+}
+
+
+def code(monkeypatch, plant, law, **fields):
+    """The code of a run for compute capability 9.0."""
+    from numba.cuda import dispatcher
+
+    from smc_mujoco.analysis.engine import gpu
+
+    device = types.SimpleNamespace(compute_capability=(9, 0))
+    monkeypatch.setattr(dispatcher, "get_current_device", lambda: device)
+    case = smc.Scenario(plant=plant, law=law, duration=1.0, **fields)
+    return gpu.ptx(group.Group([case], tuple(METRICS)).form)
+
+
+@with_cuda
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", PLANTS)
+def test_every_part_compiles_for_a_device(monkeypatch, plant):
+    assert ".entry" in code(monkeypatch, plant, "super_twisting", **FULL)
+
+
+@with_cuda
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+def test_every_law_compiles_for_a_device(monkeypatch, law):
+    for plant in PLANTS:
+        assert ".entry" in code(monkeypatch, plant, law)
+
+
+def test_without_the_package_a_device_is_refused_in_one_sentence(monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "numba_cuda" else find(name)
+    )
+    case = smc.Scenario(plant="duffing", law="pid", duration=0.01)
+    with pytest.raises(smc.ScenarioError, match="needs numba_cuda: pip install 'smc-mujoco"):
+        smc.score([case], device="cuda")

@@ -1,0 +1,49 @@
+"""Scores of many scenarios: a table without traces, by the fast engine and by MuJoCo."""
+
+import math
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.metrics.catalogue import itae, settling_time
+from smc_mujoco.studies import score as module
+
+
+@smc.law_function(gains={"when": 1.0})
+def failing(y, gains, memory):
+    return math.nan if y.t >= gains.when else -y.e, y.e
+
+
+def cases():
+    yield smc.Scenario(plant="duffing", law="pid", duration=0.5)
+    yield smc.Scenario(plant="duffing", law=failing(when=0.2), duration=0.5)
+    yield smc.Scenario(plant="duffing", law="pid", duration=0.5, friction=smc.Coulomb(0.1))
+    yield smc.Scenario(plant="duffing", law=failing(when=9.0), duration=0.5)
+
+
+def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):
+    """Runs of the engine and of MuJoCo, over several chunks; a failed run leaves the others."""
+    monkeypatch.setattr(module, "CHUNK", 3)
+    table = smc.score(cases(), metrics=("settling_time", "itae"))
+    traces = smc.run(list(cases()))
+    assert table.column("law").tolist() == [trace.scenario.law.name for trace in traces]
+    for row, trace in zip(table.rows(), traces, strict=True):
+        assert row["diverged_at"] == pytest.approx(trace.diverged_at)
+        if trace.diverged_at is not None:
+            assert row["itae"] is None
+            continue
+        assert row["itae"] == pytest.approx(itae(trace), rel=1e-9)
+        assert row["settling_time"] == settling_time(trace)
+    assert "MuJoCo repeated 3 runs" in repr(table)
+    with pytest.raises(smc.ScenarioError, match="scores alone"):
+        table.scenario(0)
+
+
+def test_what_cannot_be_scored_is_refused():
+    with pytest.raises(smc.ScenarioError, match="give one Trace, or scenarios"):
+        smc.score([1.0])
+    with pytest.raises(smc.ScenarioError, match="metric"):
+        smc.score(cases(), metrics=("nonsense",))
+    with pytest.raises(smc.ScenarioError, match="device"):
+        smc.score(cases(), device="tpu")
+    assert len(smc.score([])) == 0
