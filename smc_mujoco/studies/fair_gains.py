@@ -27,7 +27,7 @@ from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
 )
-from smc_mujoco.common.progress import bar
+from smc_mujoco.common.progress import bar, told
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -35,7 +35,7 @@ from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.conditions import Condition, applicable
+from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.scenario import Scenario
@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.studies.worst_case import WorstCase
 
+# what gains for a machine of one's own are searched by for a first answer; chosen
+BRIEF = Objective(conditions=(NAMED["nominal"], NAMED["noise"], NAMED["heavy"]), duration=2.0)
 NOT_TUNED = "not tuned: "  # at the start of a remark
 Laws = Sequence[Component | Template]  # those without given gains are templates
 
@@ -157,6 +159,7 @@ class Trial(NamedTuple):
     threads: int | None
     progress: bool
     seed: int = 0  # another one draws other instances, noise and starts
+    brief: bool = False  # whether searches have BRIEF as objective
 
     def seeds(self, count: int) -> range:
         """Return the seeds of that many runs, which are also the numbers of unseen instances."""
@@ -218,6 +221,13 @@ class Trial(NamedTuple):
         made: dict[str, list[Candidate]] = {}
         count = sum(of_plant.count(None) for of_plant in known.values())
         begun = 0
+        if self.progress and tune:
+            for plant in self.plants:
+                untuned = []
+                for law, found in zip(laws[plant.name], known[plant.name], strict=True):
+                    if found is None:
+                        untuned.append(law)
+                self._tell_time(plant, untuned, starts[plant.name], searches, budget)
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
@@ -229,6 +239,24 @@ class Trial(NamedTuple):
                     candidate = self.tuned(plant, law, starts[plant.name], searches, budget)
                 made[plant.name].append(candidate)
         return made
+
+    def _tell_time(
+        self, plant: Plant, laws: Laws, starts: Starts | None, searches: int, budget: int
+    ) -> None:
+        """Tell how long the tuning of several laws takes at most, from an evaluation of one."""
+        from smc_mujoco.analysis.tuning import search
+
+        goal = self._goal(plant, starts)
+        seconds = []
+        sizes = 0
+        for law in laws:
+            with contextlib.suppress(ScenarioError):
+                task = search.task_of(plant, coerce.law(law), goal, budget, 0, self.threads)
+                sizes += task.size
+                if not seconds:
+                    seconds.append(search.expected(task, searches) / task.size)
+        if len(laws) > 1 and seconds:
+            told(f"gains of {len(laws)} laws on {plant.name}", seconds[0] * sizes)
 
     def _check_tunable(
         self,
@@ -263,7 +291,7 @@ class Trial(NamedTuple):
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
-        usual = Objective()
+        usual = BRIEF if self.brief else Objective()
         fit = applicable([c.name for c in usual.conditions], [plant], usual.duration)
         conditions = tuple(c for c in usual.conditions if c.name in fit)
         return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)

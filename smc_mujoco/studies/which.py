@@ -138,7 +138,8 @@ def which(
       seeds: runs of a law in each condition, each with another start and other noise.
       duration: of a run, s. Default: 5, or 3 if quick.
       out: folder for gains and runs, which another call reads.
-      quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64.
+      quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64. On your own
+        model also a shorter objective, and by default the laws of the report's first page.
       defaults: whether a law may win over rivals whose gains are their defaults.
       starts, relevant, threads, progress, seed: as in `compare`.
 
@@ -159,12 +160,16 @@ def which(
     for metric in compared:
         if why := CATALOGUE[metric].refusal(machine):
             raise ScenarioError(why)
+    brief = quick and machine.is_user_model
     chosen = _suited(machine, [name for name in names if name in PROPERTIES], laws)
+    if brief and laws is None:
+        known = [law for law in chosen if law.name in gain_sets.COMPARED]
+        chosen = known or chosen
     length = duration or (3.0 if quick else 5.0)
     if conditions is None:
         conditions = applicable(DEFAULT_CONDITIONS, [machine], length)
     tested = [find_condition(name) for name in listed("conditions", conditions)]
-    trial = Trial([machine], tested, length, starts, Path(out), threads, progress, seed)
+    trial = Trial([machine], tested, length, starts, Path(out), threads, progress, seed, brief)
     trial.check({machine.name: chosen})
     if quick:
         searches, budget = (3, 16)

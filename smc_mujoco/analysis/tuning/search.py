@@ -31,6 +31,7 @@ minimised.
 import contextlib
 import dataclasses
 import os
+import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -63,7 +64,7 @@ from smc_mujoco.common.errors import (
     find,
     users_stacklevel,
 )
-from smc_mujoco.common.progress import bar
+from smc_mujoco.common.progress import bar, told
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.plant import Plant
@@ -153,10 +154,12 @@ def tune(
     goal = dataclasses.replace(
         goal, **{name: value for name, value in changes.items() if value is not None}
     )
-    task = _task(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
+    task = task_of(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
+    if progress:
+        told(f"{task.law.name} on {task.plant.name}", expected(task, searches))
     codes = None if folder is None else task.codes()
     with bar(
         f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True
@@ -170,6 +173,17 @@ def tune(
         tuned = _result(task, tuple(map(found, range(searches))))
     _warn_of_result(tuned)
     return tuned.sourced()
+
+
+def expected(task: "Task", searches: int) -> float:
+    """Return how long searches take at most, s, by timing an evaluation of the law's own gains."""
+    names = tuple(task.box)
+    evaluate = Evaluator(task.goal, task.cases(0), names, task.threads, by_equation=True)
+    gains: Any = tuple(task.law.gains[name] for name in names)
+    evaluate([gains])  # compiles
+    start = time.perf_counter()
+    evaluate([gains])
+    return (time.perf_counter() - start) * searches * task.size
 
 
 @dataclasses.dataclass
@@ -446,7 +460,7 @@ class Task(NamedTuple):
         return SearchResult(best=best, history=history, evaluations=trials.count, engine=engine)
 
 
-def _task(
+def task_of(
     plant: Plant | str,
     law: Component,
     goal: Objective,
@@ -502,7 +516,7 @@ def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
     Raise BrokenLawError if it cannot even be run there.
     """
     try:
-        _task(plant, coerce.law(law), goal, BUDGET, 0, None)
+        task_of(plant, coerce.law(law), goal, BUDGET, 0, None)
     except BrokenLawError:
         raise
     except ScenarioError as error:

@@ -107,7 +107,7 @@ CHATTERING = [
 )
 def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_equation):
     cases = cases_of(plant, law)
-    names = tuple(search._task(plant, cases[0].law, SECOND, 64, 0, 1).box)
+    names = tuple(search.task_of(plant, cases[0].law, SECOND, 64, 0, 1).box)
     candidates = []
     for factor in FACTORS:
         candidates.append(tuple(factor * cases[0].law.gains[name] for name in names))

@@ -69,7 +69,7 @@ def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatc
     assert not gains[0] & gains[1]
     seeds = []
     for i in range(3):
-        for case in search._task("duffing", found.law, SHORT, 16, 3, 1).cases(i):
+        for case in search.task_of("duffing", found.law, SHORT, 16, 3, 1).cases(i):
             seeds.append(case.seed)
     assert len(set(seeds)) == len(seeds) == 21
 
@@ -221,7 +221,7 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
         (stepper, 50.0, 1.0),
     ):
         goal = Objective(conditions=(condition,))
-        task = search._task("inverted_pendulum", smc.law("pid"), goal, 8, 0, 1)
+        task = search.task_of("inverted_pendulum", smc.law("pid"), goal, 8, 0, 1)
         T = math.sqrt(M * 0.5 / F)
         assert task.scales == {
             "X": 0.5,
@@ -234,7 +234,9 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
     with pytest.raises(
         smc.ScenarioError, match=r"commands in N and m/s\^2: tune for each drive alone"
     ):
-        search._task("duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1)
+        search.task_of(
+            "duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1
+        )
 
 
 def test_a_gain_given_as_0_stays_0():
@@ -270,7 +272,7 @@ def test_a_gain_is_searched_three_decades_wide_about_its_scale():
 def test_a_gain_over_another_is_searched_as_far_as_a_force():
     law = smc.law("extended_state")
     assert search_space.force_limits(law, {"b": 2.0}, 6.0) == {"k": pytest.approx(12.0 * 10**2.5)}
-    task = search._task("duffing", law, LEAN, 4, 0, 1)
+    task = search.task_of("duffing", law, LEAN, 4, 0, 1)
     trials = search.Trials(None, None, tuple(task.box), None, None)
     trials.limit = lambda gains: search_space.force_limits(law, gains, 6.0)
     gains = dict(zip(task.box, trials.gains([5.0] * len(task.box)), strict=True))

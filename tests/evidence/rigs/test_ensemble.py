@@ -135,7 +135,7 @@ def test_laws_are_tuned_on_every_set_of_the_machine_by_one_rule():
         ]
     goal = ensemble.objective(smc.rig("qube_servo"))
     boxes = {
-        law.name: set(search._task(rig.scenario("none").plant, law, goal, 8, 0, 1, False).box)
+        law.name: set(search.task_of(rig.scenario("none").plant, law, goal, 8, 0, 1, False).box)
         for rig in [smc.rig("qube_servo")]
         for law in rig.laws
     }
