@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import smc_mujoco as smc
+from smc_mujoco.control.law import Law
 from smc_mujoco.draw.film.film import Frames, write
+from smc_mujoco.mechanisms.plant import Plant
 
 FOLDER = Path(__file__).parent / "gallery"
 
@@ -22,12 +24,12 @@ class Clip(NamedTuple):
     published ones.
     """
 
-    plant: str
+    plant: str | Plant
     title: str
     seconds: float
     condition: str = "nominal"
     changes: Mapping[str, Any] = {}
-    laws: Sequence[str] = ()
+    laws: Sequence[str | Law] = ()
 
     def frames(self) -> Frames:
         """Return the pictures of the clip."""
@@ -58,6 +60,32 @@ EIGHT = {
     "x0": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
     "disturbance": smc.signals.Wind(x=5.0, time=1.5, width=1.0),
 }
+ARM = """
+<mujoco model="arm">
+  <default><geom type="capsule" size="0.03" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body name="upper" pos="0 0 0.6">
+      <joint name="shoulder" axis="0 1 0" damping="0.2"/>
+      <geom fromto="0 0 0 0.4 0 0" mass="1"/>
+      <body name="fore" pos="0.4 0 0">
+        <joint name="elbow" axis="0 1 0" damping="0.1"/>
+        <geom fromto="0 0 0 0.35 0 0" mass="0.6"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="shoulder" ctrlrange="-30 30"/><motor joint="elbow" ctrlrange="-15 15"/>
+  </actuator>
+</mujoco>
+"""
+# It goes down to 2 cm above the wall, where a ball falls on it.
+STRANGER = {
+    "reference": [smc.Constant(0.05), smc.Constant(0.0)],
+    "contact": (
+        smc.Wall("fore", direction=(0, 0, -1), gap=0.28),
+        smc.Ball("fore", mass=0.5, height=0.6),
+    ),
+}
 CLIPS = {  # name of the clip's file -> what it shows
     "inverted_pendulum": Clip("inverted_pendulum", "Inverted pendulum", 1.5),
     "van_der_pol": Clip("van_der_pol", "Van der Pol under measurement noise", 2.0, "noise"),
@@ -65,6 +93,18 @@ CLIPS = {  # name of the clip's file -> what it shows
     "pendulum_network": Clip("pendulum_network", "Five coupled pendulums", 2.0),
     "hard_stops": Clip(
         "inverted_pendulum", "A blow, rubber stops, and friction in the joint", 2.2, changes=BLOW
+    ),
+    "wall_and_ball": Clip(
+        smc.plant_from(
+            ARM, channels={"shoulder": smc.Channel(x0=-0.6), "elbow": smc.Channel(x0=0.2)}
+        ),
+        "A robot of your own, a wall and a ball",
+        1.2,
+        changes=STRANGER,
+        laws=(
+            smc.law("pid", kp=(150.0, 60.0), kd=(15.0, 5.0), ki=(50.0, 20.0)),
+            smc.law("super_twisting"),
+        ),
     ),
     "quadrotor": Clip(
         "quadrotor",

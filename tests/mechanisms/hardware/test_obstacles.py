@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.benchmark import problem
 from smc_mujoco.metrics.tip import contacts
 from smc_mujoco.simulation import conditions
 from smc_mujoco.simulation import model as models
@@ -242,3 +243,24 @@ def test_a_goal_in_an_obstacle_is_said(name):
     for part, words in ((smc.Stops({joint: (-0.7, 0.8)}), joint), (wall(name), body)):
         with pytest.warns(smc.errors.ScenarioWarning, match=f"reference.*{words}"):
             smc.Scenario(plant=plant, law="pid", reference=goal, contact=part)
+
+
+@pytest.mark.slow
+@EVERY
+def test_a_text_is_a_condition_of_compare(name, tmp_path):
+    plant, body, joint = machine(name)
+    text = f"stopped: contact=(Stops({{{joint!r}: (-9, 9)}}), Ball({body!r}, height=0.01))"
+    laws = [smc.law("pid", kp=40.0, kd=9.0, ki=0.0), smc.law("super_twisting", k1=5.0)]
+    out = tmp_path / "compared"
+    runs = {"seeds": 2, "duration": 0.2, "starts": smc.starts(by=1e-3), "tune": False}
+    compared = smc.compare(laws, [plant], [text], out=out, progress=False, **runs)
+    assert "stopped" in str(compared)
+
+
+@pytest.mark.parametrize("contact", ['Wall("pendulum", (1, 0, 0), 0.2)', 'Ball("pendulum")'])
+def test_a_text_is_a_cell_of_a_problem(contact, monkeypatch):
+    more = {"conditions": ["hit"], "texts": {"hit": f"contact={contact}"}}
+    rules = problem.rules(1) | more
+    monkeypatch.setattr(problem, "rules", lambda version: rules)
+    runs = smc.problem("inverted_pendulum/hit@1").scenarios("pid", instances=[0, 1])
+    assert {type(run.contact[0]).__name__ for run in runs} == {contact.partition("(")[0]}
