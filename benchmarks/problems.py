@@ -13,7 +13,8 @@
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's
 plants, `measure controls` the controls on all problems; ten minutes of processor time each. With
-`--version 2`, `measure` and `freeze` are for the rules of flight, where levels come from no law.
+`--version 2` and `3`, `measure` and `freeze` are for the rules of flight, and of carts with
+friction, where levels come from no law.
 `measure` and `enter` go on where they were stopped.
 """
 
@@ -330,6 +331,7 @@ def write_suites(left_out: Sequence[str], version: int) -> None:
             [name for name in every if "/worst" in name],
         ),
         "smc-flight@2": ("A quadrotor.", every),
+        "smc-carts@3": ("A joint without an actuator, and friction.", every),
     }
     for name, (words, chosen) in lists.items():
         if not name.endswith(f"@{version}"):

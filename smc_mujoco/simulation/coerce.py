@@ -347,15 +347,14 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
 def _placed(name: str, part: Friction, plant: Plant) -> Friction:
     """Return a friction with the joints that it acts on, if these are not the driven ones alone."""
     joints = all_joints(plant)
-    for joint in part.on:
-        if joint not in (EVERY, *joints):
-            raise unknown(f"joint of {plant.name} in {name}", joint, joints)
-    if EVERY in part.on:
-        return dataclasses.replace(part, on=joints)
+    on = joints if EVERY in part.on else part.on
     for value in stated(part).values():  # a number for each channel is one by name
-        if not part.on and isinstance(value, tuple) and len(value) == plant.n > plant.driven:
-            return dataclasses.replace(part, on=joint_names(plant))
-    return part
+        if not on and isinstance(value, tuple) and len(value) == plant.n > plant.driven:
+            on = joint_names(plant)
+    for joint in on:
+        if joint not in joints:
+            raise unknown(f"joint of {plant.name} in {name}", joint, joints)
+    return dataclasses.replace(part, on=on)
 
 
 def actuator(

@@ -314,11 +314,12 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
 def all_joints(plant: Plant) -> tuple[str, ...]:
     """Return the names of all hinges and slides of a plant, first those of its channels."""
     model = compiled(plant.spec())
-    others = []
+    names = []
     for joint in range(model.njnt):
-        if model.jnt_type[joint] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            others.append(model.joint(joint).name)
-    return tuple(filter(None, dict.fromkeys((*joint_names(plant), *others))))
+        if model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE.value:  # or a hinge
+            names.append(model.joint(joint).name)
+    first = [name for name in joint_names(plant) if name in names]
+    return tuple(filter(None, dict.fromkeys((*first, *names))))
 
 
 @functools.lru_cache(maxsize=32)

@@ -207,3 +207,43 @@ def test_a_joints_friction_is_the_frictionloss_of_that_joint_in_a_file(joint, le
         ]
     )
     assert np.abs(own.x - ours.x).max() < 0.01 * np.abs(ours.x).max()
+
+
+@pytest.mark.parametrize("part", [smc.Coulomb(0.02), LUGRE], ids=["Coulomb", "LuGre"])
+def test_a_joint_of_a_file_that_is_no_channel_has_friction_by_name(part):
+    """A pole that nobody measures stands, and one on a rail that rubs falls."""
+    alone = smc.plant_from(CART % (0.0, 0.0), channels=["slide"], name="cart", others="file")
+    runs = {}
+    for joint in ("slide", "hinge", "*"):
+        made = smc.Scenario(
+            plant=alone, law="none", friction={joint: part}, v0=0.1, duration=1.0, u_max=6.0
+        )
+        runs[joint] = smc.run(made)
+        assert made.friction[0].on == (("slide", "hinge") if joint == "*" else (joint,))
+    assert not np.array_equal(runs["slide"].x, runs["*"].x)
+    assert np.all(runs["hinge"].reaction == 0.0)  # of the cart
+    with pytest.raises(smc.ScenarioError, match="unknown joint of Sigmoid"):
+        smc.Scenario(plant=alone, law="none", friction={"hinge": SIGMOID}, u_max=6.0)
+
+
+@pytest.mark.parametrize("name", ["coulomb", "friction", "lugre"])
+@pytest.mark.parametrize("bounds", [(0.03, 0.03), (120.0, 7.0)])
+def test_named_frictions_of_an_own_machine_are_shares_of_its_own_bounds(name, bounds):
+    lift, turn = bounds
+    text = ARM % (lift, lift, turn, turn)
+    machine = smc.plant_from(text, channels=["lift", "turn"], name="arm")
+    made = smc.Scenario(plant=machine, law="none", **conditions.NAMED[name].on(machine, 1.0))
+    for joint, bound in zip(("lift", "turn"), bounds, strict=True):
+        here = [part for part in made.friction if joint in part.joint_names(machine)]
+        dry = next(part for part in here if not isinstance(part, smc.Viscous))
+        level = dry.static if name == "lugre" else dry.level
+        assert level == pytest.approx(bound / 60.0)
+        assert len(here) == (2 if name == "friction" else 1)
+
+
+ARM = """<mujoco><compiler angle="radian"/><worldbody><body>
+  <joint name="lift" type="slide" axis="0 0 1"/><geom size=".05" mass="1"/>
+  <body pos=".2 0 0"><joint name="turn" axis="0 0 1"/><geom size=".05" pos=".1 0 0" mass=".3"/>
+  </body></body></worldbody><actuator>
+  <motor joint="lift" ctrlrange="-%g %g" ctrllimited="true"/>
+  <motor joint="turn" ctrlrange="-%g %g" ctrllimited="true"/></actuator></mujoco>"""
