@@ -64,7 +64,7 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
             file = text.partition(":")[0]
             raise ScenarioError(
                 f"plant {text!r}: {file!r} ends in none of .xml, .mjcf and .urdf: "
-                "give FILE.xml:joint"
+                "give FILE.xml:joint, of a xacro what xacro FILE > FILE.urdf writes"
             )
         return plant(text, **values)
     from smc_mujoco.mechanisms.custom.others import OTHERS

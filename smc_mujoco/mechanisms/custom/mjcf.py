@@ -41,6 +41,7 @@ RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 CURES = {  # words of MuJoCo's message on a file -> what to do
     "Error opening file": "put that file there, seen from the model's folder",
+    "volume is too small": 'give that mesh inertia="shell"; in a URDF, one with a volume',
     "ASCII": "save that file as a binary STL",
     "mass and inertia": "give that body a mass and an inertia (<inertial>)",
     "not found Element 'plugin'": "load its library before (mujoco.mj_loadPluginLibrary)",
@@ -139,6 +140,10 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
         there = False
     if not there:
         raise ScenarioError(f"no model at {path}: give the path of an MJCF file (.xml)")
+    if path.suffix == ".xacro":
+        raise ScenarioError(
+            f"{path.name} is no model yet: give what xacro {path.name} > FILE.urdf writes"
+        )
     made = Source(str(path), digest(path))
     _known[made.sha256] = path
     return made

@@ -46,22 +46,32 @@ class Urdf(NamedTuple):
     def notes(self, label: str) -> list[str]:
         """Return a sentence on each kind of change to the file."""
         guessed = []
-        moves = {}
-        for body in self.spec().bodies:
-            moves[body.name] = bool(body.joints) or moves.get(body.parent and body.parent.name)
-            solid = any(geom.contype for geom in body.geoms)
-            if moves[body.name] and solid and not body.explicitinertial:
-                guessed.append(body.name)
-        sentences = {
-            f"{label} is read without its shapes {_listed(self.lost)}, which are missing or none "
-            f"of {', '.join(READABLE)}: put such files there, or do without": self.lost,
-            f"no body has the inertia that {label} gives {_listed(self.raised)}, one moment of "
-            "which exceeds the sum of the others: all three are raised by the difference, so "
-            "correct them": self.raised,
-            f"{label} gives {_listed(guessed)} no <inertial>, and MuJoCo takes that of their "
-            "shapes with the density of water: give one to each": guessed,
-        }
-        return [sentence for sentence, names in sentences.items() if names]
+        moving = set()
+        spec = self.spec()  # bodies have parents while it lives
+        for body in spec.bodies[1:]:
+            if body.joints or body.parent.name in moving:
+                moving.add(body.name)
+                solid = any(geom.contype for geom in body.geoms)
+                if solid and not body.explicitinertial:
+                    guessed.append(body.name)
+        sentences = []
+        if self.lost:
+            sentences.append(
+                f"{label} is read without its shapes {_listed(self.lost)}, which are missing or "
+                "no .stl, .obj or .msh: put such files there, or do without"
+            )
+        if self.raised:
+            sentences.append(
+                f"no body has the inertia that {label} gives {_listed(self.raised)}, one moment "
+                "of which exceeds the sum of the others: all three are raised by the difference, "
+                "so correct them"
+            )
+        if guessed:
+            sentences.append(
+                f"{label} gives {_listed(guessed)} no <inertial>, and MuJoCo takes that of their "
+                "shapes with the density of water: give one to each"
+            )
+        return sentences
 
 
 def read(file: Path) -> Urdf | None:
@@ -70,7 +80,9 @@ def read(file: Path) -> Urdf | None:
         # with neither namespaces nor their prefixes, as MuJoCo reads it
         text = file.read_bytes().strip().replace(b"xmlns=", b"ns=")
         robot = ET.fromstring(re.sub(rb"(</?\w+):", rb"\1_", text))
-        return _mended(robot, file) if robot.tag == "robot" else None
+        if robot.tag != "robot":
+            return None
+        return _mended(robot, file)
     except (OSError, ValueError, ET.ParseError):  # MuJoCo says what is wrong
         return None
 
@@ -83,7 +95,8 @@ def _mended(robot: ET.Element, file: Path) -> Urdf:
     if compiler is None:
         compiler = ET.SubElement(own, "compiler")
     folder = file.parent / compiler.attrib.pop("meshdir", "")
-    compiler.attrib = {"discardvisual": "false"} | compiler.attrib | {"strippath": "false"}
+    compiler.attrib.setdefault("discardvisual", "false")
+    compiler.set("strippath", "false")
     read = Urdf("", {}, {}, [], [])
     stems: dict[str, Path] = {}
     for link in robot.iter("link"):
@@ -100,16 +113,18 @@ def _mended(robot: ET.Element, file: Path) -> Urdf:
             stem = found.stem  # MuJoCo takes files with the same one for one mesh
             while stems.setdefault(stem, found) != found:
                 stem += "_"
-            mesh.set("filename", stem + found.suffix.lower())
-            read.meshes[mesh.get("filename", "")] = found
+            alias = stem + found.suffix.lower()
+            mesh.set("filename", alias)
+            read.meshes[alias] = found
         inertia = link.find("inertial/inertia")
         if inertia is not None and _raised(inertia):
             read.raised.append(link.get("name", ""))
     for joint in robot.iter("joint"):
         leader = joint.find("mimic")
         if leader is not None:
-            numbers = float(leader.get("offset", 0.0)), float(leader.get("multiplier", 1.0))
-            read.mimics[joint.get("name", "")] = leader.get("joint", ""), *numbers
+            offset = float(leader.get("offset", 0.0))
+            multiplier = float(leader.get("multiplier", 1.0))
+            read.mimics[joint.get("name", "")] = leader.get("joint", ""), offset, multiplier
     return read._replace(text=ET.tostring(robot, encoding="unicode"))
 
 
@@ -136,14 +151,18 @@ def _raised(inertia: ET.Element) -> bool:
     xx, xy, xz, yy, yz, zz = (float(inertia.get(f"i{axis}", 0.0)) for axis in axes)
     small, middle, large = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     lacking = max(large - middle - small, LEAST - small) + (ENOUGH - 1.0) * large
-    if large > 0.0 and lacking > 0.0:  # where all are 0, MuJoCo says what is wrong
-        for key, moment in {"ixx": xx, "iyy": yy, "izz": zz}.items():
-            inertia.set(key, repr(float(moment + lacking)))
-    return bool(large > 0.0 and large - middle - small > ROUNDED * large)
+    if large <= 0.0:  # MuJoCo says what is wrong
+        return False
+    if lacking > 0.0:
+        inertia.set("ixx", str(xx + lacking))
+        inertia.set("iyy", str(yy + lacking))
+        inertia.set("izz", str(zz + lacking))
+    return bool(large - middle - small > ROUNDED * large)
 
 
 def _listed(names: Iterable[str]) -> str:
     """Return the first three names, and how many more there are."""
-    names = list(dict.fromkeys(names))
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(map(repr, names[:3])) + more
+    quoted = [repr(name) for name in dict.fromkeys(names)]
+    if len(quoted) > 3:
+        quoted[3:] = [f"{len(quoted) - 3} more"]
+    return ", ".join(quoted)

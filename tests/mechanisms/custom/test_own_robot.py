@@ -216,10 +216,20 @@ def test_a_missing_mesh_and_a_part_are_refused_with_cures_that_work(tmp_path, co
     file = tmp_path / ("scene.xml" if included else "robot.xml")
     with pytest.raises(smc.ScenarioError, match="put that file there, seen from") as caught:
         smc.plant_from(file, ["j"])
-    place = tmp_path / re.search(r"file '(.*?)'", str(caught.value))[1]
+    place = tmp_path / re.findall(r"file '(.*?)'", str(caught.value))[0]
     place.parent.mkdir(parents=True)
     place.write_bytes(tetrahedron(0.1))
     assert smc.plant_from(file, ["j"]).n == 1
     if not included:
         with pytest.raises(smc.ScenarioError, match=r"give scene.xml, which includes it"):
             smc.plant_from(tmp_path / "motor.xml", ["k"])
+
+
+def test_a_xacro_is_refused_with_its_command(folder):
+    (folder / "arm.urdf.xacro").write_text(ARM)
+    with pytest.raises(
+        smc.ScenarioError, match=r"give what xacro arm.urdf.xacro > FILE.urdf writes"
+    ):
+        smc.plant_from("arm.urdf.xacro", ["j1"])
+    with pytest.raises(smc.ScenarioError, match=r"xacro FILE > FILE.urdf"):
+        as_plant("arm.urdf.xacro:j1")
