@@ -88,6 +88,7 @@ def view(
         )
     door = Door(web_server)
     web_server.bind_public_socket = door.bind
+    web_server.bind_loopback_socket = door.bind_inner
     web_server.serve = door.serve
     web_viewer._print_url_banner = lambda host, port: print(door.address, flush=True)
     web_viewer.webbrowser = types.SimpleNamespace(

@@ -3,12 +3,15 @@
 The address holds a secret word. Any page that is open in a browser can send requests to this
 machine. So each request must begin with the secret word, name this machine as its host, and come
 from no page of another origin. Others get 403 before Studio reads them. Uploads of models get 403,
-too, since a model may include other files of this machine.
+too, since a model may include other files of this machine. Studio draws its panels by a second
+port, whose newest connection it takes for its own: there, only this process may connect.
 """
 
 # pyright: reportMissingImports=false
 # (MuJoCo 3, which the lock has, lacks Studio)
+import os
 import secrets
+import socket
 from typing import Any
 
 SECRET_BYTES = 16
@@ -27,11 +30,36 @@ SCRIPT = """<script>{
 }</script>"""
 
 
+class InnerSocket(socket.socket):
+    """A listening socket that takes the connections of this process alone."""
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """Return a connection and its address; asyncio goes on after ConnectionAbortedError."""
+        connection, peer = super().accept()
+        if not any(_name(int(file)) == peer for file in os.listdir("/dev/fd")):
+            connection.close()
+            raise ConnectionAbortedError(f"another process came from {peer}")
+        return connection, peer
+
+
+def _name(file: int) -> Any:
+    """Return the address of an open socket of this process; None for another file."""
+    try:
+        opened = socket.socket(fileno=file)
+    except OSError:
+        return None
+    try:
+        return opened.getsockname()
+    finally:
+        opened.detach()
+
+
 class Door:
-    """The way to Studio's page: `bind` and `serve` stand for those of its server."""
+    """The way to Studio's page: its methods stand for those of its server."""
 
     def __init__(self, server: Any):
         self.server_bind = server.bind_public_socket
+        self.server_bind_inner = server.bind_loopback_socket
         self.server_serve = server.serve
         self.secret = "/" + secrets.token_urlsafe(SECRET_BYTES)
         self.hosts: tuple[str, ...] = ()  # once it is bound
@@ -46,6 +74,13 @@ class Door:
         bound = self.server_bind("127.0.0.1", port)
         port = bound.getsockname()[1]
         self.hosts = f"127.0.0.1:{port}", f"localhost:{port}"
+        return bound
+
+    def bind_inner(self, port: int = 0) -> socket.socket:
+        """Return the socket to which Studio's own panels connect."""
+        bound = self.server_bind_inner(port)
+        if os.name == "posix":
+            return InnerSocket(fileno=bound.detach())
         return bound
 
     def serve(self, handler: Any, *, process_request: Any, **options: Any) -> Any:

@@ -2,6 +2,10 @@
 before Studio reads them.
 """
 
+import os
+import socket
+import subprocess
+import sys
 import types
 
 import pytest
@@ -25,6 +29,9 @@ class Server:
 
     def __init__(self):
         self.bound = None
+
+    def bind_loopback_socket(self, port):
+        return socket.create_server(("127.0.0.1", port))
 
     def bind_public_socket(self, host, port):
         self.bound = host
@@ -107,3 +114,17 @@ def test_others_are_refused_before_studio_reads_them(word, headers, path, server
 @pytest.mark.parametrize("path", [WORD, f"{WORD}/drop", f"{WORD}/drop?sid=a"])
 def test_no_model_is_uploaded(path, server):
     assert asked(server, path) == 403
+
+
+@pytest.mark.skipif(os.name != "posix", reason="whose a connection is, is asked of /dev/fd")
+def test_studio_s_second_port_is_for_this_process_alone(server):
+    """Any page could connect to it, and took the place of Studio's own panels."""
+    with Door(server).bind_inner() as inner:
+        address = inner.getsockname()
+        code = f"import socket; print(socket.create_connection({address}).recv(9))"
+        with subprocess.Popen([sys.executable, "-SEc", code], stdout=subprocess.PIPE) as other:
+            with pytest.raises(ConnectionAbortedError):
+                inner.accept()
+            assert other.communicate()[0] == b"b''\n"
+        with socket.create_connection(address) as own, inner.accept()[0] as taken:
+            assert taken.getpeername() == own.getsockname()
