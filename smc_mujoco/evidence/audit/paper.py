@@ -77,11 +77,11 @@ REQUIRED_OF_CLAIM = ("id", "text", "whose", "where", "function", "holds_if")
 CLAIM_FIELDS: dict[str, Any] = {  # the same of a claim
     **dict.fromkeys((*REQUIRED_OF_CLAIM, "how", "over", "searched", "rivals", "runs"), str),
     **dict.fromkeys(("read", "words", "measured", "note", "instead", "shown_by"), str),
-    **dict.fromkeys(("quantifier", "quick", "varies", "immune"), str),
+    **dict.fromkeys(("quantifier", "quick", "varies", "immune", "limit"), str),
     **dict.fromkeys(("plants", "laws", "conditions"), list),
     "holds_if": dict | str,
     "late": bool,
-    "values": dict,
+    **dict.fromkeys(("values", "examples"), dict),
 }
 REQUIRED_OF_PAPER = ("title", "authors", "source", "read", "claim")
 
@@ -468,6 +468,9 @@ def _check(entry: Entry, paper: Paper) -> None:
         )
     for one in entry.plants:
         paper.plant(one)
+    for plant, gains in entry.examples.items():
+        find("plant in examples", plant, dict.fromkeys(entry.plants))
+        paper.bound(entry.searched or entry.laws[0], gains)
     for one in entry.conditions:
         paper.condition(one)
     for law in entry.laws:

@@ -5,7 +5,8 @@ A claim consists of one sentence or several. A sentence holds if all its checks 
 one ("may", "there is") if one does. Under one set of gains a claim is supported if all its
 sentences hold, refuted if none does, and else partly supported; without checks it is not testable.
 A claim about some gains or cases is supported by one example. Without an example it is not refuted
-but "not shown".
+but "not shown". Nor is a claim refuted by a limit that the paper's words do not give: it is "not as
+measured".
 
 A verdict is about what the paper says, or what follows from it. A question beside the paper gets an
 answer instead, "yes" for "supported". `totals` counts the paper's own sentences alone.
@@ -26,19 +27,26 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.frozen import frozen
 
 SUPPORTED = "supported"
 PARTLY = "partly supported"
 REFUTED = "refuted"
 NOT_SHOWN = "not shown"
+NOT_AS_MEASURED = "not as measured"
 NOT_TESTABLE = "not testable"
-VERDICTS: tuple[str, ...] = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
-ANSWERS: dict[str, str] = dict(
-    zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True)
-)
-MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌–■◧□◇–", strict=True))
+VERDICTS = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_AS_MEASURED, NOT_TESTABLE)
+ANSWERS = {
+    SUPPORTED: "yes",
+    PARTLY: "in part",
+    REFUTED: "no",
+    NOT_SHOWN: "no example",
+    NOT_TESTABLE: "no answer",
+}
+MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌△–■◧□◇–", strict=True))
 
 PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
+LIMIT_IS_OURS = "none in the paper: the limit is ours, and refutes nothing"
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
 DISTANCE_WORDS = ", distance from "  # in a range check's name, between number and range
@@ -230,6 +238,8 @@ class Statement:
     where: str  # section of the paper
     measured: str  # what is run, and what is measured on it
     holds_if: str  # the threshold, in words
+    # the paper's words that give the limit; OURS if none do; "" if it follows from what is claimed
+    limit: str = ""
     note: str = ""  # what a reader must know to judge the numbers
     # UNIVERSAL, EXISTENTIAL, or NAMED: about only the plants and conditions that it names
     quantifier: str = NAMED
@@ -243,6 +253,8 @@ class Statement:
     # the set of gains of other laws with which a search over gains decides; "" for each set by
     # itself
     rivals: str = ""
+    # plant -> gains of the law with which the claim holds there, which a search tries first
+    examples: Mapping[str, Mapping[str, float]] = frozen({})
     # what the author may claim instead, where it does not hold: a theorem or a measured bound
     instead: str = ""
     shown_by: str = ""  # the command that shows that
@@ -278,8 +290,11 @@ class Claim(Statement):
             "gains": f"{self.over} gains that the paper allows" if self.over else "",
             "measured": self.measured,
             "holds if": self.holds_if,
+            "words for the limit": LIMIT_IS_OURS if self.limit == OURS else self.limit,
             "note": self.note,
         }
+        for plant, gains in self.examples.items():
+            parts[f"holds on {plant} with"] = ", ".join(f"{k} = {v:g}" for k, v in gains.items())
         if self.instead and self.verdict != SUPPORTED:
             parts["instead"] = f"{self.instead} ({self.shown_by})"
         return {name: text for name, text in parts.items() if text}
@@ -358,10 +373,11 @@ def _marked(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items()) or "none"
 
 
-def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
+def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "", limit: str = "") -> str:
     """Return the verdict under one set of gains.
 
-    `over`: "all" or "some" if the claim is about allowed gains.
+    `over`: "all" or "some" if the claim is about allowed gains. `limit`: OURS if the paper gives
+    none.
     """
     hold = sentences(evidence, quantifier).values()
     if not hold:
@@ -370,6 +386,8 @@ def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
         return SUPPORTED if all(hold) else PARTLY
     if quantifier == EXISTENTIAL or over == "some":
         return NOT_SHOWN
+    if limit == OURS:
+        return NOT_AS_MEASURED
     return REFUTED
 
 
@@ -401,9 +419,10 @@ def combined(
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
     searched = {name: statement.over if statement.rivals in ("", name) else "" for name in evidence}
-    verdicts = {
-        name: verdict(some, statement.quantifier, searched[name]) for name, some in evidence.items()
-    }
+    limit = "" if statement.whose == OURS else statement.limit
+    verdicts = {}
+    for name, some in evidence.items():
+        verdicts[name] = verdict(some, statement.quantifier, searched[name], limit)
     if statement.rivals in verdicts:
         overall = verdicts[statement.rivals]
         rivals = f"{statement.rivals} gains of the other laws"

@@ -19,7 +19,7 @@ from smc_mujoco.evidence.rigs.identify import Identified
 
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
 # questions have their own.
-COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim"), strict=True))
+COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REFUTED])}
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}

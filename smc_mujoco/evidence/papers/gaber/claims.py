@@ -882,12 +882,17 @@ def cheap(runs, exact):
 def saturation_avoided(runs):
     """Claim 56: actuator saturation inherently avoided."""
 
-    def apart(plant):
-        half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, MIN_BOUND)
-        bounded = runs.scenario(plant, OURS, u_max=half)
+    def apart(plant, share):
+        bound = max(share * abs(runs.law(plant, OURS).gains["lam"]), MIN_BOUND)
+        bounded = runs.scenario(plant, OURS, u_max=bound)
         return deviation(*runs.traces([bounded, runs.scenario(plant, OURS, u_max=math.inf)]))
 
-    return {"deviation at u_max = lambda / 2, over |x0|": runs.by_plant(apart)}
+    deviations = {}
+    for words, share in (("", 1.0), (" / 2", 0.5)):
+        deviations[f"deviation at u_max = lambda{words}, over |x0|"] = runs.by_plant(
+            lambda plant, share=share: apart(plant, share)
+        )
+    return deviations
 
 
 def exponential(runs):
