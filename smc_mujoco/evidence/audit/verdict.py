@@ -35,15 +35,15 @@ REFUTED = "refuted"
 NOT_SHOWN = "not shown"
 NOT_AS_MEASURED = "not as measured"
 NOT_TESTABLE = "not testable"
-VERDICTS = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_AS_MEASURED, NOT_TESTABLE)
-ANSWERS = {
+VERDICTS: tuple[str, ...] = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_AS_MEASURED, NOT_TESTABLE)
+ANSWERS: dict[str, str] = {
     SUPPORTED: "yes",
     PARTLY: "in part",
     REFUTED: "no",
     NOT_SHOWN: "no example",
     NOT_TESTABLE: "no answer",
 }
-MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌△–■◧□◇–", strict=True))
+MARKS: dict[str, str] = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌△–■◧□◇–", strict=True))
 
 PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
 LIMIT_IS_OURS = "none in the paper: the limit is ours, and refutes nothing"
