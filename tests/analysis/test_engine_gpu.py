@@ -1,6 +1,7 @@
 """The fast engine's code for CUDA, which libnvvm makes without a device."""
 
 import importlib.util
+import sys
 import types
 
 import pytest
@@ -54,6 +55,7 @@ def test_every_law_compiles_for_a_device(monkeypatch, law):
 
 
 def test_without_the_package_a_device_is_refused_in_one_sentence(monkeypatch):
+    monkeypatch.delitem(sys.modules, "smc_mujoco.analysis.engine.gpu", raising=False)
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "numba_cuda" else find(name)
