@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import functools
 import importlib
+import operator
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any
@@ -21,7 +22,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.coerce import EVERY
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import Clock, Fault, Jump, Noise, PerChannel, Signal, Sum
+from smc_mujoco.simulation.signals import Clock, Fault, Jump, Noise, PerChannel, Signal
 
 FOLDERS = (
     "smc_mujoco.mechanisms.hardware",
@@ -64,8 +65,8 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
             return components.describe(value)
         case PerChannel():
             return {"each": [_data(signal) for signal in value.signals]}
-        case Sum():
-            return {"sum": [_data(signal) for signal in value.signals]}
+        case Signal(signals=signals):
+            return {"sum": [_data(signal) for signal in signals]}
         case Signal() | Part():
             values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
             return {
@@ -124,7 +125,7 @@ def _restored(data: Any) -> Any:
     if isinstance(data, dict) and "each" in data:
         return PerChannel(tuple(map(_restored, data["each"])))
     if isinstance(data, dict) and "sum" in data:
-        return Sum(tuple(map(_restored, data["sum"])))
+        return functools.reduce(operator.add, map(_restored, data["sum"]))
     if not isinstance(data, dict) or "kind" not in data:
         return data
     if data["module"].rpartition(".")[0] in FOLDERS:  # else it is a user's, and imported already

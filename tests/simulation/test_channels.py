@@ -11,6 +11,7 @@ from helpers import arms, reference
 from helpers.runs import ARRAYS, assert_same
 
 import smc_mujoco as smc
+from smc_mujoco.mechanisms.custom.scales import needs
 from smc_mujoco.studies import run_key
 
 SINE = smc.Sine(0.3, 4.0)
@@ -146,11 +147,11 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
     suggested = smc.Scenario(plant=plant, **COMMON)
     same = {
         "law": [smc.law("classical", k=5.0), "twisting"],
-        "u_max": [8.0, 6.0],
+        "u_max": [8.0, needs(plant)[1]],
         "reference": [SINE, REST],
     }
     assert suggested == smc.Scenario(plant=plant, **same, **COMMON)
-    assert suggested.limits == (8.0, 6.0)
+    assert suggested.limits == (8.0, needs(plant)[1])
     assert_same(smc.run(suggested), reference.run(suggested))
     others = {
         "law": smc.law("classical", k=1.0),
@@ -183,7 +184,7 @@ REFUSED = {
     "unknown joint": lambda: smc.Scenario(
         law={"shoulder": "classical", "elbo": "classical"}, **BOTH
     ),
-    "missing joint": lambda: smc.Scenario(law="classical", reference={"shoulder": SINE}, **BOTH),
+    "missing joint": lambda: smc.Scenario(law="classical", u_max={"shoulder": 2.0}, **BOTH),
     "joint law in one channel": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
     "wrong degree": lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
 }

@@ -303,7 +303,8 @@ def test_start_is_set_by_condition_or_starts(refused):
 
 def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
     law = smc.law("classical")
-    refused(lambda: smc.grid(["duffing", arm], law, ["noise", "nominal"], 2))
+    at_rest = smc.starts(x0=0.0)
+    refused(lambda: smc.grid([arm], law, ["noise", "nominal"], 2, starts=at_rest))
     moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
     moved += (smc.condition("c", feedforward=smc.Step(0.1)),)
     assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 12
@@ -314,7 +315,8 @@ def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
 
 
 def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
-    refused(lambda: smc.tune(arm, "observer_free", budget=4, conditions="nominal"))
+    at_rest = smc.starts(x0=0.0)
+    refused(lambda: smc.tune(arm, "pid", budget=4, conditions="nominal", starts=at_rest))
     goal = Objective(conditions=("nominal",), duration=0.5)
     found = smc.tune(
         arm,

@@ -68,7 +68,6 @@ from smc_mujoco.common.progress import bar, told
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.catalogue import arrived
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.codes import code_hashes
@@ -605,7 +604,7 @@ def _warn_of_result(tuned: Tuned) -> None:
 
 
 def _warn_of_machine(trace: Trace) -> None:
-    """Warn of a run of a user's model that falls, leans on something, or does not arrive."""
+    """Warn of a run of a user's model that falls or leans on something."""
     from smc_mujoco.mechanisms.custom.scales import falls
 
     who = f"{trace.scenario.law.name} on {trace.scenario.plant.name}"
@@ -615,11 +614,6 @@ def _warn_of_machine(trace: Trace) -> None:
         _warn(
             f"{who} stays at the bound of u with its best gains: it leans on something, or needs "
             "more force; give another goal or start, or a larger u_max if the motor gives more"
-        )
-    elif not arrived(trace):
-        _warn(
-            f"{who} does not arrive within {trace.scenario.duration:g} s with its best gains: give "
-            "a larger budget, or a longer duration"
         )
 
 
