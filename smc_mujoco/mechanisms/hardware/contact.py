@@ -225,27 +225,6 @@ def rub(spec: mujoco.MjSpec, geoms: tuple[str, str], friction: float) -> None:
     add_pair(spec, RUB, geoms, SOLREF_RUB, SOFT_IMPEDANCE, friction)
 
 
-def enable(spec: mujoco.MjSpec, what: str) -> None:
-    """Let what is added act, a "LIMIT" or "CONTACT", where the file lets none act."""
-    flags = mujoco.mjtDisableBit
-    if spec.option.disableflags & flags.mjDSBL_CONSTRAINT.value:
-        for name in ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT"):
-            spec.option.disableflags |= getattr(flags, f"mjDSBL_{name}").value
-        spec.option.disableflags &= ~flags.mjDSBL_CONSTRAINT.value
-    flag = getattr(flags, f"mjDSBL_{what}").value
-    if not spec.option.disableflags & flag:
-        return
-    spec.option.disableflags &= ~flag
-    if what == "LIMIT":
-        for part in (*spec.joints, *spec.tendons):
-            part.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-        return
-    for geom in spec.geoms:
-        geom.contype = geom.conaffinity = 0
-    for pair in spec.pairs:
-        spec.delete(pair)
-
-
 def add_pair(
     spec: mujoco.MjSpec, sort: str, geoms: tuple[str, str], normal: Pair, d: float, friction: float
 ) -> None:

@@ -22,7 +22,7 @@ from smc_mujoco.common.constraints import Number, Range
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import contact
-from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, Pair, enable, solref
+from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, Pair, solref
 from smc_mujoco.mechanisms.hardware.part import OWN, Positive, moving_joints, state_with
 from smc_mujoco.mechanisms.plant import Field, Plant
 
@@ -38,7 +38,6 @@ STEEL = (0.70, 0.72, 0.75, 1.0)
 RED = (0.85, 0.30, 0.20, 1.0)
 # m, chosen: of the slab that shows a wall, and of the ball that shows a stop
 THICKNESS, POST_RADIUS = 0.03, 0.02
-NUDGE = 1e-3  # rad or m: a step that shows the way of a body
 CLOSE = 1e-7  # m: shapes that are so near touch
 FAR = 10.0  # sizes of the machine, from where a shape approaches it
 SHAPES = mujoco.mjtGeom
@@ -79,7 +78,7 @@ class Stops(Obstacle):
             find(f"joint of {plant.name} in Stops", joint, known)
 
     def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
-        enable(spec, "LIMIT")
+        _enable(spec, "LIMIT")
         for name in self.limits:
             joint = spec.joint(name)
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
@@ -122,7 +121,7 @@ class OfBody(Obstacle):
 
     def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
         model, place, geoms, _ = _placed(self, plant)
-        enable(spec, "CONTACT")
+        _enable(spec, "CONTACT")
         _name_geoms(spec, self.body)
         other = self.add(spec)
         other.pos = place
@@ -255,20 +254,20 @@ def _posts(stops: Stops, plant: Plant) -> list[tuple[str, np.ndarray]]:
     model = plant.load(spec=spec)
     posts = []
     for joint, ends in stops.limits.items():
-        at = model.joint(joint).qposadr[0]
-        body = int(model.joint(joint).bodyid[0])
+        of = model.joint(joint)
+        body = int(of.bodyid[0])
         before = model.body_parentid[body]
-        for end, nudge in zip(ends, (NUDGE, -NUDGE), strict=True):
+        for end, side in zip(ends, (-1.0, 1.0), strict=True):
             data = _posed(model, plant.x0)
-            centres = []
-            for place in (end + nudge, end):
-                data.qpos[at] = place
-                mujoco.mj_kinematics(model, data)
-                centres.append(data.xipos[body].copy())
-            way = (centres[1] - centres[0]) / NUDGE
-            if np.linalg.norm(way) < CLOSE or not model.body_geomnum[body]:
+            data.qpos[of.qposadr[0]] = end
+            mujoco.mj_kinematics(model, data)
+            way = data.xaxis[of.id]
+            if of.type[0] == mujoco.mjtJoint.mjJNT_HINGE:
+                way = np.cross(way, data.xipos[body] - data.xanchor[of.id])
+            size = np.linalg.norm(way)
+            if size < CLOSE or not model.body_geomnum[body]:
                 continue  # a wheel
-            met = _meeting(model, data, body, model.geom(name).id, way / np.linalg.norm(way))
+            met = _meeting(model, data, body, model.geom(name).id, side * way / size)
             if met is not None:
                 frame = data.xmat[before].reshape(3, 3)
                 posts.append((joint, (met - data.xpos[before]) @ frame))
@@ -339,3 +338,25 @@ def _add_body(spec: mujoco.MjSpec) -> mujoco.MjsBody:
 def _ball(body: mujoco.MjsBody, name: str, radius: float, **look) -> None:
     """Give a body the shape of a ball, which touches nothing by itself."""
     body.add_geom(name=name, type=SHAPES.mjGEOM_SPHERE, size=(radius, 0, 0), **UNTOUCHED | look)
+
+
+def _enable(spec: mujoco.MjSpec, what: str) -> None:
+    """Let what is added act, a "LIMIT" or "CONTACT", and nothing else that the file disables."""
+    flags = mujoco.mjtDisableBit
+    option = spec.option
+    if option.disableflags & flags.mjDSBL_CONSTRAINT.value:
+        for name in ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT"):
+            option.disableflags |= getattr(flags, f"mjDSBL_{name}").value
+        option.disableflags &= ~flags.mjDSBL_CONSTRAINT.value
+    flag = getattr(flags, f"mjDSBL_{what}").value
+    if not option.disableflags & flag:
+        return
+    option.disableflags &= ~flag
+    if what == "LIMIT":
+        for part in (*spec.joints, *spec.tendons):
+            part.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+        return
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 0
+    for pair in spec.pairs:
+        spec.delete(pair)
