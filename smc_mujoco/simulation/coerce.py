@@ -354,7 +354,7 @@ def _placed(name: str, part: Friction, plant: Plant) -> Friction:
     for joint in on:
         if joint not in joints:
             raise unknown(f"joint of {plant.name} in {name}", joint, joints)
-    return dataclasses.replace(part, on=on)
+    return dataclasses.replace(part, on=tuple(on))
 
 
 def actuator(

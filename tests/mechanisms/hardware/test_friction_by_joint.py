@@ -75,6 +75,7 @@ def test_joints_survive_text_json_and_a_batch(friction):
     [
         ({"wheel": smc.Coulomb(0.1)}, "unknown joint .* 'wheel': choose from hinge, slide"),
         (smc.Coulomb(0.1, on=("wheel",)), "unknown joint .* 'wheel'"),
+        ([{"slide": smc.Coulomb(0.1)}, smc.Coulomb(0.1, on=["slide"])], "on the same joint"),
         ({"slide": 0.1}, "friction is 0.1: give"),
         ({"*": LUGRE, "hinge": SIGMOID}, "LuGre and Sigmoid on the same joint"),
         ({"slide": (smc.Coulomb(0.1), smc.Coulomb(0.2))}, "Coulomb and Coulomb on the same joint"),
