@@ -1030,7 +1030,7 @@ def _unreachable_goals(s: Resolved) -> Iterator[str]:
     if not constant or s.law.name == "none":
         return
     goal = [signal.parameters()["amplitude"] for signal in s.references]
-    goal += s.plant.goal or [0.0] * s.plant.free
+    goal += s.plant.goal or s.plant.origin[s.plant.driven :]
     for part in s.contact:
         if met := part.meets(s.plant, goal):
             yield (

@@ -39,6 +39,7 @@ RED = (0.85, 0.30, 0.20, 1.0)
 # m, chosen: of the slab that shows a wall, and of the ball that shows a stop
 THICKNESS, POST_RADIUS = 0.03, 0.02
 CLOSE = 1e-7  # m: shapes that are so near touch
+MAX_MARCH = 1000  # steps of its way
 FAR = 10.0  # sizes of the machine, from where a shape approaches it
 SHAPES = mujoco.mjtGeom
 UNTOUCHED = {"contype": 0, "conaffinity": 0}  # by other geoms
@@ -281,9 +282,8 @@ def _meeting(
     it passes.
     """
     geoms = _geoms(model, body)
-    far = FAR * model.stat.extent
-    height = far
-    while height > -far:
+    height = FAR * model.stat.extent
+    for _ in range(MAX_MARCH):
         data.geom_xpos[shape] = data.xipos[body] + height * away
         left = _distance(model, data, geoms, shape)
         if left < CLOSE:
