@@ -35,9 +35,10 @@ LAWS = ["observer_free", "classical", "adaptive", "super_twisting"]
 
 
 def shortened(scenario: smc.Scenario, duration: float = 0.1) -> smc.Scenario:
-    """The scenario over 0.1 s, a jump still at half time."""
+    """The scenario over 0.1 s, a jump or a fault still at half time."""
     jump = scenario.jump and dataclasses.replace(scenario.jump, time=duration / 2)
-    return dataclasses.replace(scenario, duration=duration, jump=jump)
+    fault = scenario.fault and dataclasses.replace(scenario.fault, at=duration / 2)
+    return dataclasses.replace(scenario, duration=duration, jump=jump, fault=fault)
 
 
 # the scenes
