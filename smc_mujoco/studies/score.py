@@ -4,9 +4,10 @@ import itertools
 import math
 import random
 from collections.abc import Hashable, Iterable, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-from smc_mujoco.common.constraints import OneOf, constrained
+from smc_mujoco.analysis.engine import Device
+from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, find, has, items_of, shown
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.simulation.scenario import Scenario
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 CHUNK = 20_000  # scenarios in memory at once
 CHECKED = 20  # of the fast engine's runs, which MuJoCo makes again; chosen
 METRICS = ("settling_time", "itae")
-Device = Annotated[str, OneOf(names=("cpu", "cuda"))]
 Scored = tuple[list[float], float | None]  # metrics, and the time of a failure, s
 
 

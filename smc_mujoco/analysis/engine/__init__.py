@@ -6,3 +6,9 @@ disturbances and the plant's equation under RK4 in a single loop, compiled toget
 Scores are summed on the way. `form` tells what a group is, and what this engine cannot run;
 `targets` compiles it. Its numbers find gains and fill maps: those on record are MuJoCo's.
 """
+
+from typing import Annotated
+
+from smc_mujoco.common.constraints import OneOf
+
+Device = Annotated[str, OneOf(names=("cpu", "cuda"))]

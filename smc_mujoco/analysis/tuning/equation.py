@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.engine import cpu
 from smc_mujoco.analysis.engine.group import Group, key
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.simulation import state
@@ -20,11 +19,17 @@ class Equations:
     """The runs by the plant's equation, all candidates at once."""
 
     def __init__(
-        self, goal: Objective, cases: Sequence[Scenario], names: Sequence[str], threads: int
+        self,
+        goal: Objective,
+        cases: Sequence[Scenario],
+        names: Sequence[str],
+        threads: int,
+        device: str,
     ):
         self.goal = goal
         self.cases = cases
         self.threads = threads
+        self.device = device
         members: dict[Hashable, list[int]] = {}
         for index, case in enumerate(cases):
             members.setdefault(key(case), []).append(index)
@@ -44,7 +49,7 @@ class Equations:
                 own = rows[k * len(indices) : (k + 1) * len(indices)]
                 for value, places in zip(gains, columns, strict=True):
                     own[:, places] = value
-            scores = cpu.run(made.form, rows, made.tables, self.threads)
+            scores = made.run(rows, self.threads, self.device)
             for row, score in enumerate(scores.tolist()):
                 index = indices[row % len(indices)]
                 costs[row // len(indices) * count + index] = self._costs(self.cases[index], *score)

@@ -54,6 +54,7 @@ class Evaluator:
       by_equation: whether the plant's equation replaces MuJoCo where it can.
       constraints: whether limits and contacts act in MuJoCo.
       slots: how many candidates MuJoCo runs at once.
+      device: of the runs by equation, "cpu" or "cuda".
     """
 
     def __init__(
@@ -65,11 +66,13 @@ class Evaluator:
         by_equation: bool = False,
         constraints: bool = True,
         slots: int = 1,
+        device: str = "cpu",
     ):
         self.goal = goal
         self.cases = list(cases)
         self.names = tuple(names)
         self.threads = cores(threads)
+        self.device = device
         prepared = []
         for case in self.cases:
             prepared.append(prepare(case))
@@ -91,7 +94,7 @@ class Evaluator:
 
         if any(map(why_not, self.cases)):
             return None
-        return Equations(self.goal, self.cases, self.names, self.threads)
+        return Equations(self.goal, self.cases, self.names, self.threads, self.device)
 
     def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""

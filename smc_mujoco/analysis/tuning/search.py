@@ -39,6 +39,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, PYTHON, Evaluator, with_gains
 from smc_mujoco.analysis.tuning.objective import (
@@ -118,6 +119,7 @@ def tune(
     searches: Searches = SEARCHES,
     folder: Annotated[str | os.PathLike[str], FilePath()] | None = None,
     outside_theorem: bool = False,
+    device: Device = "cpu",
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
@@ -135,6 +137,7 @@ def tune(
       searches: their number. They share nothing: `Tuned.sets` has the best gains of each.
       folder: keeps each search as soon as it ends. After a kill, the same call goes on there.
       outside_theorem: whether gains may miss the conditions of the law's theorem.
+      device: on which the fast engine runs candidates, "cpu" or "cuda".
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,
@@ -154,6 +157,7 @@ def tune(
         goal, **{name: value for name, value in changes.items() if value is not None}
     )
     task = task_of(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
+    task = task._replace(device=device)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
@@ -357,6 +361,7 @@ class Task(NamedTuple):
     threads: int | None
     inside: np.ndarray  # log10 gains in the box that hold the conditions
     outside_theorem: bool
+    device: str = "cpu"
 
     def holds(self, gains: Gains) -> bool:
         """Return whether gains of the box hold the conditions of the law's theorem."""
@@ -417,7 +422,9 @@ class Task(NamedTuple):
         """
         cases = self.cases(i)
         names = tuple(self.box)
-        by_equation = Evaluator(self.goal, cases, names, self.threads, by_equation=True)
+        by_equation = Evaluator(
+            self.goal, cases, names, self.threads, by_equation=True, device=self.device
+        )
         if by_equation.engine == EQUATION:
             trials = self._trials(by_equation, by_equation, i, report)
             best = self._on_record(trials.best.gains, cases)

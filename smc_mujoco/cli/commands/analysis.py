@@ -63,6 +63,9 @@ def tune(
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
+    device: Annotated[
+        str, typer.Option(help="Of the fast engine: cpu, or cuda for an NVIDIA card.")
+    ] = "cpu",
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
@@ -96,6 +99,7 @@ def tune(
         start,
         searches=searches,
         folder=folder,
+        device=device,
     )
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
