@@ -626,10 +626,8 @@ def _apply_pushes(address, sim, data):
 @njit(error_model="numpy")
 def _apply_wind(address, sim):
     """Let the part that has drag push by the wind, whose signals have an axis in each channel."""
-    wind = sim.wind
-    wind.x = 0.0
-    wind.y = 0.0
-    wind.z = 0.0
+    for i in range(3):
+        sim.wind[i] = 0.0
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         sim.instant.stream = signal.stream
@@ -640,10 +638,7 @@ def _apply_wind(address, sim):
                 != 0
             ):
                 return record.RAISED
-            speed = sim.motion.value * signal.peak[i]
-            wind.x += speed * (i == 0)
-            wind.y += speed * (i == 1)
-            wind.z += speed * (i == 2)
+            sim.wind[i] += sim.motion.value * signal.peak[i]
     call(sim.push.function.address, address, address + record.AT.push, 0, 0)
     return record.FINE
 

@@ -68,9 +68,9 @@ MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 # Fields that no scenario of a free body sets, with their words
 NOT_OF_FREE_BODIES = {
-    "friction": "friction",
-    "actuator": "actuator",
-    "sensor": "sensor",
+    "friction": "friction, as it has no joint that rubs",
+    "actuator": "actuator, as its thrusters are its drives",
+    "sensor": "sensor, as an Encoder is of a joint",
     "feedforward": "feedforward",
     "clock": "clock with late or missed samples",
     "velocity": "estimated velocity",

@@ -43,7 +43,6 @@ SIGHT = floats(Sight._fields)
 RAW = floats(("x", "v"))
 JOINT_STATE = floats(JointState._fields)
 EXERTED = floats(("force", "held"))
-WIND = floats(("x", "y", "z"))
 TORQUE = floats(Torque._fields)
 
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
@@ -136,7 +135,7 @@ SIMULATION = np.dtype(
         ("parts", "i8"),
         ("exerts", "i8"),
         ("push", PART),
-        ("wind", WIND),
+        ("wind", "f8", (3,)),
         # what they read of the callback: stage and physics step, whether a command arrived, and
         # what they reach, if `reaches`
         ("stage", "i8"),

@@ -35,6 +35,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import fingerprint, numba_internals
 from smc_mujoco.common.jit import Key, compiled
 from smc_mujoco.control.law import Measurement, catalogue
+from smc_mujoco.mechanisms.hardware import moments
 from smc_mujoco.mechanisms.hardware.moments import lever
 from smc_mujoco.simulation import callback, controller, philox, state
 from smc_mujoco.simulation.model import channels
@@ -53,7 +54,7 @@ THREE = smc.plant("pendulum_network", n=3)
 USED = [
     (philox, "uniform", numba.njit(lambda seed, channel, stream, k: 0.5)),
     (controller, "MAX_STATE", 2e6),
-    (controller, "lever", numba.njit(fastmath=True)(controller.lever.py_func)),
+    (moments, "lever", numba.njit(fastmath=True)(moments.lever.py_func)),
     (controller, "_drag", numba.njit(lambda sim, data, x, y, z: (x, y, z))),
 ]
 

@@ -202,6 +202,6 @@ class Rotors(Part):
     @staticmethod
     def push(sim, data, part):
         """Apply the force of the wind."""
-        force = drag_of(sim, data, sim.wind.x, sim.wind.y, sim.wind.z)
+        force = drag_of(sim, data, sim.wind[0], sim.wind[1], sim.wind[2])
         for i in range(3):
             data.xfrc_applied[channel_at(sim.channels, i).xfrc] += force[i]
