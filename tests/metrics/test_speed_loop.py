@@ -69,3 +69,9 @@ def test_channels_of_several_joints_track_their_own_speeds():
     last = trace.t >= 0.8 * trace.t[-1] - 1e-9
     off = np.abs(trace.v[last] - np.array([0.1, -0.3]))
     assert smc.score(trace)["ultimate_bound"] == pytest.approx(off.max())
+
+
+def test_tuning_refuses_a_speed_that_its_objective_would_not_see():
+    fast = smc.condition("fast", tracks="speed", reference=smc.signals.Ramp(1.0))
+    with pytest.raises(smc.ScenarioError, match="'fast' tracks a speed"):
+        smc.tune("duffing", "pid", conditions=[fast], searches=1, budget=1)

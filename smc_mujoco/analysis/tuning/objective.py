@@ -158,6 +158,11 @@ class Objective:
                     f"starts at its goal under {condition.name!r}, where a law has nothing to do"
                 )
                 raise ScenarioError(f"{case.plant.name} {where}: {START_CURE}")
+            if case.tracks == "speed":
+                raise ScenarioError(
+                    f"condition {condition.name!r} tracks a speed, and tuning counts errors of "
+                    "positions: give the law's gains, and tune=False to compare"
+                )
             cases.append(case)
         return cases
 
