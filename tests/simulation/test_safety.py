@@ -55,7 +55,7 @@ USED = [
     (philox, "uniform", numba.njit(lambda seed, channel, stream, k: 0.5)),
     (controller, "MAX_STATE", 2e6),
     (moments, "lever", numba.njit(fastmath=True)(moments.lever.py_func)),
-    (controller, "_drag", numba.njit(lambda sim, data, x, y, z: (x, y, z))),
+    (controller, "_exert", numba.njit(lambda address, sim, data, part: 0)),
 ]
 
 
