@@ -290,7 +290,15 @@ def test_two_laws_apart_by_what_is_just_relevant_have_a_false_winner_in_at_most_
                 }
             ).winners
         )
-    assert stats.binomtest(wrong, 800, 0.05, alternative="greater").pvalue > 1e-3
+    assert (
+        stats.binomtest(
+            wrong,
+            800,
+            0.05,
+            alternative="greater",
+        ).pvalue
+        > 1e-3
+    )
     assert wrong > 8  # the test is not idle: one of its two sides is exact
 
 
@@ -332,7 +340,12 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
             step = np.exp(rng.normal(0.0, 0.05, (1, 12)))
             halves[law] = np.where(again, cells[law] * step, NAN)
             trends[law] = np.exp(rng.normal(0.05, 0.05, (1, 12)))
-        found = Comparison(cells, 0.5, halves=halves, trends=trends)
+        found = Comparison(
+            cells,
+            0.5,
+            halves=halves,
+            trends=trends,
+        )
         (winner,) = found.winners
         if winner is None:
             continue
@@ -349,9 +362,15 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
                 else:
                     changed = {}
                 better.append(values | changed)
-            after = Comparison(better[0], 0.5, halves=better[1], trends=better[2])
+            after = Comparison(
+                better[0],
+                0.5,
+                halves=better[1],
+                trends=better[2],
+            )
             assert after.winners == [winner]
-            b, a = after.p[0], found.p[0]
+            b = after.p[0]
+            a = found.p[0]
             row = found.laws.index(winner)
             assert np.all(b[row] <= a[row] + 1e-12)
         wins += 1
@@ -512,7 +531,12 @@ def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(uni
 def test_a_median_that_half_the_step_moves_is_marked(factor, floor, first_order, marked):
     cells = {"a": blocks(1.0), "b": blocks(2.0)}
     halves = {"a": factor * cells["a"], "b": cells["b"]}
-    found = Comparison(cells, floor, halves=halves, first_order=first_order)
+    found = Comparison(
+        cells,
+        floor,
+        halves=halves,
+        first_order=first_order,
+    )
     middle = float(np.median(cells["a"]))
     if marked:
         wanted = pytest.approx((middle, factor * middle))

@@ -59,7 +59,15 @@ def counts_no_turns(y, gains, memory):
         ("inverted_pendulum", smc.law("classical", k=1.945, c=12.0)),
         ("duffing", smc.law("observer_free", lam=0.9, k1=1.0)),
         ("van_der_pol", smc.law("observer_free", lam=6.0, k1=1.976)),
-        ("van_der_pol", smc.law("super_twisting", k1=4.567, k2=45.47, c=2.16)),
+        (
+            "van_der_pol",
+            smc.law(
+                "super_twisting",
+                k1=4.567,
+                k2=45.47,
+                c=2.16,
+            ),
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) else value.name,
 )
@@ -105,15 +113,39 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
     approaching = 0.03 * math.sqrt(0.9)
     assert [verdict(0.03, q * approaching, False) for q in (0.9999, 1.0001)] == [CONVERGES, None]
     assert [verdict(1e-4, x, False) for x in (0.00399, 0.00401)] == [CONVERGES, None]
-    assert verdict(1e-4, 0.003, False, start=0.003) is None  # it began near
+    assert (
+        verdict(
+            1e-4,
+            0.003,
+            False,
+            start=0.003,
+        )
+        is None
+    )  # it began near
     assert [verdict(0.5, 0.5 + 2.0 * q, False) for q in (0.99e-6, 1.01e-6)] == [DOES_NOT, None]
-    assert [verdict(0.5, 0.5, False, u=(1.0, 1.0 + 6.0 * q)) for q in (0.99e-6, 1.01e-6)] == [
+    assert [
+        verdict(
+            0.5,
+            0.5,
+            False,
+            u=(1.0, 1.0 + 6.0 * q),
+        )
+        for q in (0.99e-6, 1.01e-6)
+    ] == [
         DOES_NOT,
         None,
     ]
     rests = []
     for q in (0.99e-6, 1.01e-6):
-        rests.append(verdict(0.5, 0.5, False, u=(2.0, 2.0 + 2.0 * q), u_max=math.inf))
+        rests.append(
+            verdict(
+                0.5,
+                0.5,
+                False,
+                u=(2.0, 2.0 + 2.0 * q),
+                u_max=math.inf,
+            )
+        )
     assert rests == [DOES_NOT, None]
     assert verdict(0.03, 0.03, False) is None  # at rest in the band
     assert (

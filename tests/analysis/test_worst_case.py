@@ -50,7 +50,12 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
     base = scenario(duration=1.0)
     within = CLASSES[name]
     worst = smc.worst_case(base, within=within, budget=8)
-    again = smc.worst_case(base, within=within, budget=8, threads=1)
+    again = smc.worst_case(
+        base,
+        within=within,
+        budget=8,
+        threads=1,
+    )
     assert again.value == worst.value
     assert again.median == worst.median
     assert again.scenario == worst.scenario
@@ -213,7 +218,12 @@ def test_it_finds_the_worst_of_a_linear_loop():
         x0=0.0,
         u_max=1e3,
     )
-    worst = smc.worst_case(base, "peak", smc.Uncertainty(disturbance=0.5), budget=48)
+    worst = smc.worst_case(
+        base,
+        "peak",
+        smc.Uncertainty(disturbance=0.5),
+        budget=48,
+    )
     assert worst.value <= 0.5 * gain * 1.001
     assert worst.value >= 0.5 * gain * 0.95  # the 5 % that a second searcher may find more
 
@@ -262,7 +272,12 @@ def test_constants_and_relays_reach_what_another_adversary_found():
             w=36.11,
             b=5.667,
         ): 0.0863,
-        smc.law("boundary_layer", k=5.139, c=4.12, phi=0.3788): 0.0505,
+        smc.law(
+            "boundary_layer",
+            k=5.139,
+            c=4.12,
+            phi=0.3788,
+        ): 0.0505,
         smc.law("observer_free", lam=5.784, k1=3.193): 0.1206,
     }
     for law, value in found.items():

@@ -193,7 +193,13 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
     force = np.eye(2)[driven] * (torque[:60] + pulse)[:, None]
     for k in range(0, 60, 7):
         slope = lambda _, state, k=k: simulator._slope.py_func(tuple(state), *force[k], known)  # noqa: E731
-        end = solve_ivp(slope, (0.0, 2e-3), states[k], rtol=1e-10, atol=1e-12).y[:, -1]
+        end = solve_ivp(
+            slope,
+            (0.0, 2e-3),
+            states[k],
+            rtol=1e-10,
+            atol=1e-12,
+        ).y[:, -1]
         np.testing.assert_allclose(states[k + 1], end, atol=1e-6)
 
 
@@ -230,11 +236,26 @@ def test_upright_is_within_the_published_bounds_after_any_turns(k):
 @pytest.mark.parametrize("seed", DRAWN)
 def test_a_minute_is_that_of_the_published_simulator(seed):
     times, goals = global_policy.resets(seed)
-    np.testing.assert_allclose(times[:5], DRAWN[seed][0], rtol=0, atol=5.1e-5)
-    np.testing.assert_allclose(goals[:3], DRAWN[seed][1], rtol=0, atol=5.1e-6)
+    np.testing.assert_allclose(
+        times[:5],
+        DRAWN[seed][0],
+        rtol=0,
+        atol=5.1e-5,
+    )
+    np.testing.assert_allclose(
+        goals[:3],
+        DRAWN[seed][1],
+        rtol=0,
+        atol=5.1e-6,
+    )
     run = global_policy.minute(boards.on_board("pendubot", "none"), seed)
     for time, state in STATES[seed].items():
-        np.testing.assert_allclose(run.states[round(time / 2e-3)], state, rtol=0, atol=2e-6)
+        np.testing.assert_allclose(
+            run.states[round(time / 2e-3)],
+            state,
+            rtol=0,
+            atol=2e-6,
+        )
     pushed = np.flatnonzero(np.abs(run.torques).sum(axis=1))
     ends = np.flatnonzero(np.diff(pushed) > 1)
     begun = pushed[[0, *(ends + 1)]]

@@ -26,14 +26,28 @@ def figure(traces, path, format="svg", **options) -> list:
     """The files that a figure is written to: an SVG, whose words can be read, to save the time of
     the PNG.
     """
-    draw_figure.figure(traces, path, format=format, **options)
+    draw_figure.figure(
+        traces,
+        path,
+        format=format,
+        **options,
+    )
     return files(path, format)
 
 
 def runs(
     plant: str = "duffing", condition: str = "nominal", duration: float = 1.0
 ) -> list[smc.Trace]:
-    return smc.run(list(smc.paper.comparison(plant, condition, LAWS, duration=duration).values()))
+    return smc.run(
+        list(
+            smc.paper.comparison(
+                plant,
+                condition,
+                LAWS,
+                duration=duration,
+            ).values()
+        )
+    )
 
 
 @pytest.fixture(scope="module")

@@ -53,7 +53,12 @@ def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
     changed = {}
     for name in "vus":
         changed[name] = factor * getattr(trace, name)
-    return dataclasses.replace(trace, scenario=scenario, x=x, **changed)
+    return dataclasses.replace(
+        trace,
+        scenario=scenario,
+        x=x,
+        **changed,
+    )
 
 
 def ten(trace: smc.Trace) -> list[smc.Trace]:
@@ -344,7 +349,12 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
     page = figure(one, size=(5.0, 4.0))
     assert isinstance(page, Figure)
     assert tuple(page.get_size_inches()) == (5.0, 4.0)
-    figure(one, tmp_path / "a", format="pdf", size="ieee-column")
+    figure(
+        one,
+        tmp_path / "a",
+        format="pdf",
+        size="ieee-column",
+    )
     figure(one, tmp_path / "b.pdf")
     assert {path.name for path in tmp_path.iterdir()} == {"a.pdf", "b.pdf"}
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")

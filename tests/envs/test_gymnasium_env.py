@@ -87,7 +87,12 @@ def test_friction_and_drives_hold_in_a_batch_too(drives):
 OBSTACLES = {
     "stops": smc.Stops({"hinge": (-0.3, 0.3)}),
     "wall": smc.Wall("pendulum", direction=(1, 0, 0), gap=0.01),
-    "ball": smc.Ball("pendulum", mass=0.3, height=0.001, radius=0.3),
+    "ball": smc.Ball(
+        "pendulum",
+        mass=0.3,
+        height=0.001,
+        radius=0.3,
+    ),
 }
 
 

@@ -258,7 +258,12 @@ class Loop:
         control = self.middle = self.controller.scale * command
         control = control - self.rise
         if self.drive_step and self.drive_step.ripple:
-            moving = zip(control, data.qpos[self.channels["qpos"]], v, strict=True)
+            moving = zip(
+                control,
+                data.qpos[self.channels["qpos"]],
+                v,
+                strict=True,
+            )
             control = np.array([rippled(self.drive_step, *each) for each in moving])
         data.ctrl[self.channels["ctrl"][self.driven]] = control[self.driven]
 

@@ -31,7 +31,12 @@ PLANTS = pytest.mark.parametrize("name", ALL)
 def sized(name, n, **parameters):
     """The plant without dry friction, which is tested in tests/mechanisms/test_rig_plants.py."""
     size = {"n": n} if n > 1 else {}
-    return plant(name, **size, **dict.fromkeys(catalogue()[name].dry, 0.0), **parameters)
+    return plant(
+        name,
+        **size,
+        **dict.fromkeys(catalogue()[name].dry, 0.0),
+        **parameters,
+    )
 
 
 def changed(name, n, rng):
@@ -110,7 +115,15 @@ def test_the_model_obeys_its_equation_with_its_own_and_with_other_parameters(nam
 
 def test_a_long_chain_obeys_its_equation():
     p = sized("pendulum_network", 40)
-    assert worst_error(p, p.load(), np.random.default_rng(1), trials=5) < 1e-9
+    assert (
+        worst_error(
+            p,
+            p.load(),
+            np.random.default_rng(1),
+            trials=5,
+        )
+        < 1e-9
+    )
 
 
 @CASES

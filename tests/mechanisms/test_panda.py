@@ -117,7 +117,14 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
     dw = np.zeros(3)
     acc = np.array([0.0, 0.0, GRAV])
     loads = []
-    for turn, offset, rate, rise, parts in zip(turns, offsets, v, a, bodies, strict=True):
+    for turn, offset, rate, rise, parts in zip(
+        turns,
+        offsets,
+        v,
+        a,
+        bodies,
+        strict=True,
+    ):
         acc = turn.T @ (acc + cross(dw, offset) + cross(w, cross(w, offset)))
         spin = turn.T @ w
         dw = turn.T @ dw + cross(spin, rate * z) + rise * z
@@ -316,7 +323,12 @@ BEHIND = {
 def test_the_probe_presses_on_a_surface_and_does_not_pass_through(kind):
     point, axis, place, way = BEHIND[kind]
     home = (0.5545, 0.0, 0.5245)
-    path = smc.signals.cartesian_path("panda", [0.0, 1.0], [home, point], site="tip")
+    path = smc.signals.cartesian_path(
+        "panda",
+        [0.0, 1.0],
+        [home, point],
+        site="tip",
+    )
     common = {
         "plant": "panda",
         "law": "computed_torque_sliding",

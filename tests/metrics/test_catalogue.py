@@ -117,18 +117,16 @@ def second_order(zeta, omega, t):
 # Runs of a few samples, by hand
 
 # of the reference
-STEP, PULSE = (
-    [9, 9, 13, 13, 13],
-    [
-        0,
-        2,
-        2,
-        2,
-        0,
-        0,
-        0,
-    ],
-)
+STEP = [9, 9, 13, 13, 13]
+PULSE = [
+    0,
+    2,
+    2,
+    2,
+    0,
+    0,
+    0,
+]
 LAST = np.zeros((11, 2))
 # the last part is t = 8, 9, 10
 LAST[8:] = (
@@ -509,7 +507,14 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
         for name in ("x", "v", "u", "s", "r", "reaction"):
             columns[name] = getattr(trace, name)[:, [i]]
         alone.append(
-            m.score(run(trace.t, columns.pop("x"), units=("m", "rad")[i : i + 1], **columns))
+            m.score(
+                run(
+                    trace.t,
+                    columns.pop("x"),
+                    units=("m", "rad")[i : i + 1],
+                    **columns,
+                )
+            )
         )
     found = m.scores(trace)
     assert list(found) == ["driven", "free"]
@@ -578,7 +583,12 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
 
 def test_a_law_that_drops_the_pole_has_settled_nothing_also_where_both_have_one_unit():
     t = clock(1, 0.1)
-    acrobot = run(t, np.column_stack([np.exp(-9 * t), 5.0 + t]), units=("rad", "rad"), free=True)
+    acrobot = run(
+        t,
+        np.column_stack([np.exp(-9 * t), 5.0 + t]),
+        units=("rad", "rad"),
+        free=True,
+    )
     assert m.scores(acrobot)["driven"]["settling_time"] < 1.0
     assert m.settling_time(acrobot) == m.scores(acrobot)["free"]["settling_time"] == math.inf
 
@@ -682,7 +692,14 @@ def test_a_run_at_rest_scores_zero_however_short(n, samples):
 
 
 def test_a_run_of_one_step_by_hand():
-    scores = m.score(run([0, 0.5], [2.0, -1.0], u=[3.0, -1.0], s=[1.0, 0.5]))
+    scores = m.score(
+        run(
+            [0, 0.5],
+            [2.0, -1.0],
+            u=[3.0, -1.0],
+            s=[1.0, 0.5],
+        )
+    )
     assert {name: None if math.isnan(value) else value for name, value in scores.items()} == {
         "settling_time": math.inf,
         "rise_time": 0.0,  # 10 % and 90 % at the same sample
@@ -724,7 +741,12 @@ def test_the_limit_cycle_of_the_worst_channel_is_scored_and_its_absence_is_nan()
 def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     t = np.arange(2001) / 100
     asked = []
-    both = run(t, np.zeros((len(t), 2)), s=np.sin(60 * t)[:, None] * np.ones(2), units=("m", "rad"))
+    both = run(
+        t,
+        np.zeros((len(t), 2)),
+        s=np.sin(60 * t)[:, None] * np.ones(2),
+        units=("m", "rad"),
+    )
     monkeypatch.setattr(
         limit_cycle,
         "channel_cycle",
@@ -776,14 +798,26 @@ def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentage
     if not np.any(trace.x[0] - trace.r[0]) and not np.any(np.ptp(trace.r, axis=0)):
         return  # the scale is then 1 by convention
     before = m.score(trace)
-    after = m.score(dataclasses.replace(trace, x=c * trace.x, r=c * trace.r, u=k * trace.u))
+    after = m.score(
+        dataclasses.replace(
+            trace,
+            x=c * trace.x,
+            r=c * trace.r,
+            u=k * trace.u,
+        )
+    )
     for metric in m.metrics():
         power, of_u = (
             2 if f"({one})^2" in metric.unit else int(one in metric.unit) for one in ("{x}", "{u}")
         )
         if metric.name in before:
             factor = abs(c) ** power * abs(k) ** of_u
-            value = pytest.approx(factor * before[metric.name], rel=1e-12, abs=1e-12, nan_ok=True)
+            value = pytest.approx(
+                factor * before[metric.name],
+                rel=1e-12,
+                abs=1e-12,
+                nan_ok=True,
+            )
             assert after[metric.name] == value, metric.name
 
 
@@ -805,7 +839,12 @@ def test_permuting_channels_changes_nothing(trace, random):
 @settings(max_examples=40)
 @given(random_runs(), WHOLE, WHOLE)
 def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
-    moved = dataclasses.replace(trace, t=trace.t + start, x=trace.x + shift, r=trace.r + shift)
+    moved = dataclasses.replace(
+        trace,
+        t=trace.t + start,
+        x=trace.x + shift,
+        r=trace.r + shift,
+    )
     before = m.score(trace)
     after = m.score(moved)
     del before["peak"], after["peak"]
@@ -844,11 +883,21 @@ def test_a_speed_loop_is_never_settled_by_its_position_and_arrives_by_its_speed(
     t = np.linspace(0.0, 10.0, 1001)
     r = reference(t)
     speed = np.gradient(r, t)
-    following = run(t, r - 0.2 * speed, r=r[:, None], v=speed)
+    following = run(
+        t,
+        r - 0.2 * speed,
+        r=r[:, None],
+        v=speed,
+    )
     assert math.isnan(m.settling_time(following)) == travels
     assert m.arrived(following)
     if travels:
-        resting = run(t, np.full(1001, r[0]), r=r[:, None], v=np.zeros(1001))
+        resting = run(
+            t,
+            np.full(1001, r[0]),
+            r=r[:, None],
+            v=np.zeros(1001),
+        )
         assert not m.arrived(resting)
         assert math.isnan(m.settling_time(resting))
 

@@ -19,7 +19,15 @@ def ramp(y, gains, memory):
 
 def ran(fault, law=ramp, **fields):
     plant = smc.plant_from(SLIDE, ["slide"])
-    return smc.run(smc.Scenario(plant=plant, law=law, duration=1.0, fault=fault, **fields))
+    return smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            duration=1.0,
+            fault=fault,
+            **fields,
+        )
+    )
 
 
 def impulse(t, at, gain, bias, stuck, period):
@@ -40,11 +48,26 @@ def impulse(t, at, gain, bias, stuck, period):
 @pytest.mark.parametrize("at", [0.0, 0.5, 0.3125], ids=["start", "at a sample", "between"])
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_the_speed_is_the_integral_of_the_faulty_force(gain, bias, stuck, at, integrator):
-    fault = smc.Fault(at=at, gain=gain, bias=bias, stuck=stuck)
-    trace = ran(fault, control_period=5e-3, physics_step=2.5e-4, integrator=integrator)
+    fault = smc.Fault(
+        at=at,
+        gain=gain,
+        bias=bias,
+        stuck=stuck,
+    )
+    trace = ran(
+        fault,
+        control_period=5e-3,
+        physics_step=2.5e-4,
+        integrator=integrator,
+    )
     expected = impulse(trace.t, at, gain, bias, stuck, 5e-3) / MASS
     if not (stuck and at == 0.0):  # nothing was told before
-        assert np.allclose(trace.v[:, 0], expected, rtol=0.0, atol=2e-5)
+        assert np.allclose(
+            trace.v[:, 0],
+            expected,
+            rtol=0.0,
+            atol=2e-5,
+        )
     assert np.allclose(trace.u[:, 0], 3.0 * trace.t)  # the law does not know
 
 
@@ -61,7 +84,17 @@ def test_a_fault_is_kept_told_and_part_of_a_condition(tmp_path):
     trace = ran(fault)
     assert smc.load(trace.save(tmp_path / "a.npz")).scenario.fault == fault
     named = smc.condition("half", fault=fault)
-    assert smc.run(smc.grid("duffing", "pid", [named], duration=1.0))[0].scenario.fault == fault
+    assert (
+        smc.run(
+            smc.grid(
+                "duffing",
+                "pid",
+                [named],
+                duration=1.0,
+            )
+        )[0].scenario.fault
+        == fault
+    )
     titles = []
     for ax in smc.figure(trace).axes:
         titles += [text.get_text() for text in ax.texts]
@@ -76,7 +109,12 @@ def test_the_gain_that_may_be_lost_is_what_holds_the_start(kp, x0):
         return -gains.kp * y.e - gains.kd * y.de, y.e
 
     weight = 0.5 * 9.81 * 0.5
-    found = smc.margins("inverted_pendulum", pd(kp=kp), "gain", starts=smc.starts(x0=x0))
+    found = smc.margins(
+        "inverted_pendulum",
+        pd(kp=kp),
+        "gain",
+        starts=smc.starts(x0=x0),
+    )
     held = 1.0 - weight * np.sin(x0) / 6.0  # u_max is 6 N m
     assert found[0].value == pytest.approx(held, abs=0.03)
 

@@ -158,7 +158,12 @@ def test_process_noise_is_a_path_that_does_not_depend_on_where_it_is_read():
     signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
     fine = np.arange(4001) * 2.5e-4
     values = path(signal, fine)
-    np.testing.assert_allclose(path(signal, fine[::3]), values[::3], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        path(signal, fine[::3]),
+        values[::3],
+        rtol=0,
+        atol=1e-12,
+    )
     np.testing.assert_allclose(
         path(signal, np.repeat(fine, 2)), np.repeat(values, 2), rtol=0, atol=1e-12
     )
@@ -186,7 +191,12 @@ def test_process_noise_does_not_depend_on_steps_or_integrator():
         {"law": "classical"},
         {"noise": smc.Noise(1, 1)},
     ):
-        np.testing.assert_allclose(process(**fields).d, d, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            process(**fields).d,
+            d,
+            rtol=0,
+            atol=1e-12,
+        )
     for period in (2e-3, 20e-3):
         np.testing.assert_allclose(
             process(control_period=period).d, d[:: round(period / 1e-3)], rtol=0, atol=1e-12

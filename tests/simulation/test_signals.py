@@ -75,7 +75,16 @@ BLOW = Push(
     time=0.3,
     width=0.2,
 )
-IN_SPACE = [BLOW, Wind(1.0, -2.0, time=0.3, width=0.4), Dryden(7.0, dt=5e-3)]
+IN_SPACE = [
+    BLOW,
+    Wind(
+        1.0,
+        -2.0,
+        time=0.3,
+        width=0.4,
+    ),
+    Dryden(7.0, dt=5e-3),
+]
 SEEN = 0.3, -0.2, 0.1  # e, e' and s
 # what a reference may be
 LED = [signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)]
@@ -237,7 +246,12 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
         gust.v[-1] - base.v[-1], length * (push.v[-1] - base.v[-1]), rtol=1e-3, atol=1e-7
     )
     # and is logged as it acts
-    np.testing.assert_allclose(gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(
+        gust.d[-1],
+        length * push.d[-1],
+        rtol=1e-3,
+        atol=1e-4,
+    )
 
 
 @pytest.mark.parametrize(
@@ -280,7 +294,18 @@ def test_an_impulse_changes_the_momentum_by_itself(integrator):
 
 def test_band_limited_noise_has_its_variance_over_seeds_and_channels():
     """In 4000 paths: to 3 standard errors of a Gaussian's mean, variance and kurtosis."""
-    d = np.array([path(NOISE, [0.37], seed=s, channel=c)[0] for s in range(1000) for c in range(4)])
+    d = np.array(
+        [
+            path(
+                NOISE,
+                [0.37],
+                seed=s,
+                channel=c,
+            )[0]
+            for s in range(1000)
+            for c in range(4)
+        ]
+    )
     assert abs(np.mean(d)) < 3 * 0.3 / math.sqrt(4000)
     assert np.mean(d**2) == pytest.approx(0.09, rel=3 * math.sqrt(2 / 4000))
     assert np.mean(d**4) / np.mean(d**2) ** 2 == pytest.approx(
@@ -352,7 +377,13 @@ def test_a_time_series_is_straight_between_its_points_and_zero_outside():
         times = np.cumsum(rng.exponential(size=n))
         values = rng.normal(size=n)
         at = np.concatenate([rng.uniform(0.0, times[-1] + 1.0, 200), times])
-        expected = np.interp(at, times, values, left=0.0, right=0.0)
+        expected = np.interp(
+            at,
+            times,
+            values,
+            left=0.0,
+            right=0.0,
+        )
         np.testing.assert_allclose(
             path(TimeSeries(times, values), at), expected, rtol=1e-12, atol=1e-12
         )

@@ -23,7 +23,12 @@ def of(signal, t):
 def jerk_squared(times, states):
     """The integral of r'''^2 of the quintics through states (r, r', r'') at times."""
     total = 0.0
-    for T, start, end in zip(np.diff(times), states[:-1], states[1:], strict=True):
+    for T, start, end in zip(
+        np.diff(times),
+        states[:-1],
+        states[1:],
+        strict=True,
+    ):
         powers = np.array(
             [
                 [T**k, k * T ** (k - 1) if k else 0, k * (k - 1) * T ** (k - 2) if k > 1 else 0]
@@ -102,7 +107,13 @@ def tip(x):
 def test_cartesian_path_moves_the_tip_through_its_points():
     points = [tip((0.1, 0.2, 0.3)), tip((0.0, 1.0, 0.5)), tip((0.2, 0.6, -0.2))]
     times = (0.0, 1.0, 1.8)
-    path = smc.signals.cartesian_path(arms.arm(), times, points, site="tip", x0=(0.1, 0.2, 0.3))
+    path = smc.signals.cartesian_path(
+        arms.arm(),
+        times,
+        points,
+        site="tip",
+        x0=(0.1, 0.2, 0.3),
+    )
     lines = []
     for i in range(3):
         lines.append(smc.signals.Waypoints(times, [point[i] for point in points]))
@@ -156,5 +167,11 @@ def test_a_point_beyond_reach_is_named_with_its_distance(refused):
         "m away; give points within reach, or another x0",
     )
     refused(
-        lambda: smc.signals.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said
+        lambda: smc.signals.cartesian_path(
+            "double_pendulum",
+            (0, 1),
+            points,
+            body="lower",
+        ),
+        *said,
     )

@@ -97,7 +97,12 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
     escaped = r"50 \% \& $<$b$>$x\_1\textasciicircum{}\{2\}$<$/b$>$ \textbackslash{} $\lambda$ = 2"
     assert list(latex)[1].startswith(escaped)
     for row, in_latex in zip(table.rows, latex.values(), strict=True):
-        for cell, shown, tex in zip(row[1:], html[row[0].text], in_latex, strict=True):
+        for cell, shown, tex in zip(
+            row[1:],
+            html[row[0].text],
+            in_latex,
+            strict=True,
+        ):
             interval, *detects = cell.below.splitlines()
             assert " ".join([cell.text, interval, *detects]) in shown
             for number in (cell.text, interval):

@@ -55,7 +55,14 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(folder):
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
-    return smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=folder, **SHORT)
+    return smc.compare(
+        laws,
+        PLANTS,
+        ["friction", "encoder"],
+        8,
+        out=folder,
+        **SHORT,
+    )
 
 
 def kinds(found, plant="duffing"):
@@ -111,7 +118,14 @@ def test_the_same_call_goes_on_from_its_folder(found, folder, monkeypatch):
     monkeypatch.setattr(batches, "compute", lambda batches, *rest: [*batches].index(0))
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
     with pytest.raises(ValueError, match="0 is not in list"):  # no run is missing, so no batch
-        smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=folder, **SHORT)
+        smc.compare(
+            laws,
+            PLANTS,
+            ["friction", "encoder"],
+            8,
+            out=folder,
+            **SHORT,
+        )
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -147,7 +161,13 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
             **short,
         )
         made.to_latex("tables.tex")
-        smc.which("duffing", "noise", laws=["pid", "classical"], out="which", **short)
+        smc.which(
+            "duffing",
+            "noise",
+            laws=["pid", "classical"],
+            out="which",
+            **short,
+        )
         written.append(contents(tmp_path / name))
     first, second = written
     assert {"compared/results.parquet", "which/results.parquet", "tables.tex"} <= set(first)
@@ -160,7 +180,13 @@ def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
     tables = []
     for seed in (0, 1):
         given = {"out": tmp_path, "seed": seed, **SHORT}
-        made = smc.compare(["classical", "pid"], "duffing", "noise", 3, **given)
+        made = smc.compare(
+            ["classical", "pid"],
+            "duffing",
+            "noise",
+            3,
+            **given,
+        )
         tables.append(made.table)
         (holdout, *_) = made.leaderboard
         tables.append(holdout.entries[0].interval.median)
@@ -179,7 +205,14 @@ def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
 def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path, monkeypatch):
     monkeypatch.setattr(compare, "MAX_BLOCKS", most)
     conditions = ["nominal", "noise", "sine", "constant"]
-    made = smc.compare(["classical", "pid"], "duffing", conditions, 1, out=tmp_path, **SHORT)
+    made = smc.compare(
+        ["classical", "pid"],
+        "duffing",
+        conditions,
+        1,
+        out=tmp_path,
+        **SHORT,
+    )
     blocks = []
     for board in made.leaderboard:
         if board.metric == "itae":
@@ -196,7 +229,14 @@ def test_up_to_twelve_blocks_have_a_table_each():
 def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        made = smc.compare([plain_law, "classical"], "duffing", "nominal", 2, out=tmp_path, **SHORT)
+        made = smc.compare(
+            [plain_law, "classical"],
+            "duffing",
+            "nominal",
+            2,
+            out=tmp_path,
+            **SHORT,
+        )
     assert kinds(made)["plain_law"] == "tuned here"
     (remark,) = made.remarks
     assert remark.startswith("plain_law: no unit, so searched about the default: lam and k1")
@@ -204,7 +244,15 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
 
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
     laws = [my_law, smc.law("classical")]
-    made = smc.compare(laws, "duffing", "nominal", 8, False, out=tmp_path, **SHORT)
+    made = smc.compare(
+        laws,
+        "duffing",
+        "nominal",
+        8,
+        False,
+        out=tmp_path,
+        **SHORT,
+    )
     assert kinds(made) == {"my_law": "default", "classical": "shipped"}
     assert made.remarks == ["my_law: default gains (on duffing)"]
     assert "classical" not in [board.winner for board in made.leaderboard]
@@ -235,7 +283,12 @@ def test_what_cannot_run_is_refused_before_any_gains_are_searched(
 ):
     monkeypatch.setattr(fair_gains.Trial, "tuned", None)
     with pytest.raises(smc.ScenarioError, match=said):
-        smc.compare(*arguments, out=tmp_path / "new", progress=False, **named)
+        smc.compare(
+            *arguments,
+            out=tmp_path / "new",
+            progress=False,
+            **named,
+        )
     assert not os.path.exists(tmp_path / "new")
 
 
@@ -267,13 +320,25 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     within = smc.Uncertainty(disturbance=0.5)
     laws = [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
     given = {"worst": within, "out": tmp_path, **SHORT}
-    made = smc.compare(laws, "duffing", "nominal", 1, **given)
+    made = smc.compare(
+        laws,
+        "duffing",
+        "nominal",
+        1,
+        **given,
+    )
     for case in made.worst["duffing"].values():
         assert smc.score(smc.run(case.scenario))["rms_error"] == case.value >= case.median
     (table,) = [table for table in made.tables if "worst of 16 runs" in table.title]
     assert table.to_latex() in made.to_latex()
     monkeypatch.setattr(worst_case, "worst_case", None)
-    again = smc.compare(laws, "duffing", "nominal", 1, **given)
+    again = smc.compare(
+        laws,
+        "duffing",
+        "nominal",
+        1,
+        **given,
+    )
     assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
 
 

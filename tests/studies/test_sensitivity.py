@@ -37,7 +37,12 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
     whole = 49.0 / 8.0 + 0.1 * math.pi**4 / 5.0 + 0.01 * math.pi**8 / 18.0 + 0.5
     first = 0.5 * (1.0 + 0.1 * math.pi**4 / 5.0) ** 2 / whole, 49.0 / 8.0 / whole, 0.0, 0.0
     both = 8.0 * 0.01 * math.pi**8 / 225.0 / whole
-    for axis, alone, more in zip(axes, first, (both, 0.0, both, 0.0), strict=True):
+    for axis, alone, more in zip(
+        axes,
+        first,
+        (both, 0.0, both, 0.0),
+        strict=True,
+    ):
         assert axis.first.median == pytest.approx(alone, abs=0.02)
         assert axis.total.median == pytest.approx(alone + more, abs=0.02)
         assert axis.total.low <= alone + more <= axis.total.high
@@ -256,7 +261,13 @@ def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_inde
     base = scenario(law="none", plant="van_der_pol")
     over = smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0))
     found, alone = (
-        smc.sensitivity(base, over, points=16, threads=threads) for threads in (None, 1)
+        smc.sensitivity(
+            base,
+            over,
+            points=16,
+            threads=threads,
+        )
+        for threads in (None, 1)
     )
     indices = {axis.name: axis for axis in found.axes}
     assert indices["mass"].total.median > 0.8
@@ -272,7 +283,12 @@ def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_inde
 
 def test_a_run_fails_where_its_force_is_too_small_and_one_without_a_score_has_the_worst():
     base = scenario(plant="inverted_pendulum", law="observer_free", duration=4.0)
-    found = smc.sensitivity(base, smc.Uncertainty(bound=(0.05, 1.0)), "settling_time", points=16)
+    found = smc.sensitivity(
+        base,
+        smc.Uncertainty(bound=(0.05, 1.0)),
+        "settling_time",
+        points=16,
+    )
     bounds = found.space.column(0, found.shares)
     assert 0 < found.failed.sum() < 16
     assert bounds[found.failed].max() < bounds[~found.failed].min()
@@ -364,7 +380,12 @@ def test_runs_without_a_score_are_counted_and_too_many_are_not_explained():
         smc.ScenarioError,
         match="no run of 48 has a settling_time: give longer runs, another metric",
     ):
-        smc.sensitivity(dataclasses.replace(base, duration=0.1), over, "settling_time", points=16)
+        smc.sensitivity(
+            dataclasses.replace(base, duration=0.1),
+            over,
+            "settling_time",
+            points=16,
+        )
     found = smc.sensitivity(
         dataclasses.replace(base, duration=4.0), over, "settling_time", points=16
     )

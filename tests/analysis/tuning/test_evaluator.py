@@ -33,7 +33,12 @@ def test_objectives_are_those_of_each_law_on_its_own_unseen_instance():
         expected.append(objective_of(smc.run(BRIEF.holdout("duffing", law, i))))
     assert found == pytest.approx(expected, rel=1e-12)
     assert found[0] != found[2]
-    again, _ = objectives("duffing", laws[:1], BRIEF, instances=[2])
+    again, _ = objectives(
+        "duffing",
+        laws[:1],
+        BRIEF,
+        instances=[2],
+    )
     assert again == pytest.approx(found[2:], rel=1e-12)
 
 
@@ -111,7 +116,14 @@ def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_e
     candidates = []
     for factor in FACTORS:
         candidates.append(tuple(factor * cases[0].law.gains[name] for name in names))
-    evaluate = Evaluator(SECOND, cases, names, threads=2, by_equation=by_equation, slots=2)
+    evaluate = Evaluator(
+        SECOND,
+        cases,
+        names,
+        threads=2,
+        by_equation=by_equation,
+        slots=2,
+    )
     assert evaluate.engine == (EQUATION if by_equation else MUJOCO)
     found = [one.objective for one in evaluate(candidates)]
     assert found == pytest.approx(
@@ -139,10 +151,25 @@ def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_
     for k in (1.0, 1e9, 2.5, 0.01, 1.3):
         candidates.append(tuple(k * value for value in law.gains.values()))
     options = {"threads": 1, "by_equation": by_equation}
-    evaluate = Evaluator(goal, cases, names, slots=3, **options)
+    evaluate = Evaluator(
+        goal,
+        cases,
+        names,
+        slots=3,
+        **options,
+    )
     together = evaluate(candidates)
     assert [evaluate([one])[0] for one in reversed(candidates)] == together[::-1]
-    assert Evaluator(goal, cases, names, slots=1, **options)(candidates) == together
+    assert (
+        Evaluator(
+            goal,
+            cases,
+            names,
+            slots=1,
+            **options,
+        )(candidates)
+        == together
+    )
     expected = []
     for gains in candidates:
         expected.append(by_runs(cases, names, gains, goal))
@@ -163,7 +190,12 @@ def test_what_is_more_than_its_equation_is_run_by_mujoco():
     ):
         goal = Objective(conditions=("nominal", condition), duration=0.2)
         law = smc.law("observer_free")
-        evaluate = Evaluator(goal, goal.scenarios(plant, law), ("lam",), by_equation=True)
+        evaluate = Evaluator(
+            goal,
+            goal.scenarios(plant, law),
+            ("lam",),
+            by_equation=True,
+        )
         assert evaluate.engine == MUJOCO
         cases = evaluate.cases
         assert evaluate([(5.0,)])[0].objective == pytest.approx(
@@ -175,7 +207,12 @@ def test_what_is_more_than_its_equation_is_run_by_mujoco():
 def test_a_law_that_does_not_compile_has_the_objective_of_its_runs():
     goal = Objective(conditions=("nominal",), duration=0.2)
     cases = goal.scenarios("duffing", uncompiled())
-    evaluate = Evaluator(goal, cases, ("k", "c"), by_equation=True)
+    evaluate = Evaluator(
+        goal,
+        cases,
+        ("k", "c"),
+        by_equation=True,
+    )
     assert evaluate.engine == PYTHON
     assert evaluate([(2.0, 3.0)])[0].objective == by_runs(cases, ("k", "c"), (2.0, 3.0), goal)
 
@@ -185,6 +222,12 @@ def test_without_constraints_no_limit_acts():
     goal = Objective(conditions=("contact",), duration=1.0)
     cases = goal.scenarios("inverted_pendulum", smc.law("observer_free", lam=0.001))
     with_stop, without = (
-        Evaluator(goal, cases, ("lam",), constraints=one)([(0.001,)])[0] for one in (True, False)
+        Evaluator(
+            goal,
+            cases,
+            ("lam",),
+            constraints=one,
+        )([(0.001,)])[0]
+        for one in (True, False)
     )
     assert without.objective > 1.1 * with_stop.objective

@@ -46,7 +46,18 @@ def found():
 
 
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
-    assert tune("duffing", "observer_free", 16, 3, SHORT, threads=1, searches=3) == found
+    assert (
+        tune(
+            "duffing",
+            "observer_free",
+            16,
+            3,
+            SHORT,
+            threads=1,
+            searches=3,
+        )
+        == found
+    )
 
 
 def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatch):
@@ -132,7 +143,14 @@ def test_a_search_whose_equation_differs_from_mujoco_is_made_again_by_mujoco(fou
     wrong = dataclasses.replace(plant, nominal=_of_twice_the_force)
 
     def searched():
-        tuned = tune(wrong, "observer_free", budget=16, seed=3, objective=SHORT, searches=1)
+        tuned = tune(
+            wrong,
+            "observer_free",
+            budget=16,
+            seed=3,
+            objective=SHORT,
+            searches=1,
+        )
         return tuned.searches[0]
 
     assert found.searches[0].engine == EQUATION
@@ -166,7 +184,13 @@ def test_what_needs_a_shorter_step_keeps_its_own():
 @pytest.mark.filterwarnings("ignore:no set of gains")
 @pytest.mark.parametrize("budget", [1, 4, 32])
 def test_a_search_stops_at_its_budget_and_no_set_of_gains_is_paid_for_twice(budget):
-    (one,) = tune("duffing", "observer_free", budget=budget, objective=LEAN, searches=1).searches
+    (one,) = tune(
+        "duffing",
+        "observer_free",
+        budget=budget,
+        objective=LEAN,
+        searches=1,
+    ).searches
     assert 1 <= one.evaluations <= 2 * budget
     assert len({e.gains for e in one.history}) == len(one.history)
 
@@ -281,7 +305,13 @@ def test_a_gain_over_another_is_searched_as_far_as_a_force():
 
 def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
     with pytest.warns(smc.errors.ScenarioWarning, match=r"gains of failing have no unit.*Gain\("):
-        tuned = tune("duffing", failing(), budget=2, objective=LEAN, searches=1)
+        tuned = tune(
+            "duffing",
+            failing(),
+            budget=2,
+            objective=LEAN,
+            searches=1,
+        )
     for name, (low, high) in tuned.bounds.items():
         assert low * high == pytest.approx(failing().gains[name] ** 2)
 
@@ -293,7 +323,12 @@ def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
         own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)}
     )
     goal = Objective(conditions=("nominal",), duration=1.5)
-    tuned = tune("duffing", odd, objective=goal, searches=1)
+    tuned = tune(
+        "duffing",
+        odd,
+        objective=goal,
+        searches=1,
+    )
     low, high = tuned.bounds["lam"]
     assert tuned.searched["lam"] == (pytest.approx(low / 10), pytest.approx(10 * high))
     assert high < tuned.gains["lam"] <= 10 * high
@@ -330,7 +365,13 @@ def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lif
         return costs(trials, candidates, *rest)
 
     monkeypatch.setattr(search.Trials, "_costs", seen)
-    found = tune(plant, law, 24, objective=LEAN, searches=1)
+    found = tune(
+        plant,
+        law,
+        24,
+        objective=LEAN,
+        searches=1,
+    )
     template = found.law.template
     assert template is not None
     names = tuple(found.bounds)
@@ -345,15 +386,37 @@ def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lif
     assert not any(missed())
     assert "outside its theorem" not in str(found.law.source)
     evaluated.clear()
-    tune(plant, law, 24, objective=LEAN, searches=1, outside_theorem=True)
+    tune(
+        plant,
+        law,
+        24,
+        objective=LEAN,
+        searches=1,
+        outside_theorem=True,
+    )
     assert any(missed())
 
 
 def test_a_theorem_that_no_gains_of_the_search_hold_is_refused(refused):
     with pytest.warns(smc.errors.GainWarning):
         law = smc.law("terminal", p=0.3)  # held
-    refused(lambda: tune("duffing", law, 2, objective=LEAN, searches=1))
-    tune("duffing", law, 2, objective=LEAN, searches=1, outside_theorem=True)
+    refused(
+        lambda: tune(
+            "duffing",
+            law,
+            2,
+            objective=LEAN,
+            searches=1,
+        )
+    )
+    tune(
+        "duffing",
+        law,
+        2,
+        objective=LEAN,
+        searches=1,
+        outside_theorem=True,
+    )
 
 
 # runs that fail
@@ -416,8 +479,25 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
 
         return sensor_lost
 
-    refused(lambda: tune("duffing", made(0.0), objective=LEAN, searches=1))
-    assert not tune("duffing", made(2.0), budget=8, objective=LEAN, searches=1).sets[0].failed
+    refused(
+        lambda: tune(
+            "duffing",
+            made(0.0),
+            objective=LEAN,
+            searches=1,
+        )
+    )
+    assert (
+        not tune(
+            "duffing",
+            made(2.0),
+            budget=8,
+            objective=LEAN,
+            searches=1,
+        )
+        .sets[0]
+        .failed
+    )
 
 
 WORSE = (
@@ -428,14 +508,30 @@ WORSE = (
 
 
 def test_warns_if_and_only_if_the_laws_own_gains_are_better():
-    first = tune("duffing", smc.law("classical", k=0.5), objective=SHORT, searches=1)
+    first = tune(
+        "duffing",
+        smc.law("classical", k=0.5),
+        objective=SHORT,
+        searches=1,
+    )
     assert first.objective < first.before
     with pytest.warns(smc.errors.ScenarioWarning, match=WORSE) as caught:
-        again = tune("duffing", first.law, budget=1, objective=SHORT, searches=1)
+        again = tune(
+            "duffing",
+            first.law,
+            budget=1,
+            objective=SHORT,
+            searches=1,
+        )
     assert again.objective > again.before
     assert [Path(one.filename).name for one in caught] == ["test_search.py"]
     # as good as its own: a warning would be an error
-    tune("duffing", first.law, objective=SHORT, searches=1)
+    tune(
+        "duffing",
+        first.law,
+        objective=SHORT,
+        searches=1,
+    )
 
 
 LAGGING = smc.condition("lagging", actuator=smc.Lag(0.01))
@@ -449,8 +545,19 @@ def predicted(tuned) -> float:
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse_grid")
 def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
-    free = tune("duffing", "classical", 20, objective=LAGGED)
-    bound = tune("duffing", "classical", 20, objective=LAGGED, chattering=1e-4)
+    free = tune(
+        "duffing",
+        "classical",
+        20,
+        objective=LAGGED,
+    )
+    bound = tune(
+        "duffing",
+        "classical",
+        20,
+        objective=LAGGED,
+        chattering=1e-4,
+    )
     assert predicted(bound) <= 1e-4 < predicted(free)
     assert bound.objective < FAILURE_COST
     assert "predicted chattering of s <= 0.0001" in str(bound.definition)
@@ -462,5 +569,12 @@ def test_it_warns_if_all_gains_tried_chatter_too_much():
     with pytest.warns(
         smc.errors.ScenarioWarning, match="are predicted to chatter with more than 1e-12"
     ):
-        tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12, searches=1)
+        tuned = tune(
+            "duffing",
+            "classical",
+            2,
+            objective=LAGGED,
+            chattering=1e-12,
+            searches=1,
+        )
     assert tuned.objective > 2.0 * FAILURE_COST

@@ -138,7 +138,15 @@ def test_bars_are_shares_of_each_joints_limit(trace):
 
 
 def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
-    hit = struck(trace, disturbance=smc.signals.Push("hand", x=50.0, time=0.021, width=0.01))
+    hit = struck(
+        trace,
+        disturbance=smc.signals.Push(
+            "hand",
+            x=50.0,
+            time=0.021,
+            width=0.01,
+        ),
+    )
     body = (2.0, 0.0, 1.0)  # 250, 100 px
     shown = overlay(hit, body=body)
     before, during = (shown.over(paper(), frame) for frame in (0, 1))
@@ -156,7 +164,15 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
 
 def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace, monkeypatch):
     still = dataclasses.replace(trace, x=np.zeros_like(trace.x))
-    hit = struck(still, disturbance=smc.signals.Push("hand", y=50.0, time=0.3, width=0.02))
+    hit = struck(
+        still,
+        disturbance=smc.signals.Push(
+            "hand",
+            y=50.0,
+            time=0.3,
+            width=0.02,
+        ),
+    )
     found = pace.clock([hit], 30.0)
     slow = np.abs(found.times - 0.31) < 0.02
     assert slow.sum() > 5

@@ -35,7 +35,16 @@ renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 def runs(
     plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration: float = 0.3
 ) -> list[smc.Trace]:
-    return smc.run(list(smc.paper.comparison(plant, condition, laws, duration=duration).values()))
+    return smc.run(
+        list(
+            smc.paper.comparison(
+                plant,
+                condition,
+                laws,
+                duration=duration,
+            ).values()
+        )
+    )
 
 
 def driven(traces):
@@ -46,7 +55,12 @@ def driven(traces):
 def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
     clock = Clock(np.array(times), np.ones(len(times)))
     with contextlib.nullcontext() if charts else without_charts:
-        frames = film.Frames(traces, options.get("labels"), size=options.get("size", SIZE), at=0.0)
+        frames = film.Frames(
+            traces,
+            options.get("labels"),
+            size=options.get("size", SIZE),
+            at=0.0,
+        )
         frames.clock = clock
         return list(frames)
 
@@ -248,7 +262,17 @@ def test_only_dry_friction_sticks():
         assert states.has_dry_friction(twin) is (cf > 0.0 or cfq > 0.0)
     assert moods(realistic(friction=Coulomb(0.0))) == [(None, 61)]
     assert moods(realistic(friction=LuGre(0.5, 0.8, 0.05)))[-1][0] == "sticks"
-    assert moods(realistic("none", contact="floor", x0=0.9, duration=1.0))[-1][0] == "sticks"
+    assert (
+        moods(
+            realistic(
+                "none",
+                contact="floor",
+                x0=0.9,
+                duration=1.0,
+            )
+        )[-1][0]
+        == "sticks"
+    )
 
 
 def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
@@ -298,7 +322,14 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
     edges = np.append(-1e-3, slack.t)
-    ahead = MachineTrack(slack, "#0072B2", edges, edges[:2], {}, arms=True).ahead
+    ahead = MachineTrack(
+        slack,
+        "#0072B2",
+        edges,
+        edges[:2],
+        {},
+        arms=True,
+    ).ahead
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1
     resting = realistic(contact="floor", duration=0.2)

@@ -162,7 +162,13 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         time=0.1,
         width=0.02,
     )
-    trace = machine(arms.arm(), "none", u_max=limits, reference=smc.Sine(0.3, 4.0), duration=0.3)
+    trace = machine(
+        arms.arm(),
+        "none",
+        u_max=limits,
+        reference=smc.Sine(0.3, 4.0),
+        duration=0.3,
+    )
     trace = dataclasses.replace(
         trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)
     )
@@ -282,7 +288,18 @@ def test_two_machines_stand_apart_in_their_room_with_their_arrows(kind):
         )
         drawn = [
             (0, 0, arrows.Arrow(0.0, 0.8, red)),
-            (1, 0, arrows.Arrow(-0.7, 0.3, red, 1, 0.65, head=False)),
+            (
+                1,
+                0,
+                arrows.Arrow(
+                    -0.7,
+                    0.3,
+                    red,
+                    1,
+                    0.65,
+                    head=False,
+                ),
+            ),
         ]
         stage.pose(0, np.linspace(0.25, 0.3, first))
         red_parts = []
@@ -418,7 +435,13 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
         "camera": (10.0, -20.0),
     }
     given = (["a"], "b", size, (10.0, -20.0))
-    film.film(trace, tmp_path / "a.mp4", fps=10.0, speed=2.0, **looks)
+    film.film(
+        trace,
+        tmp_path / "a.mp4",
+        fps=10.0,
+        speed=2.0,
+        **looks,
+    )
     film.film(trace, tmp_path / "b.png", at=5.0, **looks)
     film.film(
         trace,

@@ -201,7 +201,12 @@ def test_levels_of_a_law_that_switches_fall_along_its_surface():
 
 
 def test_the_bound_is_that_of_the_inner_level_to_its_last_digit():
-    plant = smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803)
+    plant = smc.plant(
+        "van_der_pol",
+        M=0.685,
+        mu=0.164,
+        k=0.803,
+    )
     law = smc.law("classical", k=2.271, c=0.275)
     assert smc.audits.certify(smc.Scenario(plant=plant, law=law, x0=1.58)).bound == 0.0
 
@@ -272,28 +277,106 @@ MUTANTS = {
     "sign of local": set_margin(SATURATED, "local", times(-1)),
     "local a little larger": set_margin(SATURATED, "local", times(1.001)),
     "start": set_margin(LEVELS, "start", times(1.001)),
-    "a box left out": put("parts", SATURATED, "conditions", 1, "boxes", change=without(7)),
+    "a box left out": put(
+        "parts",
+        SATURATED,
+        "conditions",
+        1,
+        "boxes",
+        change=without(7),
+    ),
     "the box to infinity left out": put(
         "parts", SATURATED, "conditions", 1, "boxes", change=without(-1)
     ),
-    "a box shifted": put("parts", SATURATED, "conditions", 1, "boxes", 9, 0, change=times(1.001)),
-    "mass in V": put("parts", SATURATED, "V", "v^2", change=times(1.001)),
-    "spring in V": put("parts", SATURATED, "V", "x^2", change=times(1.001)),
-    "another theorem": put("parts", LEVELS, "theorem", change=lambda _: "reaching"),
-    "mass of the plant": put("plant", "parameters", "M", change=times(1.001)),
-    "spring of the plant": put("plant", "parameters", "alpha", change=times(1.001)),
+    "a box shifted": put(
+        "parts",
+        SATURATED,
+        "conditions",
+        1,
+        "boxes",
+        9,
+        0,
+        change=times(1.001),
+    ),
+    "mass in V": put(
+        "parts",
+        SATURATED,
+        "V",
+        "v^2",
+        change=times(1.001),
+    ),
+    "spring in V": put(
+        "parts",
+        SATURATED,
+        "V",
+        "x^2",
+        change=times(1.001),
+    ),
+    "another theorem": put(
+        "parts",
+        LEVELS,
+        "theorem",
+        change=lambda _: "reaching",
+    ),
+    "mass of the plant": put(
+        "plant",
+        "parameters",
+        "M",
+        change=times(1.001),
+    ),
+    "spring of the plant": put(
+        "plant",
+        "parameters",
+        "alpha",
+        change=times(1.001),
+    ),
     "another plant": put("plant", "name", change=lambda _: "van_der_pol"),
-    "lam": put("law", "gains", "lam", change=times(1.001)),
+    "lam": put(
+        "law",
+        "gains",
+        "lam",
+        change=times(1.001),
+    ),
     "k1": put("law", "gains", "k1", change=times(0.999)),
     "another law": put("law", "name", change=lambda _: "boundary_layer"),
     "a weaker actuator": put("u_max", change=lambda _: 4.0),
-    "a smaller bound": put("parts", LEVELS, "bound", change=times(0.999)),
-    "a smaller inner level": put("parts", LEVELS, "inner", change=times(0.1)),
-    "an outer level beyond the grid": put("parts", LEVELS, "outer", change=lambda _: 0.9999),
-    "a hill in W": put("parts", LEVELS, "W", change=raised),
-    "a row of W left out": put("parts", LEVELS, "W", change=without(20)),
+    "a smaller bound": put(
+        "parts",
+        LEVELS,
+        "bound",
+        change=times(0.999),
+    ),
+    "a smaller inner level": put(
+        "parts",
+        LEVELS,
+        "inner",
+        change=times(0.1),
+    ),
+    "an outer level beyond the grid": put(
+        "parts",
+        LEVELS,
+        "outer",
+        change=lambda _: 0.9999,
+    ),
+    "a hill in W": put(
+        "parts",
+        LEVELS,
+        "W",
+        change=raised,
+    ),
+    "a row of W left out": put(
+        "parts",
+        LEVELS,
+        "W",
+        change=without(20),
+    ),
     "a larger disturbance": put("disturbance", change=times(1.5)),
-    "another start": put("parts", LEVELS, "start", change=lambda _: [2.9, 5.0]),
+    "another start": put(
+        "parts",
+        LEVELS,
+        "start",
+        change=lambda _: [2.9, 5.0],
+    ),
     "another unit": put("unit", change=lambda _: "rad"),
     "another mechanism": put("plant", "mechanism", change=lambda _: "springs"),
     "two carts": put("plant", "n", change=lambda _: 2),
@@ -505,11 +588,25 @@ OTHERS = {
         "classical",
         put("parts", "reaching", "X", change=times(1.3)),
     ),
-    "a higher strip": ("duffing", "classical", put("parts", "reaching", "S", change=times(1.001))),
+    "a higher strip": (
+        "duffing",
+        "classical",
+        put(
+            "parts",
+            "reaching",
+            "S",
+            change=times(1.001),
+        ),
+    ),
     "a spring that pushes": (
         "pendulum_network",
         "observer_free",
-        put("plant", "parameters", "kc", change=times(-1)),
+        put(
+            "plant",
+            "parameters",
+            "kc",
+            change=times(-1),
+        ),
     ),
     "inverted pendulums": (
         "pendulum_network",
@@ -566,7 +663,12 @@ def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d
     """The worst found by the adversary, on the machine that MuJoCo samples."""
     made = certificate(plant, disturbance=d0)
     within = smc.Uncertainty(disturbance=d0)
-    worst = smc.worst_case(scenario(plant, duration=4.0), "ultimate_bound", within, budget=16)
+    worst = smc.worst_case(
+        scenario(plant, duration=4.0),
+        "ultimate_bound",
+        within,
+        budget=16,
+    )
     assert made.bound is not None
     assert worst.value <= made.bound <= 2.0 * worst.value
 
@@ -666,7 +768,14 @@ def test_no_run_contradicts_a_certificate(law):
         reported = list(claims(made, d0, rng))
         runs = []
         for x0, v0, push, _ in reported:
-            runs.append(dataclasses.replace(one, x0=x0, v0=v0, disturbance=push or ()))
+            runs.append(
+                dataclasses.replace(
+                    one,
+                    x0=x0,
+                    v0=v0,
+                    disturbance=push or (),
+                )
+            )
         for (x0, v0, push, end), trace in zip(reported, smc.run(runs), strict=True):
             late = np.abs(trace.x[-8000:]).max()
             assert late <= end, (plant, gains, d0, x0, v0, push)

@@ -85,7 +85,12 @@ def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
     offset.
     """
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
-    result = smc.audits.identify(near, axis_record(0.6 + begin, begin), starts=1, most=3)
+    result = smc.audits.identify(
+        near,
+        axis_record(0.6 + begin, begin),
+        starts=1,
+        most=3,
+    )
     for name, value in result.values.items():
         assert value == pytest.approx(AXIS.values[name], rel=0.02)
     assert min(result.fits[0].values()) > 99.0
@@ -122,7 +127,15 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     far = AXIS.with_values({"mass": 2000.0})
     brief = smc.run(AXIS.scenario(duration=0.5, reference=smc.Sine(0.05, 8.0), x0=0.0))
     one, again, other = (
-        smc.audits.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6)
+        smc.audits.identify(
+            far,
+            brief,
+            ["mass"],
+            starts=2,
+            seed=seed,
+            most=1,
+        )
+        for seed in (5, 5, 6)
     )
     assert one.values == again.values
     assert one.errors == again.errors
@@ -150,7 +163,13 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
             noise=noise,
         )
     )
-    result = smc.audits.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
+    result = smc.audits.identify(
+        AXIS,
+        trace,
+        ("mass", "viscous"),
+        starts=1,
+        most=4,
+    )
     for name, value in result.values.items():
         assert abs(value - AXIS.values[name]) < 3.0 * result.errors[name]
         assert result.errors[name] < 0.01 * AXIS.values[name]
@@ -166,7 +185,12 @@ def test_noise_is_read_off_a_moving_record():
 
 def test_parameters_that_cannot_be_told_apart_are_named(swung):
     with pytest.raises(smc.ScenarioError, match="in the records depends on torque_limit"):
-        smc.audits.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
+        smc.audits.identify(
+            PENDULUM,
+            swung,
+            ("inertia", "torque_limit"),
+            starts=1,
+        )
     still = smc.run(AXIS.scenario(duration=0.06, x0=0.0))
     with pytest.raises(smc.ScenarioError, match=r"cannot tell|nothing in the records depends on"):
         smc.audits.identify(AXIS, still, starts=1)
@@ -393,7 +417,13 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
 
     It holds an offset of 340 N, and not the greater ones that the search tries.
     """
-    smc.audits.identify(smc.rig("emps", offset=-340.0), moved, ["offset"], starts=6, most=2)
+    smc.audits.identify(
+        smc.rig("emps", offset=-340.0),
+        moved,
+        ["offset"],
+        starts=6,
+        most=2,
+    )
     assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
 
 

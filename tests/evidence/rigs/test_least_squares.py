@@ -353,7 +353,19 @@ def test_a_record_is_cut_into_pieces_of_its_window():
     np.testing.assert_allclose(
         np.array([made.state(rest, k) for k in range(3)])[:, 1], 0.0, atol=1e-12
     )
-    assert len(Replays(twin, ["M"], data, False, lambda count: None, whole=True).pieces) == 1
+    assert (
+        len(
+            Replays(
+                twin,
+                ["M"],
+                data,
+                False,
+                lambda count: None,
+                whole=True,
+            ).pieces
+        )
+        == 1
+    )
     np.testing.assert_allclose(
         made.start.values * made.scales, [twin.values["M"], twin.values["b"]]
     )

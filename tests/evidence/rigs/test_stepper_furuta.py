@@ -123,7 +123,12 @@ def test_no_run_falls_before_its_law_acts(name):
     rig = smc.rig("stepper_furuta")
     twin = rig.set(name) if name in rig.published else rig.members()[name]
     for law in rig.laws[:3]:
-        one = twin.scenario(law, x0=reported.start(8), seed=8, duration=0.1)
+        one = twin.scenario(
+            law,
+            x0=reported.start(8),
+            seed=8,
+            duration=0.1,
+        )
         assert np.abs(smc.run(one).u[:, 0]).max() > 0.0
 
 

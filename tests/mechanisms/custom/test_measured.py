@@ -57,7 +57,14 @@ def test_a_gain_matrix_drives_the_machine_as_in_plain_mujoco(make, tilt, gains):
     K = np.array(gains[make.__name__])
     settings = {"physics_step": 1e-3, "integrator": "Euler", "duration": 2.0, "u_max": 9.0}
     law = smc.law_from(K.tolist())
-    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=started(plant, tilt), **settings))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            x0=started(plant, tilt),
+            **settings,
+        )
+    )
 
     model = mujoco.MjModel.from_xml_string(POLES if make is poles else WHEELS)
     data = mujoco.MjData(model)
@@ -66,14 +73,20 @@ def test_a_gain_matrix_drives_the_machine_as_in_plain_mujoco(make, tilt, gains):
     else:
         data.qpos[1] = tilt
     for k in range(len(trace.t)):
-        x, v = data.qpos.copy(), data.qvel.copy()
+        x = data.qpos.copy()
+        v = data.qvel.copy()
         if make is wheels:
             lean = data.qpos[3:7]
             angle = 2.0 * np.arctan2(lean[2], lean[0])
             turn = 2.0 * lean[[1, 3]]  # of rotations this small
             x = np.array([*x[7:], *x[:3], turn[0], angle, turn[1]])
             v = np.array([*v[6:], *v[:6]])
-        assert np.allclose(trace.x[k], x, rtol=0.0, atol=1e-7)
+        assert np.allclose(
+            trace.x[k],
+            x,
+            rtol=0.0,
+            atol=1e-7,
+        )
         error = x - np.array([0.0] * plant.driven + list(plant.goal))
         data.ctrl[:] = np.clip(-K @ np.concatenate([error, v]), -9.0, 9.0)
         mujoco.mj_step(model, data)
@@ -84,7 +97,14 @@ def test_a_gain_matrix_drives_the_machine_as_in_plain_mujoco(make, tilt, gains):
 def test_the_regulator_stands_and_its_trace_comes_back(make, tilt, tmp_path):
     plant = make()
     law = smc.design.lqr(plant)
-    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=started(plant, tilt), duration=6.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant,
+            law=law,
+            x0=started(plant, tilt),
+            duration=6.0,
+        )
+    )
     errors = np.abs(trace.x - trace.r)[:, list(plant.scored_channels)]
     assert errors[-1].max() < 0.02 * abs(tilt)
     assert smc.score(trace)["settling_time"] < 5.0
@@ -99,7 +119,14 @@ def test_the_order_of_measured_joints_is_that_of_the_channels():
     for order in (("low", "high"), ("high", "low")):
         names = ("slide", *order)
         start = tuple(x0[name] for name in names)
-        trace = smc.run(smc.Scenario(plant=poles(order), law="pid", x0=start, duration=0.2))
+        trace = smc.run(
+            smc.Scenario(
+                plant=poles(order),
+                law="pid",
+                x0=start,
+                duration=0.2,
+            )
+        )
         traces.append(trace.columns())
     for name in x0:
         assert np.array_equal(traces[0][f"x_{name}"], traces[1][f"x_{name}"])
@@ -115,7 +142,14 @@ def test_a_law_reads_the_whole_mass_matrix_and_gives_u_of_the_driven():
 
     start = {"x0": (0.0, 0.2, -0.4), "v0": (0.1, -0.3, 0.6), "u_max": 9.0}
     with pytest.warns(match="does not compile"):
-        trace = smc.run(smc.Scenario(plant=poles(), law=reading, duration=0.005, **start))
+        trace = smc.run(
+            smc.Scenario(
+                plant=poles(),
+                law=reading,
+                duration=0.005,
+                **start,
+            )
+        )
     M, h, limit = seen[0]
     assert limit.tolist() == [9.0, 0.0, 0.0]
     acceleration = np.linalg.solve(M, np.array([0.5, 0.0, 0.0]) - h)
@@ -129,7 +163,12 @@ def test_where_a_base_is_counts_only_if_the_reference_says_where_it_should_be(ga
     asked = {"left": kept, "right": kept, "base_x": smc.Constant(0.3)}
     bounds = []
     for reference in (None, asked):
-        scenario = smc.Scenario(plant=plant, law=law, duration=0.5, reference=reference)
+        scenario = smc.Scenario(
+            plant=plant,
+            law=law,
+            duration=0.5,
+            reference=reference,
+        )
         trace = smc.run(scenario)
         bounds.append(smc.scores(trace)["free m"]["ultimate_bound"])
     assert bounds[0] < 1e-3

@@ -54,7 +54,15 @@ MOTORS = "".join(f'<motor joint="hip{i}"/><motor joint="knee{i}"/>' for i in ran
 MACHINES = {
     "arm": (ARM, "b"),
     "hand": (HAND, "lift"),
-    "walker": (WALKER.format(legs=LEGS, motors=MOTORS, high=0.601, bent="0 0 0 0"), "knee0"),
+    "walker": (
+        WALKER.format(
+            legs=LEGS,
+            motors=MOTORS,
+            high=0.601,
+            bent="0 0 0 0",
+        ),
+        "knee0",
+    ),
 }
 PID = smc.law("pid", kp=9.0, ki=1.0, kd=2.0)
 FAST = {"duration": 2.0, "conditions": ("nominal",)}
@@ -63,7 +71,12 @@ FAST = {"duration": 2.0, "conditions": ("nominal",)}
 def plant(name, mode, key="home", **channel):
     text, joint = MACHINES[name]
     fields = {"motor": True} | channel
-    return smc.plant_from(text, {joint: smc.Channel(**fields)}, keyframe=key, others=mode)
+    return smc.plant_from(
+        text,
+        {joint: smc.Channel(**fields)},
+        keyframe=key,
+        others=mode,
+    )
 
 
 def posed(name, x):
@@ -108,7 +121,8 @@ def moved(made):
     data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
     first = data.qpos.copy()
     joint = model.joint(model.actuator_trnid[-1, 0])
-    at, dof = joint.qposadr[0], joint.dofadr[0]
+    at = joint.qposadr[0]
+    dof = joint.dofadr[0]
     (goal,), (data.qpos[at],) = made.origin, scales.beside_goal(made)
     far = np.zeros(model.nq)
     load = scales.at_goal(made).load[0]
@@ -196,7 +210,12 @@ def test_the_goal_is_in_the_range_and_runs_start_beside_it(key, limits, goal, to
     text = ARM.replace('range="-2.4 -.5"', f'range="{limits}"')
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        made = smc.plant_from(text, ["c"], keyframe=key, others="locked")
+        made = smc.plant_from(
+            text,
+            ["c"],
+            keyframe=key,
+            others="locked",
+        )
     assert any("outside its range" in str(w.message) for w in caught) == told
     assert made.origin == made.x0 == (goal,)
     assert np.all(smc.run(smc.Scenario(plant=made, law="pid", duration=0.01)).r == goal)
@@ -206,7 +225,12 @@ def test_the_goal_is_in_the_range_and_runs_start_beside_it(key, limits, goal, to
         (x,) = run.resolved.x0
         assert abs(x - goal) == pytest.approx(min(0.3, 0.6 * room), rel=0.201)
         assert low < x < high
-    given = smc.grid(made, PID, starts=smc.starts(x0=goal + 0.01), seeds=3)[2].resolved.x0[0]
+    given = smc.grid(
+        made,
+        PID,
+        starts=smc.starts(x0=goal + 0.01),
+        seeds=3,
+    )[2].resolved.x0[0]
     assert 0.008 <= given - goal <= 0.012
     for beyond in (smc.Constant(high + 0.1), smc.Sine(high - low, 9.0, about="goal")):
         with pytest.raises(smc.ScenarioError, match=f"'c' of arm .* {re.escape(f'{low:g}')}"):
@@ -214,11 +238,23 @@ def test_the_goal_is_in_the_range_and_runs_start_beside_it(key, limits, goal, to
 
 
 def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
-    made = smc.plant_from(ARM, {"b": {}, "c": {}}, keyframe="home", others="locked")
+    made = smc.plant_from(
+        ARM,
+        {"b": {}, "c": {}},
+        keyframe="home",
+        others="locked",
+    )
     sine = smc.Sine(0.1, 3.0, about="goal")
     runs = []
     for reference in ({"c": sine}, {"c": smc.Constant(-1.1) + smc.Sine(0.1, 3.0)}):
-        runs.append(smc.Scenario(plant=made, law="pid", reference=reference, duration=0.5))
+        runs.append(
+            smc.Scenario(
+                plant=made,
+                law="pid",
+                reference=reference,
+                duration=0.5,
+            )
+        )
     assert runs[0] == runs[1] == serialise.restore(serialise.describe(runs[0]))
     trace = smc.run(runs[0])
     wanted = np.stack([0 * trace.t - 0.6, -1.1 + 0.1 * np.sin(3.0 * trace.t)], axis=1)
@@ -243,7 +279,14 @@ def test_a_pose_inside_something_is_refused_with_the_names(what):
 def test_a_joint_is_tuned_and_settles(name, mode):
     made = plant(name, mode)
     goal = dataclasses.replace(smc_objective(), **FAST)
-    tuned = smc.tune(made, "pid", budget=8, searches=1, objective=goal, threads=1)
+    tuned = smc.tune(
+        made,
+        "pid",
+        budget=8,
+        searches=1,
+        objective=goal,
+        threads=1,
+    )
     assert tuned.scales["X"] == pytest.approx(0.3)
     trace = smc.run(smc.grid(made, tuned.law, duration=3.0)[0])
     assert np.abs(trace.e[-500:]).max() < 0.05
@@ -258,8 +301,22 @@ def smc_objective():
 
 
 def test_a_joint_that_leans_on_its_stop_never_settles():
-    stop = smc.plant_from(ARM, {"c": {}}, keyframe="home", others="locked")
-    weak = smc.Scenario(plant=stop, law=smc.law("pid", kp=1e3, ki=0.0, kd=1.0), duration=1.0)
+    stop = smc.plant_from(
+        ARM,
+        {"c": {}},
+        keyframe="home",
+        others="locked",
+    )
+    weak = smc.Scenario(
+        plant=stop,
+        law=smc.law(
+            "pid",
+            kp=1e3,
+            ki=0.0,
+            kd=1.0,
+        ),
+        duration=1.0,
+    )
     for u_max, leaning in ((20.0, False), (0.05, True)):
         trace = smc.run(dataclasses.replace(weak, u_max=u_max))
         assert leans(trace) == leaning
@@ -269,8 +326,18 @@ def test_a_joint_that_leans_on_its_stop_never_settles():
 def test_a_robot_that_falls_is_told_so_and_never_settles():
     standing = plant("walker", "held")
     assert scales.falls(standing) == ""
-    text = WALKER.format(legs=LEGS, motors=MOTORS, high=0.68, bent=".4 0 .4 0")
-    limp = smc.plant_from(text, ["knee0"], keyframe="home", others="file")
+    text = WALKER.format(
+        legs=LEGS,
+        motors=MOTORS,
+        high=0.68,
+        bent=".4 0 .4 0",
+    )
+    limp = smc.plant_from(
+        text,
+        ["knee0"],
+        keyframe="home",
+        others="file",
+    )
     assert "locked" in scales.falls(limp)
     trace = smc.run(smc.Scenario(plant=limp, law="pid", duration=0.1))
     assert np.isinf(smc.score(trace)["settling_time"])

@@ -44,7 +44,12 @@ def scenario(friction, plant="cart_pole", **fields):
 def test_a_part_alone_is_on_the_driven_joint_and_by_name_on_any(part, plant, driven, free):
     alone, named, hinge, both, none = smc.run(
         [
-            scenario(friction, plant, integrator="implicitfast", physics_step=2.5e-4)
+            scenario(
+                friction,
+                plant,
+                integrator="implicitfast",
+                physics_step=2.5e-4,
+            )
             for friction in (part, {driven: part}, {free: part}, {"*": part}, None)
         ]
     )
@@ -122,19 +127,28 @@ def by_tiny_steps(M, m, inertia, l, hangs, x, q, level, where, seconds):
     """
     h = 2e-5
     steps = 50
-    a, c1, c2, k, rate, grav = 0.67, 0.67, 3.6, 0.5, 3.0, 9.81
+    a = 0.67
+    c1 = 0.67
+    c2 = 3.6
+    k = 0.5
+    rate = 3.0
+    grav = 9.81
     if hangs:
         l = -l
     samples = round(seconds * 1e3)
     out = np.zeros((samples + 1, 2))
-    v, w, u = 0.0, 0.0, 0.0
+    v = 0.0
+    w = 0.0
+    u = 0.0
     for j in range(samples * steps + 1):
         lever = m * l * math.cos(q)
         det = (M + m) * inertia - lever * lever
         along = m * l * math.sin(q) * w * w
         about = m * l * grav * math.sin(q)
-        f, fq = (inertia * along - lever * about) / det, ((M + m) * about - lever * along) / det
-        g, gq = inertia / det, -lever / det
+        f = (inertia * along - lever * about) / det
+        fq = ((M + m) * about - lever * along) / det
+        g = inertia / det
+        gq = -lever / det
         if j % steps == 0:
             out[j // steps] = x, q
             S = a * (v + c1 * x) + w + c2 * q
@@ -178,7 +192,8 @@ def test_the_verdict_on_a_cart_is_that_of_a_set_valued_integration(plant, machin
     truth = by_tiny_steps(*machine, level, where, 10.0)
     found, known = (smc.scores(t) for t in (trace, dataclasses.replace(trace, x=truth)))
     for group in found:
-        ours, theirs = found[group]["settling_time"], known[group]["settling_time"]
+        ours = found[group]["settling_time"]
+        theirs = known[group]["settling_time"]
         assert theirs < 9.0
         assert ours == pytest.approx(theirs, rel=5e-3)
     assert np.abs(trace.x - truth).max() < 5e-3 * np.abs(truth).max()
@@ -213,7 +228,12 @@ def test_a_joints_friction_is_the_frictionloss_of_that_joint_in_a_file(joint, le
 @pytest.mark.parametrize("part", [smc.Coulomb(0.02), LUGRE], ids=["Coulomb", "LuGre"])
 def test_a_joint_of_a_file_that_is_no_channel_has_friction_by_name(part):
     """A pole that nobody measures stands, and one on a rail that rubs falls."""
-    alone = smc.plant_from(CART % (0.0, 0.0), channels=["slide"], name="cart", others="file")
+    alone = smc.plant_from(
+        CART % (0.0, 0.0),
+        channels=["slide"],
+        name="cart",
+        others="file",
+    )
     runs = {}
     for joint in ("slide", "hinge", "*"):
         made = smc.Scenario(
@@ -224,7 +244,12 @@ def test_a_joint_of_a_file_that_is_no_channel_has_friction_by_name(part):
     assert not np.array_equal(runs["slide"].x, runs["*"].x)
     assert np.all(runs["hinge"].reaction == 0.0)  # of the cart
     with pytest.raises(smc.ScenarioError, match="unknown joint of Sigmoid"):
-        smc.Scenario(plant=alone, law="none", friction={"hinge": SIGMOID}, u_max=6.0)
+        smc.Scenario(
+            plant=alone,
+            law="none",
+            friction={"hinge": SIGMOID},
+            u_max=6.0,
+        )
 
 
 @pytest.mark.parametrize("name", ["coulomb", "friction", "lugre"])

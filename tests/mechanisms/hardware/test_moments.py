@@ -65,7 +65,12 @@ FRICTIONS = {
     "coulomb": smc.Coulomb(0.1),
     "lugre": smc.hardware.LuGre(0.05, 0.1, 0.05),
     "sigmoid": smc.hardware.Sigmoid(p1=0.3, p2=20.0),
-    "servo": smc.hardware.ServoFriction(kc=0.05, kcs=0.05, vs=0.1, kv=0.01),
+    "servo": smc.hardware.ServoFriction(
+        kc=0.05,
+        kcs=0.05,
+        vs=0.1,
+        kv=0.01,
+    ),
     "dahl": dahl(level=0.1),
     "grease": grease(),
     "two": (dahl(level=0.1), smc.Viscous(0.05)),
@@ -92,7 +97,15 @@ def same(a, b):
 
 @pytest.mark.parametrize("name", FRICTIONS)
 def test_a_friction_never_drives(name):
-    trace = smc.run(scenario(law="none", x0=2.0, v0=0.5, duration=1.0, friction=FRICTIONS[name]))
+    trace = smc.run(
+        scenario(
+            law="none",
+            x0=2.0,
+            v0=0.5,
+            duration=1.0,
+            friction=FRICTIONS[name],
+        )
+    )
     p = trace.scenario.plant.values({})
     energy = 0.5 * trace.v[:, 0] ** 2 + 9.81 / p.l * np.cos(trace.x[:, 0])
     assert trace.failure is None

@@ -95,7 +95,12 @@ def free(name, contact, seconds=0.6, **fields):
 
 def wall(name, gap=0.05, restitution=0.3):
     direction = (2, 0, 0) if name == "cart" else (0, 0, -1)
-    return smc.Wall(machine(name)[1], direction=direction, gap=gap, restitution=restitution)
+    return smc.Wall(
+        machine(name)[1],
+        direction=direction,
+        gap=gap,
+        restitution=restitution,
+    )
 
 
 def distances(trace):
@@ -139,7 +144,12 @@ def test_a_blow_parts_with_the_share_of_speed_that_was_asked(name, restitution):
     end = plant.x0[channel] + 0.2
     stopped = free(name, smc.Stops({joint: (end - 2.0, end)}, restitution), 0.5)
     hit = free(name, wall(name, 0.1, restitution), 0.5)
-    ball = smc.Ball(body, mass=0.01, height=0.2, restitution=restitution)
+    ball = smc.Ball(
+        body,
+        mass=0.01,
+        height=0.2,
+        restitution=restitution,
+    )
     fallen = free(name, ball, 0.3, **held(name))
     gaps = end - stopped.x[:, channel], distances(hit), distances(fallen)
     assert list(map(left_share, gaps)) == pytest.approx([restitution] * 3, abs=0.02)
@@ -175,7 +185,14 @@ def test_a_wall_stands_where_the_body_ends_and_the_gap(name, direction):
 @EVERY
 def test_a_ball_falls_from_rest_by_its_height(name):
     _, body, _ = machine(name)
-    gap = distances(free(name, smc.Ball(body, mass=0.01, height=0.1), 0.16, **held(name)))
+    gap = distances(
+        free(
+            name,
+            smc.Ball(body, mass=0.01, height=0.1),
+            0.16,
+            **held(name),
+        )
+    )
     assert gap[0] > 0.0
     met = STEP * int(np.argmax(gap < 0.0))
     assert met == pytest.approx(math.sqrt(2 * 0.1 / 9.81), abs=0.001)
@@ -184,10 +201,16 @@ def test_a_ball_falls_from_rest_by_its_height(name):
 @EVERY
 def test_the_force_of_contact_is_what_changes_the_momentum_of_a_ball(name):
     _, body, _ = machine(name)
-    trace = free(name, smc.Ball(body, mass=0.1, height=0.1), 0.2, **held(name))
+    trace = free(
+        name,
+        smc.Ball(body, mass=0.1, height=0.1),
+        0.2,
+        **held(name),
+    )
     found = contacts(trace)
     struck = np.flatnonzero(found.force)
-    first, last = struck[0] - 1, struck[0] + np.argmax(found.force[struck[0] :] == 0.0)
+    first = struck[0] - 1
+    last = struck[0] + np.argmax(found.force[struck[0] :] == 0.0)
     v = states(trace, trace.t)[1][:, -6:-3]
     fallen = np.array([0, 0, -9.81]) * (trace.t[last] - trace.t[first])
     momentum = 0.1 * (v[last] - v[first] - fallen)
@@ -200,7 +223,12 @@ def test_the_force_of_contact_is_what_changes_the_momentum_of_a_ball(name):
 def test_what_is_far_away_changes_no_bit(name):
     _, body, joint = machine(name)
     far = smc.Stops({joint: (-90.0, 90.0)}), wall(name, gap=90.0), smc.Ball(body, height=90.0)
-    alone = free(name, None, integrator="implicitfast", physics_step=STEP)
+    alone = free(
+        name,
+        None,
+        integrator="implicitfast",
+        physics_step=STEP,
+    )
     for part in (*far, far):
         with_it = free(name, part)
         for array, same in zip(with_it.arrays().values(), alone.arrays().values(), strict=True):
@@ -242,7 +270,12 @@ def test_a_goal_in_an_obstacle_is_said(name):
     goal = smc.Constant(0.9)
     for part, words in ((smc.Stops({joint: (-0.7, 0.8)}), joint), (wall(name), body)):
         with pytest.warns(smc.errors.ScenarioWarning, match=f"reference.*{words}"):
-            smc.Scenario(plant=plant, law="pid", reference=goal, contact=part)
+            smc.Scenario(
+                plant=plant,
+                law="pid",
+                reference=goal,
+                contact=part,
+            )
 
 
 @pytest.mark.slow
@@ -250,10 +283,25 @@ def test_a_goal_in_an_obstacle_is_said(name):
 def test_a_text_is_a_condition_of_compare(name, tmp_path):
     plant, body, joint = machine(name)
     text = f"stopped: contact=(Stops({{{joint!r}: (-9, 9)}}), Ball({body!r}, height=0.01))"
-    laws = [smc.law("pid", kp=40.0, kd=9.0, ki=0.0), smc.law("super_twisting", k1=5.0)]
+    laws = [
+        smc.law(
+            "pid",
+            kp=40.0,
+            kd=9.0,
+            ki=0.0,
+        ),
+        smc.law("super_twisting", k1=5.0),
+    ]
     out = tmp_path / "compared"
     runs = {"seeds": 2, "duration": 0.2, "starts": smc.starts(by=1e-3), "tune": False}
-    compared = smc.compare(laws, [plant], [text], out=out, progress=False, **runs)
+    compared = smc.compare(
+        laws,
+        [plant],
+        [text],
+        out=out,
+        progress=False,
+        **runs,
+    )
     assert "stopped" in str(compared)
 
 
