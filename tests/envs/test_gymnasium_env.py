@@ -297,13 +297,13 @@ def test_an_arm_tracks_a_reference_of_each_joint():
         off = np.eye(7)[i]
         assert tasks.reward(*found.errors(r + off, dr, 300)) < 0.9
         assert tasks.reward(*found.errors(r, dr + 5.0 * off, 300)) < 0.99
-    several = [smc.Sine(0.1 * i, 2.0) for i in range(7)]
+    several = [smc.Sine(0.1 * i, 2.0, about="goal") for i in range(7)]
     own = PlantEnv(arm, "track", {"reference": several, "duration": 0.5}).setting.reference(100)
-    np.testing.assert_allclose(own[:7], 0.1 * np.arange(7) * np.sin(0.2))
+    np.testing.assert_allclose(own[:7], rest + 0.1 * np.arange(7) * np.sin(0.2))
     both = PlantEnv(
-        arm, "track", {"reference": smc.Sine(0.1, 2.0), "duration": 0.5}
+        arm, "track", {"reference": smc.Sine(0.1, 2.0, about="goal"), "duration": 0.5}
     ).setting.reference(100)
-    np.testing.assert_allclose(both[:7], 0.1 * np.sin(0.2))
+    np.testing.assert_allclose(both[:7], rest + 0.1 * np.sin(0.2))
 
 
 # what gymnasium has

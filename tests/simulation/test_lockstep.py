@@ -137,16 +137,18 @@ def scattered(number):
             rng.uniform(0.1, 1), tau=rng.uniform(0.01, 1), dt=rng.uniform(1e-4, 1e-2)
         ),
     ]
+    law = smc.law(str(rng.choice(STUDIED)))
+    reference = smc.Sine(0.05, omega=20.0, about="goal") if plant.ranges else None
     return smc.Scenario(
         plant=plant,
-        law=smc.law(str(rng.choice(STUDIED))),
+        law=law,
         duration=0.2,
         control_period=period,
         physics_step=step,
         u_max=float(rng.choice([0.3, 6.0, math.inf])),
         x0=tuple(np.clip(rng.uniform(-1.5, 1.5, plant.n), *within(plant))),
         v0=tuple(rng.uniform(-1.5, 1.5, plant.n)),
-        reference=signals[rng.integers(4)],
+        reference=reference or signals[rng.integers(4)],
         disturbance=tuple(signals[i] for i in rng.choice(5, size=rng.integers(4), replace=False)),
         noise=smc.Noise(*rng.choice([0.0, 0.01], 2)),
         input_delay=int(rng.integers(0, 40)) * step,
