@@ -13,9 +13,9 @@ from smc_mujoco.simulation.signals import (
     Push,
     Ramp,
     Relay,
+    Sum,
     Wind,
 )
-from smc_mujoco.simulation.sums import Sum
 from smc_mujoco.simulation.time_series import Held, TimeSeries, Waypoints, cartesian_path
 
 __all__ = [

@@ -161,7 +161,7 @@ trace = smc.run(scenarios)[0]
 smc.figure(trace, "figure.png")
 smc.leaderboard(smc.study(scenarios, "study"))
 smc.plot
-for name in "exchange law_from rig identify paper problem".split():
+for name in "exchange law_from rig paper problem".split():
     try:
         getattr(smc, name)
     except smc.ScenarioError as error:

@@ -120,7 +120,7 @@ SAID = {
         f"friction within {percent(1.0 - uncertainty.DEFAULT_FRICTION_SCALE[0])}",
     ],
     smc.Scenario: [
-        f"Default: {scenario.U_MAX:g}, or the limit",
+        f"Default: {scenario.U_MAX:g}; of your own model the limit of the",
         f"else up to {1e3 * scenario.MAX_STEP:g} ms",
         f"to a {PARTS[scenario.DRIVE_STEPS]} of that period or half of the drive's time constant",
         f"up to {1e3 * scenario.REALISTIC_STEP:g} ms with friction",
@@ -128,8 +128,7 @@ SAID = {
         f"0 .. 2^{math.log2(constraints.MAX_SEED + 1):g} - 1",
     ],
     conditions: [
-        f"dry friction of {(level := under('coulomb')['friction'].level):g} N m or N is u_max / "
-        f"{scenario.U_MAX / level:g}",
+        f"{scenario.U_MAX / conditions.BOUNDS_PER_FRICTION:g} N m or N in the study",
         f"late by up to {part(under('jitter')['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
         f"one sample in {round(1 / under('missed')['clock'].missed)} does".replace("10", "ten"),
     ],

@@ -5,6 +5,7 @@ numba.np the kernel of functions of whole arrays, and `ensure_blas`, see jit.py.
 """
 
 # ruff: noqa: F401
+from numba.core import cgutils
 from numba.core.bytecode import FunctionIdentity
 from numba.core.ccallback import CFunc
 from numba.core.compiler import CompileResult

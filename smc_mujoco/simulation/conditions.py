@@ -325,7 +325,7 @@ def _kinds() -> dict[str, Any]:
     If two have one name, the suite's is returned.
     """
     from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
-    from smc_mujoco.simulation import sums, time_series  # noqa: F401
+    from smc_mujoco.simulation import time_series  # noqa: F401
 
     kinds: list[type] = [Noise, Jump, Fault, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]

@@ -62,6 +62,7 @@ from smc_mujoco.simulation.signals import (
     PerChannel,
     Push,
     Signal,
+    extremes,
 )
 
 MAX_TIME = 1e9  # s, of runs
@@ -793,8 +794,6 @@ def check_reference_ranges(s: Resolved) -> None:
     """Check that each reference stays within its joint's range."""
     if not s.plant.ranges:
         return
-    from smc_mujoco.simulation.sums import extremes
-
     for (joint, low, high), signal in zip(s.plant.ranges, s.references, strict=False):
         least, most = extremes(signal, s.duration)
         if not low - MAX_EXCESS <= least <= most <= high + MAX_EXCESS:

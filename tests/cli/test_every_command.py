@@ -55,7 +55,7 @@ CALLS = {
         "studies.which.which"
     ],
     "tune duffing pid": ["analysis.tuning.search.tune"],
-    "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
+    "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["analysis.margins.margins"],
     "margins --quick": ["analysis.margins.margins"],

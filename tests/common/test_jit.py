@@ -74,6 +74,7 @@ def test_code_is_kept_if_no_other_process_numbers_a_function_alike_and_no_addres
 @pytest.mark.parametrize(
     ("thing", "attributes"),
     [
+        (internals.cgutils, "create_struct_proxy pack_array get_null_value"),
         (internals.FunctionIdentity, "_unique_ids"),
         (internals.CFunc, "compile address cache_hits"),
         (internals.CompileResult, "_reduce _rebuild"),

@@ -89,6 +89,8 @@ def run(
         law=SimpleNamespace(name="classical"),
         noise=SimpleNamespace(position=noise),
         sensor=None,
+        tracks="position",
+        scored_channels=tuple(range(n)),
     )
     more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
     return Run(

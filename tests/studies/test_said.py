@@ -128,7 +128,7 @@ def test_a_task_of_the_arm_has_its_part_its_seed_and_all_that_disturbs_it(task):
     assert dict(one.mismatch) == {"payload": 0.5}  # the law knows nothing of it
     assert (one.jump is not None) is (task == "payload")
     assert bool(one.disturbance) is (task == "blow")
-    assert (one.contact is not None and one.contact.kind == "wall") is (task in ("wall", "behind"))
+    assert (bool(one.contact) and one.contact[0].kind == "wall") is (task in ("wall", "behind"))
 
 
 SETUP = (

@@ -19,11 +19,11 @@ if not hasattr(np, "row_stack"):  # numba-cuda 0.30 asks for it, and numpy 2.5 h
     setattr(np, "row_stack", np.vstack)  # noqa: B010
 
 from numba import cuda, float64, njit, types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.loop import simulation
+from smc_mujoco.common.numba_internals import cgutils
 
 THREADS = 128  # in a block
 PIECE = 2**18  # runs in a call of the device: they fill an H100, and Ctrl-C waits for them

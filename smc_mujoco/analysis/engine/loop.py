@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 from smc_mujoco.analysis.engine.form import (
@@ -30,6 +29,7 @@ from smc_mujoco.analysis.engine.form import (
 )
 from smc_mujoco.analysis.engine.scores import own, tallying
 from smc_mujoco.common.jit import named
+from smc_mujoco.common.numba_internals import cgutils
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import philox

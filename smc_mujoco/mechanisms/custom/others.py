@@ -76,7 +76,7 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
             bodies = model.geom_bodyid[contact.geom]
             if contact.dist < -DEPTH and moved[bodies[0]] != moved[bodies[1]]:
                 first, second = (
-                    model.geom(i).name or model.body(model.geom_bodyid[i]).name
+                    model.geom(i).name or model.body(model.geom_bodyid[i]).name or f"geom {i}"
                     for i in contact.geom.tolist()
                 )
                 raise ScenarioError(

@@ -111,7 +111,7 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
     plant = smc.plant_from(
         f"""<mujoco><worldbody><body pos="0 0 3"><joint name="j" axis="0 1 0"/><geom
           size=".5"/></body>
-        <geom type="box" size="{half} .1 .1"
+        <geom type="box" size="{half} .1 .1" contype="0" conaffinity="0"
           pos="{place + 0.5 - half if place else 0} 0 3"/></worldbody>
         <actuator><motor joint="j"/></actuator></mujoco>""",
         ["j"],

@@ -461,7 +461,7 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path, case):
 
 def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
     with pytest.raises(
-        smc.ScenarioError, match="its C code is for 3, where panda has 7: write it for 7"
+        smc.ScenarioError, match="its code is for 3, where panda has 7: write it for 7"
     ) as error:
         smc.Scenario(plant="panda", law=compiled["unit_vector"][1])
     assert "\n" not in str(error.value)

@@ -22,7 +22,7 @@ def jaco():
     joints = {}
     for i, x in enumerate(START, start=1):
         joints[f"joint_{i}"] = smc.Channel(motor=True, x0=x)
-    with pytest.warns(smc.ScenarioWarning, match="outside its range"):
+    with pytest.warns(UserWarning, match="outside its range"):
         return smc.plant_from(kinova.JacoArm().mjcf_model, channels=joints, name="jaco")
 
 
