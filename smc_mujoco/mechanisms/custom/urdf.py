@@ -1,5 +1,5 @@
 """URDFs as they lie in robots' repositories: with meshes of a package, meshes that MuJoCo cannot
-read or that are missing, impossible inertias, and joints that mimic others.
+read or that are missing, and impossible inertias.
 """
 
 import re
@@ -23,7 +23,6 @@ class Urdf(NamedTuple):
 
     text: str
     meshes: dict[str, Path]  # name in the text -> file
-    mimics: dict[str, tuple[str, float, float]]  # joint -> the one it follows, offset, multiplier
     lost: list[str]  # names of meshes without a file that MuJoCo can read
     raised: list[str]  # links with an inertia that no body has
 
@@ -36,11 +35,6 @@ class Urdf(NamedTuple):
                 for geom in body.geoms:
                     if geom.contype:
                         geom.group = UNSEEN_GROUP
-        there = {joint.name for joint in spec.joints}
-        for joint, (leader, offset, multiplier) in self.mimics.items():
-            if {joint, leader} <= there:
-                gear = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joint, name2=leader)
-                gear.data[:5] = offset, multiplier, 0.0, 0.0, 0.0
         return spec
 
     def notes(self, label: str) -> list[str]:
@@ -97,7 +91,7 @@ def _mended(robot: ET.Element, file: Path) -> Urdf:
     folder = file.parent / compiler.attrib.pop("meshdir", "")
     compiler.attrib.setdefault("discardvisual", "false")
     compiler.set("strippath", "false")
-    read = Urdf("", {}, {}, [], [])
+    read = Urdf("", {}, [], [])
     stems: dict[str, Path] = {}
     for link in robot.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
@@ -119,12 +113,6 @@ def _mended(robot: ET.Element, file: Path) -> Urdf:
         inertia = link.find("inertial/inertia")
         if inertia is not None and _raised(inertia):
             read.raised.append(link.get("name", ""))
-    for joint in robot.iter("joint"):
-        leader = joint.find("mimic")
-        if leader is not None:
-            offset = float(leader.get("offset", 0.0))
-            multiplier = float(leader.get("multiplier", 1.0))
-            read.mimics[joint.get("name", "")] = leader.get("joint", ""), offset, multiplier
     return read._replace(text=ET.tostring(robot, encoding="unicode"))
 
 

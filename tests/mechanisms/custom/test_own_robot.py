@@ -190,6 +190,7 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path):
     file = in_package(tmp_path, '<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="j2" multiplier="-2" offset=".1"/>')  # fmt: skip
     plant = smc.plant_from(file, {"j2": {"motor": True}})
     data = mujoco.MjData(model := plant.load())
+    assert model.neq == 1
     data.joint("j1").qpos, data.joint("j2").qpos = 0.1, 0.0
     model.opt.gravity[:] = 0.0
     data.qfrc_applied[model.joint("j2").dofadr] = 2.0
