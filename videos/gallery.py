@@ -39,7 +39,7 @@ class Clip(NamedTuple):
             runs.append(smc.Scenario(plant=self.plant, law=law, duration=self.seconds, **changes))
         if not self.laws:
             runs = smc.paper.comparison(
-                self.plant, self.condition, duration=self.seconds, changes=changes
+                str(self.plant), self.condition, duration=self.seconds, changes=changes
             ).values()
         return smc.film(smc.run(runs), title=self.title, fps=20.0)
 

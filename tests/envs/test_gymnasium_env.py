@@ -109,7 +109,7 @@ def test_episodes_begin_clear_of_obstacles_and_meet_them_as_runs_do(kind):
     for _ in range(299):
         copies, *_ = many.step([[1.0], [1.0]])
         o, *_ = single.step([1.0])
-    assert np.abs(copies[0] - o).max() < 1e-12
+        assert np.abs(copies[0] - o).max() < 1e-12
     placed = PlantEnv(PENDULUM, changes=changes | {"x0": 0.2, "v0": 3.0})
     trace = smc.run(run_of(placed.setting, LAW))
     assert np.abs(trace.reaction).max() > 1.0

@@ -184,9 +184,9 @@ def test_a_part_called_in_python_gives_the_same_bits(parts, plant):
     ],
 )
 def test_a_part_that_fails_is_named(parts, words):
-    trace = smc.run(scenario(**parts))
-    assert trace.failure.startswith(words)
-    assert "in channel 0, at t = 0.00" in trace.failure
+    failure = str(smc.run(scenario(**parts)).failure)
+    assert failure.startswith(words)
+    assert "in channel 0, at t = 0.00" in failure
 
 
 @pytest.mark.parametrize(
