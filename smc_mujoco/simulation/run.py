@@ -108,7 +108,7 @@ def run(
 
     MuJoCo's eight callbacks are global to the process. During a run no other callback is called,
     and a run fails if other code sets one, or takes its control callback away. Ctrl-C ends
-    the call within seconds. A compiled law of yours that never returns cannot be stopped: it keeps
+    the call within seconds. A compiled law that never returns cannot be stopped: it keeps
     one core busy until Python ends.
     """
     shown_bar = Flag()("progress", progress)

@@ -393,7 +393,7 @@ def find(name: str) -> Path:
     if Path(name).suffix or Path(name).name != name:
         raise ScenarioError(
             f"no scene file {name}: give the path of a .py file, or a name from smc-mujoco list; "
-            "for a model of yours give smc-mujoco compare FILE.xml:joint --law pid"
+            "for your own model give smc-mujoco compare FILE.xml:joint --law pid"
         )
     return lookup("scene", name, scenes())
 

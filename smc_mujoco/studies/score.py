@@ -168,7 +168,9 @@ class _Sample:
         for i, name in enumerate(self.metrics):
             apart = 0.0
             for (_, (values, _)), (own, _) in zip(self.drawn, others, strict=True):
-                if values[i] != own[i] and not math.isnan(values[i] + own[i]):
+                if math.isnan(values[i]) != math.isnan(own[i]):
+                    apart = math.inf  # one of the two failed
+                elif values[i] != own[i] and not math.isnan(own[i]):
                     apart = max(apart, abs(values[i] - own[i]))
             parts.append(f"{name} {apart:.1g}")
         return f"MuJoCo repeated {len(self.drawn)} runs, apart by at most {', '.join(parts)}"

@@ -22,14 +22,13 @@ from smc_mujoco.analysis.engine.form import (
 from smc_mujoco.analysis.engine.scores import METRICS, RESTING
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component, gain_at
+from smc_mujoco.metrics.catalogue import TRANSIENT_SHARE
 from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND
 from smc_mujoco.simulation.prepare import known_values, pause_phase, references
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
-
-TRANSIENT = 0.25  # of the run, which rms_error leaves out
 
 
 def why_not(scenario: Scenario, metrics: Sequence[str] = ()) -> str:
@@ -182,7 +181,7 @@ class Group:
             "pause_samples": pause_samples,
             "pause_phase": pause_phase(s) if pause else 0,
             "band": SETTLING_BAND * (start or 1.0),
-            "early": np.searchsorted(t, TRANSIENT * (1.0 - ROUNDING) * t[-1]),
+            "early": np.searchsorted(t, TRANSIENT_SHARE * (1.0 - ROUNDING) * t[-1]),
             "late": np.searchsorted(t, t[-1] - LAST_PART * (1 + ROUNDING) * t[-1]),
             "x0": s.x0,
             "v0": s.v0,
