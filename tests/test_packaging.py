@@ -78,13 +78,13 @@ def binaries(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return python.parent
 
 
-def test_the_wheel_holds_the_package_the_models_and_the_scenes_and_nothing_else(wheel):
+def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel):
     names = set()
     for name in zipfile.ZipFile(wheel).namelist():
         if ".dist-info/" not in name:
             names.add(name)
     assert names == shipped("smc_mujoco") | {
-        f"smc_mujoco/{name}" for name in shipped("models", "scenes")
+        f"smc_mujoco/{name}" for name in shipped("models", "scenes", "benchmarks/papers")
     }
 
 

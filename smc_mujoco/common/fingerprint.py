@@ -37,7 +37,7 @@ from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]
 # folders that are in the package in a wheel, and beside it in a checkout
-BESIDE_PACKAGE = ("models", "scenes")
+BESIDE_PACKAGE = ("models", "scenes", "benchmarks")
 PRESENTATION = (
     "evidence/report",
     "evidence/commands",

@@ -24,6 +24,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from smc_mujoco.common import files
 from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import reading, replacing
@@ -40,6 +41,7 @@ from smc_mujoco.evidence.audit.verdict import (
     Statement,
     Threshold,
 )
+from smc_mujoco.evidence.papers import gaber
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -50,7 +52,6 @@ from smc_mujoco.simulation.scenario import Scenario
 
 PAPER_FILE = "paper.toml"
 CODE_FILE = "claims.py"
-SHIPPED_PACKAGE = "smc_mujoco.evidence.papers"
 KINDS_OF_CLAIM = {"paper": "of its sentences", "derived": "derived", "ours": "beside it"}
 NO_FIELDS: Mapping[str, Any] = frozen({})
 # How much of a paper was read.
@@ -211,8 +212,10 @@ class Paper:
 
 def shipped() -> dict[str, Path]:
     """Return name -> folder of every paper that ships, in alphabetical order."""
-    home = Path(str(importlib.import_module(SHIPPED_PACKAGE).__file__)).parent
-    return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{PAPER_FILE}"))}
+    found = {"gaber": Path(gaber.__file__).parent}
+    for path in files.shipped("benchmarks/papers").glob(f"*/{PAPER_FILE}"):
+        found[path.parent.name] = path.parent
+    return dict(sorted(found.items()))
 
 
 Home = tuple[Path, str]  # a paper's folder, and the name under which it is imported
@@ -223,7 +226,8 @@ def catalogue() -> Catalogue[Home]:
     """Return name -> home of every paper that ships or comes with another package."""
     of_suite = {}
     for name, folder in shipped().items():
-        of_suite[name] = (folder, f"{SHIPPED_PACKAGE}.{name}")
+        of_suite[name] = (folder, _package(folder))
+    of_suite["gaber"] = (of_suite["gaber"][0], gaber.__name__)
     return Catalogue(of_suite, added("smc_mujoco.papers", _of_package))
 
 

@@ -7,22 +7,22 @@ import math
 import numpy as np
 import pytest
 from helpers.broken_laws import survivors
-
-import smc_mujoco as smc
-from smc_mujoco.control.component import Template
-from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.paper import paper, shipped
-from smc_mujoco.evidence.papers.acary_2012.claims import observed_twisting_60
-from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import (
+from papers.acary_2012.claims import observed_twisting_60
+from papers.aldana_lopez_2019.claims import (
     BAND,
     classical_bound,
     general_margins,
     least_bound,
 )
-from smc_mujoco.evidence.papers.huber_2014.claims import implicit_twisting
+from papers.huber_2014.claims import implicit_twisting
+from papers.perez_ventura_2017.claims import predicted
+from papers.seeber_2024.claims import flip, slopes
+
+import smc_mujoco as smc
+from smc_mujoco.control.component import Template
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, late_step, settled
-from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
-from smc_mujoco.evidence.papers.seeber_2024.claims import flip, slopes
 from smc_mujoco.simulation.trace import Trace
 from tests.evidence.papers.test_quick_verdicts import runs_made_once
 
@@ -233,7 +233,7 @@ def test_a_paper_s_own_laws_are_those_recorded(snapshot):
     said = {}
     for name in PAPERS:
         for law, one in paper(name).laws.items():
-            if isinstance(one, Template) and f"papers.{name}" in one.function.__module__:
+            if isinstance(one, Template) and f"paper_{name}" in one.function.__module__:
                 gains = ", ".join(
                     f"{gain} = {its.default:g}{' > 0' * its.positive}"
                     for gain, its in one.gains.items()
