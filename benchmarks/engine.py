@@ -49,11 +49,11 @@ def scenario(fields: dict, seed: int = 0) -> smc.Scenario:
 def rows_of(group: Group, count: int) -> np.ndarray:
     """Rows of runs that differ in seed and start."""
     rows = np.repeat(group.rows[:1], count, axis=0)
-    x0, band, seed = group.places.of("x0", "band", "seed")
+    x0, bands, seed = group.places.of("x0", "bands", "seed")
     n = group.form.n
     starts = np.random.default_rng(1).uniform(0.2, 0.6, (count, n))
     rows[:, x0 : x0 + n] = starts
-    rows[:, band] = 0.02 * starts.max(axis=1)
+    rows[:, bands : bands + n] = 0.02 * starts.max(axis=1, keepdims=True)
     rows[:, seed] = np.arange(count)
     return rows
 

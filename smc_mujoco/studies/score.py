@@ -112,7 +112,7 @@ def _scored(
         if not isinstance(case, Scenario):
             raise ScenarioError(f"cannot score {shown(case)}: give one Trace, or scenarios")
         key = None
-        if not group.why_not(case, metrics):
+        if not group.why_not(case, metrics, device):
             key = group.key(case)
         members.setdefault(key, []).append(i)
     for key, indices in members.items():

@@ -47,7 +47,10 @@ def check(plant, law, conditions, duration=10.0):
     made.rows[:, made.places.at["logging"]] = 1.0
     logs = np.full((len(cases), base.samples + 1, base.plant.n, len(LOGGED)), np.nan)
     scores = cpu.run(made.form, made.rows, made.tables, 1, logs)
-    close = [smc.run(_beside(cases, offset)) for offset in BESIDE]
+    near = [_beside(cases, offset) for offset in BESIDE]
+    close = list(map(smc.run, near))
+    moved = [group.Group(some, metrics) for some in near]
+    others_scores = [some.run(some.rows) for some in moved]
     for i, (name, trace) in enumerate(zip(conditions, smc.run(cases), strict=True)):
         score = scores[i]
         others = [traces[i] for traces in close]
@@ -64,13 +67,15 @@ def check(plant, law, conditions, duration=10.0):
                 room = 3.0 * max(np.abs(getattr(one, column) - samples).max() for one in others)
                 assert apart <= AGREES * max(1.0, np.abs(samples).max()) + room, (name, column)
         expected = catalogue.score(trace)
-        beside = list(map(catalogue.score, others))
-        for metric, value in zip(metrics, score[SCORES:], strict=True):
-            room = 3.0 * max(abs(one[metric] - expected[metric]) for one in beside)
-            assert value == pytest.approx(expected[metric], rel=AGREES, abs=AGREES + room), (
-                name,
-                metric,
-            )
+        beside = [expected, *map(catalogue.score, others)]
+        scores_beside = [score, *(some[i] for some in others_scores)]
+        for j, metric in enumerate(metrics):
+            # of all starts, because one alone may lie at an end of what rounding makes of it
+            values = [one[metric] for one in beside]
+            finite = [0.0] + [value for value in values if value < np.inf]
+            room = AGREES + 3.0 * np.ptp(finite[1:] or finite)
+            found = np.median([one[SCORES + j] for one in scores_beside])
+            assert found == pytest.approx(np.median(values), rel=AGREES, abs=room), (name, metric)
 
 
 def _beside(cases, offset):
@@ -105,6 +110,26 @@ def test_a_run_of_other_parts_is_that_of_mujoco(plant, law, condition):
         {condition: APART[condition]},
         duration=4.0,
     )
+
+
+OTHERS = {  # plant, law, and what else the scenario has
+    "joints": ("inverted_pendulum_network", "passivity_based", {"model": "nominal"}),
+    "C": ("duffing", "boundary_layer", {}),
+    "cart": ("cart_pole", "hierarchical", {}),
+    "arm": ("furuta", "rotary_swing_up", {"x0": (0.0, 3.0)}),
+    "torque": ("pendulum_network", smc.law("pid").on_computed_torque(), {"model": "nominal"}),
+}
+
+
+@pytest.mark.parametrize("kind", OTHERS)
+def test_a_law_called_by_address_or_of_more_joints_runs_as_in_mujoco(kind, tmp_path):
+    plant, law, fields = OTHERS[kind]
+    if kind == "C":
+        path = tmp_path / "mine.c"
+        path.write_text(smc.exchange.law_to_c(law))
+        law = smc.law_from(path)
+    noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
+    check(plant, law, {"plain": fields, "noise": fields | noisy}, duration=2.0)
 
 
 @pytest.mark.slow

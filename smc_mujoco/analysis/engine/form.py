@@ -4,11 +4,14 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
+from smc_mujoco.control.joint_law import stored_dtype
+from smc_mujoco.control.measurement import Measurement
+
 LOGGED = ("x", "v", "u", "s", "d", "r")  # of a channel at a sample, in a log
 FAILURE, FAILED_STEP, SCORES = range(3)  # places in the scores of a run; metrics follow
 SETTINGS = ("samples", "steps", "step", "period", "delay", "jump_step", "seed", "uses_model")
 SETTINGS += ("sigma_x", "sigma_v", "jitter", "missed", "pause", "pause_samples", "pause_phase")
-SETTINGS += ("band", "early", "late", "logging")
+SETTINGS += ("early", "late", "logging")
 ACTIVE, STREAM, PARAMETERS = range(3)  # places in the numbers of a signal
 STATE = ("x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "d")
 MEASURED = ("seen_x", "seen_v", "seen_a")
@@ -18,7 +21,7 @@ SAMPLED = ("sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r"
 class Part(NamedTuple):
     """A function of the user's, with the names of its parameters and its memory in a channel."""
 
-    function: Any
+    function: Any  # None: one in C, whose address is in the row
     names: tuple[str, ...]
     memory: int = 0
 
@@ -26,9 +29,10 @@ class Part(NamedTuple):
 class Form(NamedTuple):
     """What decides the code of a loop. Runs of one form differ in numbers alone."""
 
-    n: int  # channels, each with an actuator
+    n: int  # channels
+    driven: int  # those that have an actuator, which come first
+    joint: bool  # whether the law is of many joints
     laws: tuple[Part, ...]  # of all channels, or one for each
-    spread: bool  # whether each channel has gains of its own
     nominal: Part
     estimator: Part
     surface: Part | None
@@ -68,12 +72,14 @@ def row_places(form: Form) -> Places:
     places = Places()
     for name in SETTINGS:
         places.take(name)
-    for name in ("x0", "v0", "limits"):
+    for name in ("x0", "v0", "limits", "bands"):
         places.take(name, form.n)
     for name in ("known", "before", "after"):
         places.take(name, len(form.nominal.names))
     for i, law in enumerate(form.laws):
-        places.take(f"law {i}", len(law.names) * (form.n if form.spread else 1))
+        if law.function is None:
+            places.take(f"address {i}")
+        places.take(f"law {i}", len(law.names) * (form.driven if form.joint else 1))
     places.take("estimator", len(form.estimator.names))
     places.take("surface", len(form.surface.names) if form.surface else 0)
     for name, kind in signals(form).items():
@@ -89,6 +95,10 @@ def work_places(form: Form) -> Places:
         places.take(name, form.n)
     places.take("buffer", form.slots * form.n)
     places.take("law", max(law.memory for law in form.laws) * form.n)
+    if any(law.function is None for law in form.laws):
+        places.take("rest", form.n)  # velocities of 0
+        places.take("commanded", 2 * form.n)
+        places.take("measured", measured_places(form))
     places.take("estimator", form.estimator.memory * form.n)
     places.take("surface", form.surface.memory * form.n if form.surface else 0)
     for name, kind in signals(form).items():
@@ -96,6 +106,13 @@ def work_places(form: Form) -> Places:
     for name in form.metrics:
         places.take(f"metric {name}", 4 * form.n)
     return places
+
+
+def measured_places(form: Form) -> int:
+    """Return how many numbers a law in C reads."""
+    if form.joint:
+        return stored_dtype(form.n).itemsize // 8
+    return len(Measurement._fields)
 
 
 def signals(form: Form) -> dict[str, Any]:

@@ -23,7 +23,8 @@ from smc_mujoco.analysis.engine.scores import METRICS, RESTING
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.metrics.catalogue import TRANSIENT_SHARE
-from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND
+from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND, groups
+from smc_mujoco.simulation.cfunctions import compile_component
 from smc_mujoco.simulation.prepare import known_values, pause_phase, references
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Resolved, Scenario
@@ -31,27 +32,26 @@ from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
 
 
-def why_not(scenario: Scenario, metrics: Sequence[str] = ()) -> str:
+def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu") -> str:
     """Return what this engine cannot do of a scenario, in one sentence; "" if it does all."""
     s = scenario.resolved
     plant = s.plant
     parts = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     beyond = {
         f"{plant.name} is more than one equation a joint": bool(
-            plant.by_mujoco or plant.unmodelled or plant.direct or plant.free
+            plant.by_mujoco or plant.unmodelled or plant.direct or plant.measured
         ),
         "it has friction, contacts or another mechanism": not s.plain_equation,
         "it has an actuator": bool(s.actuator),
         "it has a sensor": s.sensor is not None,
         f"its integrator is {s.integrator}": s.integrator != "RK4",
-        "a law of many joints": s.law.joint,
+        "a law of many joints, or in C, is for the processor": device == "cuda"
+        and any(part.function is None for part in _laws(s)),
         "an actuator fails": s.fault is not None,
         "a disturbance acts on a body": any(
             d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
         ),
-        "its law is not written in Python that compiles": any(
-            isinstance(part.function, AtAddress | Uncompiled) for part in parts
-        ),
+        "its law does not compile": any(isinstance(part.function, Uncompiled) for part in parts),
     }
     moving = not all(isinstance(signal, Constant) for signal in s.references)
     for name in metrics:
@@ -67,13 +67,19 @@ def key(scenario: Scenario) -> Hashable:
 
 
 def _part(c: Component) -> Part:
-    return Part(c.function, tuple(c.gains), c.memory)
+    function = c.function
+    if c.joint or isinstance(function, AtAddress):
+        function = None
+    return Part(function, tuple(c.gains), c.memory)
+
+
+def _laws(s: Resolved) -> tuple[Part, ...]:
+    return tuple(map(_part, s.law.of_channels(s.plant.driven)))
 
 
 def _parts(s: Resolved) -> tuple:
-    laws = s.law.of_channels(s.plant.driven)
     return (
-        tuple(map(_part, laws)),
+        _laws(s),
         Part(s.plant.nominal, tuple(s.plant.parameters)),
         _part(s.velocity),
         None if s.surface is None else _part(s.surface),
@@ -83,6 +89,8 @@ def _parts(s: Resolved) -> tuple:
 def _fixed(s: Resolved) -> tuple:
     return (
         s.plant.n,
+        s.plant.driven,
+        s.law.joint,
         tuple(map(type, references(s))),
         None if s.feedforward is None else type(s.feedforward),
         tuple(None if error is None else type(error) for error in s.noise.errors),
@@ -102,13 +110,14 @@ class Group:
         resolved = [scenario.resolved for scenario in scenarios]
         first = resolved[0]
         laws, nominal, estimator, surface = _parts(first)
-        n, kinds, feedforward, errors, true_model = _fixed(first)
+        n, driven, joint, kinds, feedforward, errors, true_model = _fixed(first)
         clock = not all(s.clock.regular for s in resolved)
         delay = max(s.delay_steps // s.steps for s in resolved)
         self.form = Form(
             n=n,
+            driven=driven,
+            joint=joint,
             laws=laws,
-            spread=not all(s.law.uniform for s in resolved) and len(laws) == 1,
             nominal=nominal,
             estimator=estimator,
             surface=surface,
@@ -159,10 +168,6 @@ class Group:
 
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
         pause, pause_samples = s.clock.pauses(s.control_period, s.physics_step)
-        start = max(
-            abs(x - signal.value(0.0, signal)[0]) if isinstance(signal, Constant) else math.nan
-            for x, signal in zip(s.x0, s.references, strict=True)
-        )
         t = np.arange(s.samples + 1) * s.control_period
         settings = {
             "samples": s.samples,
@@ -180,7 +185,7 @@ class Group:
             "pause": pause,
             "pause_samples": pause_samples,
             "pause_phase": pause_phase(s) if pause else 0,
-            "band": SETTLING_BAND * (start or 1.0),
+            "bands": _bands(s),
             "early": np.searchsorted(t, TRANSIENT_SHARE * (1.0 - ROUNDING) * t[-1]),
             "late": np.searchsorted(t, t[-1] - LAST_PART * (1 + ROUNDING) * t[-1]),
             "x0": s.x0,
@@ -199,18 +204,25 @@ class Group:
         self._fill_signals(row, s)
 
     def _fill_gains(self, row: np.ndarray, law: Component) -> None:
-        columns = self.form.n if self.form.spread else 1
-        for i, part in enumerate(law.of_channels(self.form.n)):
-            gains = [gain_at(value, j) for j in range(columns) for value in part.gains.values()]
+        for i, part in enumerate(law.of_channels(self.form.driven)):
+            gains = []
+            for value in part.gains.values():
+                gains += [gain_at(value, j) for j in range(self._columns)]
             self._put(row, f"law {i}", gains)
+            if self.form.laws[i].function is None:
+                self._put(row, f"address {i}", compile_component(part).address)
+
+    @property
+    def _columns(self) -> int:
+        """The number of values of a gain in the row of a law."""
+        return self.form.driven if self.form.joint else 1
 
     def gain_columns(self, name: str) -> list[int]:
         """Return where a gain of the law is in a row: of every channel."""
         found = []
         for i, part in enumerate(self.form.laws):
-            size = len(part.names)
-            first = self.places.at[f"law {i}"] + part.names.index(name)
-            found += [first + size * j for j in range(self.form.n if self.form.spread else 1)]
+            first = self.places.at[f"law {i}"] + part.names.index(name) * self._columns
+            found += range(first, first + self._columns)
         return found
 
     def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
@@ -243,6 +255,20 @@ class Group:
             self._starts[id(data)] = sum(points.size for points in self._points)
             self._points.append(data.ravel())
         return self._starts[id(data)]
+
+
+def _bands(s: Resolved) -> np.ndarray:
+    """Return the settling band of every channel, (n,); NaN where a reference moves."""
+    goals = np.zeros(s.plant.n)
+    for i, signal in enumerate(s.references):
+        goals[i] = math.nan
+        if isinstance(signal, Constant):
+            goals[i] = signal.amplitude
+    bands = np.abs(np.subtract(s.x0, goals))
+    for group in groups(s):
+        channels = list(group.channels)
+        bands[channels] = SETTLING_BAND * (bands[channels].max() or 1.0)
+    return bands
 
 
 def _kinds(scenarios: Sequence[Resolved]) -> tuple[type, ...]:

@@ -23,14 +23,16 @@ from smc_mujoco.analysis.engine.form import (
     PARAMETERS,
     STREAM,
     Form,
+    measured_places,
     parameters,
     row_places,
     work_places,
 )
 from smc_mujoco.analysis.engine.scores import own, tallying
-from smc_mujoco.common.jit import named
+from smc_mujoco.common.jit import call, named, place
 from smc_mujoco.common.numba_internals import cgutils
 from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.joint_law import head_at, measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
@@ -327,19 +329,70 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
 def _law(form: Form, i: int, compile_user: Compiler) -> Any:
     """Return a compiled function (row, tables, work, y, channel) -> u and s of law i."""
     part = form.laws[i]
+    if part.function is None:
+        return _law_in_c(form, i)
     function = compile_user(part.function)
     gains = reader(part.names)
     memory = part.memory
     at = row_places(form).at[f"law {i}"]
     first = work_places(form).at["law"]
-    columns = len(part.names) if form.spread else 0
 
     @own
     def law(row, tables, work, y, channel):
         state = view(work, first + channel * memory, memory)
-        return function(y, gains(row, at + channel * columns), state)
+        return function(y, gains(row, at), state)
 
     return law
+
+
+def _law_in_c(form: Form, i: int) -> Any:
+    """Return the same of a law in C, which takes addresses."""
+    ask = _calling(form, i)
+    size = measured_places(form)
+    MEASURED, COMMANDED = work_places(form).of("measured", "commanded")
+
+    @own
+    def law(row, tables, work, y, channel):
+        for j in range(size):
+            work[MEASURED + j] = y[j]
+        ask(row, work, channel)
+        return work[COMMANDED], work[COMMANDED + 1]
+
+    return law
+
+
+def _calling(form: Form, i: int) -> Any:
+    """Return a compiled function (row, work, channel): call law i, which is in C, on what was
+    measured.
+    """
+    memory = form.laws[i].memory
+    ADDRESS, GAINS = row_places(form).of(f"address {i}", f"law {i}")
+    MEASURED, COMMANDED, MEMORY = work_places(form).of("measured", "commanded", "law")
+
+    @own
+    def ask(row, work, channel):
+        first = place(work)
+        state = first + 8 * (MEMORY + channel * memory)
+        gains = place(row) + 8 * GAINS
+        address = int(row[ADDRESS])
+        if call(address, first + 8 * MEASURED, gains, state, first + 8 * COMMANDED) != 0:
+            raise ValueError
+
+    return ask
+
+
+@functools.cache
+def _replacing(names: tuple[str, ...]) -> Callable:
+    """Return a compiled function (y, numbers) -> the measurement y with other values of these."""
+    fields = []
+    for name in Measurement._fields:
+        value = f"y.{name}"
+        if name in names:
+            value = f"numbers[{names.index(name)}]"
+        fields.append(f"{name}={value}")
+    space = {"Measurement": Measurement}
+    exec(f"def replaced(y, numbers): return Measurement({', '.join(fields)})", space)
+    return own(space["replaced"])
 
 
 def _surface(form: Form, compile_user: Compiler) -> Any:
@@ -352,36 +405,148 @@ def _surface(form: Form, compile_user: Compiler) -> Any:
     memory = part.memory
     at = row_places(form).at["surface"]
     first = work_places(form).at["surface"]
+    replaced = _replacing(("has_surface", "s", "v_eq"))
 
     @own
     def on_surface(row, work, y, channel):
         state = view(work, first + channel * memory, memory)
         s, v_eq = function(y, gains(row, at), state)
-        return Measurement(
-            y.t,
-            y.dt,
-            y.x,
-            y.v,
-            y.e,
-            y.de,
-            y.r,
-            y.dr,
-            y.ddr,
-            y.f,
-            y.g,
-            y.a,
-            y.limit,
-            y.model,
-            1.0,
-            s,
-            v_eq,
-            y.q,
-            y.dq,
-            y.fq,
-            y.gq,
-        )
+        return replaced(y, (1.0, s, v_eq))
 
     return on_surface
+
+
+def _referring(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, t, i): the reference of channel i."""
+    references = []
+    for i, kind in enumerate(form.references):
+        references.append(_signal(form, f"references {i}", kind, compile_user))
+    return _by_channel(references)
+
+
+def _asking(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, t, i) -> u, s and r of channel i."""
+    n = form.n
+    driven = form.driven
+    true_model = form.true_model
+    refer = _referring(form, compile_user)
+    law = _by_channel([_law(form, i, compile_user) for i in range(len(form.laws))])
+    on_surface = _surface(form, compile_user)
+    with_partner = _replacing(("q", "dq", "fq", "gq"))
+    nominal = compile_user(form.nominal.function)
+    values = reader(form.nominal.names)
+    KNOWN, LIMITS, PERIOD, USES_MODEL = row_places(form).of(
+        "known", "limits", "period", "uses_model"
+    )
+    SEEN_X, SEEN_V, SEEN_A, D = work_places(form).of("seen_x", "seen_v", "seen_a", "d")
+
+    @own
+    def ask(row, tables, work, t, i):
+        known = values(row, KNOWN)
+        xs = view(work, SEEN_X, n)
+        vs = view(work, SEEN_V, n)
+        r, dr, ddr = refer(row, tables, work, t, i)
+        f, g = nominal(xs, vs, i, known)
+        if true_model:
+            f += work[D + i] * g
+        a = work[SEEN_A + i]
+        if math.isnan(a):
+            a = ddr
+        y = Measurement(
+            t=t,
+            dt=row[PERIOD],
+            x=xs[i],
+            v=vs[i],
+            e=xs[i] - r,
+            de=vs[i] - dr,
+            r=r,
+            dr=dr,
+            ddr=ddr,
+            f=f,
+            g=g,
+            a=a,
+            limit=row[LIMITS + i],
+            model=row[USES_MODEL],
+            has_surface=0.0,
+            s=0.0,
+            v_eq=0.0,
+            q=0.0,
+            dq=0.0,
+            fq=0.0,
+            gq=0.0,
+        )
+        if n > driven:
+            partner = i + driven
+            fq, gq = nominal(xs, vs, partner, known)
+            y = with_partner(y, (xs[partner], vs[partner], fq, gq))
+        u, s = law(row, tables, work, on_surface(row, work, y, i), i)
+        return u, s, r
+
+    return ask
+
+
+def _asking_all(form: Form, compile_user: Compiler) -> Any:
+    """Return the same of a law of many joints, which is asked once, for all channels."""
+    n = form.n
+    driven = form.driven
+    refer = _referring(form, compile_user)
+    law = _calling(form, 0)
+    nominal = compile_user(form.nominal.function)
+    values = reader(form.nominal.names)
+    KNOWN, LIMITS, PERIOD, USES_MODEL = row_places(form).of(
+        "known", "limits", "period", "uses_model"
+    )
+    SEEN_X, SEEN_V, SEEN_A, REST, R, MEASURED, COMMANDED = work_places(form).of(
+        "seen_x", "seen_v", "seen_a", "rest", "r", "measured", "commanded"
+    )
+
+    @own
+    def measure(row, tables, work, t):
+        head = head_at(place(work) + 8 * MEASURED, 0)
+        head.t = t
+        head.dt = row[PERIOD]
+        head.model = row[USES_MODEL]
+        head.dynamics = 0.0
+        head.n = n
+        head.driven = driven
+        y = measurement_at(place(work) + 8 * MEASURED)
+        known = values(row, KNOWN)
+        xs = view(work, SEEN_X, n)
+        vs = view(work, SEEN_V, n)
+        for i in range(n):
+            r, dr, ddr = refer(row, tables, work, t, i)
+            work[R + i] = r
+            y.x[i] = xs[i]
+            y.v[i] = vs[i]
+            y.e[i] = xs[i] - r
+            y.de[i] = vs[i] - dr
+            y.r[i] = r
+            y.dr[i] = dr
+            y.ddr[i] = ddr
+            y.a[i] = work[SEEN_A + i]
+            if math.isnan(y.a[i]):
+                y.a[i] = ddr
+            y.limit[i] = row[LIMITS + i]
+            y.h[i] = 0.0
+            y.g[i] = 0.0
+            for j in range(n):
+                y.M[i, j] = 0.0
+            y.M[i, i] = 1.0
+            if row[USES_MODEL] != 0.0:  # M is diagonal
+                f, g = nominal(xs, vs, i, known)
+                at_rest = nominal(xs, view(work, REST, n), i, known)[0]
+                y.M[i, i] = 1.0 / g
+                y.h[i] = -f / g
+                y.g[i] = -at_rest / g
+
+    @own
+    def ask(row, tables, work, t, i):
+        if i == 0:
+            measure(row, tables, work, t)
+            law(row, work, 0)
+        return work[COMMANDED + i], work[COMMANDED + n + i], work[R + i]
+
+    return ask
 
 
 def _commanding(form: Form, compile_user: Compiler) -> Any:
@@ -390,71 +555,25 @@ def _commanding(form: Form, compile_user: Compiler) -> Any:
     It runs the law of every channel.
     """
     n = form.n
+    driven = form.driven
     slots = form.slots
-    true_model = form.true_model
-    references = []
-    for i, kind in enumerate(form.references):
-        references.append(_signal(form, f"references {i}", kind, compile_user))
-    refer = _by_channel(references)
+    ask = (_asking_all if form.joint else _asking)(form, compile_user)
     if form.feedforward is None:
         feed = _absent
     else:
         feed = _signal(form, "feedforward", form.feedforward, compile_user)
-    law = _by_channel([_law(form, i, compile_user) for i in range(len(form.laws))])
-    on_surface = _surface(form, compile_user)
-    nominal = compile_user(form.nominal.function)
-    values = reader(form.nominal.names)
-    KNOWN, LIMITS, PERIOD, USES_MODEL = row_places(form).of(
-        "known", "limits", "period", "uses_model"
-    )
-    SEEN_X, SEEN_V, SEEN_A, D, BUFFER, U, S, R = work_places(form).of(
-        "seen_x", "seen_v", "seen_a", "d", "buffer", "u", "s", "r"
-    )
+    LIMITS = row_places(form).at["limits"]
+    BUFFER, U, S, R = work_places(form).of("buffer", "u", "s", "r")
 
     @own
     def command(row, tables, work, k, t):
-        known = values(row, KNOWN)
-        xs = view(work, SEEN_X, n)
-        vs = view(work, SEEN_V, n)
         forward = feed(row, tables, work, t, 0)[0]
-        for i in range(n):
-            r, dr, ddr = refer(row, tables, work, t, i)
-            f, g = nominal(xs, vs, i, known)
-            if true_model:
-                f += work[D + i] * g
-            a = work[SEEN_A + i]
-            if math.isnan(a):
-                a = ddr
-            limit = row[LIMITS + i]
-            x = xs[i]
-            v = vs[i]
-            y = Measurement(
-                t,
-                row[PERIOD],
-                x,
-                v,
-                x - r,
-                v - dr,
-                r,
-                dr,
-                ddr,
-                f,
-                g,
-                a,
-                limit,
-                row[USES_MODEL],
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            )
-            u, s = law(row, tables, work, on_surface(row, work, y, i), i)
+        for i in range(driven):
+            u, s, r = ask(row, tables, work, t, i)
             u += forward
             if not (math.isfinite(u) and math.isfinite(s) and math.isfinite(r)):
                 return False
+            limit = row[LIMITS + i]
             u = min(max(u, -limit), limit)
             work[BUFFER + k % slots * n + i] = u
             work[U + i] = u
@@ -473,7 +592,7 @@ def _disturbing(form: Form, compile_user: Compiler) -> Any:
     """
     if not form.disturbances:
         return own(lambda row, tables, work, t, k: None)
-    n = form.n
+    driven = form.driven
     total = own(lambda row, tables, work, t, i, k, d: d)
     for j, kind in reversed(list(enumerate(form.disturbances))):
         total = _adding(form, f"disturbances {j}", kind, total, compile_user)
@@ -481,7 +600,7 @@ def _disturbing(form: Form, compile_user: Compiler) -> Any:
 
     @own
     def disturb(row, tables, work, t, k):
-        for i in range(n):
+        for i in range(driven):
             work[D + i] = total(row, tables, work, t, i, k, 0.0)
 
     return disturb
@@ -522,6 +641,7 @@ def _adding(form: Form, name: str, kind: Any, others: Any, compile_user: Compile
 def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
     """Return a compiled function (row, tables, work, k, within, step): a physics step of RK4."""
     n = form.n
+    driven = form.driven
     jump = form.jump
     disturbed = bool(form.disturbances)
     # a signal without memory is the same at the second stage and at the third
@@ -554,7 +674,10 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
                 disturb(row, tables, work, k * row[PERIOD] + (within + fraction) * h, -1)
             for i in range(n):
                 f, g = nominal(xs, vs, i, p)
-                work[A + i] = f + g * (work[APPLIED + i] + work[D + i])
+                actuator = i
+                if i >= driven:  # it has none, and moves with that of this channel
+                    actuator -= driven
+                work[A + i] = f + g * (work[APPLIED + actuator] + work[D + actuator])
             weight = 1.0 if stage % 3 == 0 else 2.0
             reach = h if stage == 2 else 0.5 * h
             for i in range(n):

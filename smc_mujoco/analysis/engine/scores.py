@@ -1,7 +1,8 @@
 """Metrics that a run sums up sample by sample, so that it needs no log.
 
-Each is that of `metrics`, for channels of one unit. A metric is two compiled functions: one takes a
-sample into its numbers in `work`, the other makes the score of them at the end.
+Each is that of `metrics`; all but times are of the channels that have an actuator. A metric is two
+compiled functions: one takes a sample into its numbers in `work`, the other makes the score of them
+at the end.
 """
 
 import math
@@ -48,7 +49,7 @@ def _integral(kind: str) -> Callable:
     squared = kind == "ise"
 
     def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.n
+        n = form.driven
         X, R = work_places(form).of("sample_x", "r")
         PERIOD = row_places(form).at["period"]
 
@@ -73,7 +74,7 @@ def _largest(column: str, late: bool = False, error: bool = False) -> Callable:
     """Return the largest |value| of a column, of the last part if `late`; minus r for an error."""
 
     def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.n
+        n = form.driven
         VALUE, R = work_places(form).of(column, "r")
         LATE = row_places(form).at["late"]
 
@@ -95,7 +96,7 @@ def _variation(late: bool) -> Callable:
     """Return the total variation of u, worst channel; of the last part per second if `late`."""
 
     def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.n
+        n = form.driven
         U, LAST_U = work_places(form).of("u", "last_u")
         LATE, SAMPLES, PERIOD = row_places(form).of("late", "samples", "period")
 
@@ -120,7 +121,7 @@ def _variation(late: bool) -> Callable:
 
 
 def _energy(form: Form, at: int) -> tuple[Any, Any]:
-    n = form.n
+    n = form.driven
     U = work_places(form).at["u"]
     SAMPLES, PERIOD = row_places(form).of("samples", "period")
 
@@ -139,7 +140,7 @@ def _mean(squared: bool) -> Callable:
     """
 
     def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.n
+        n = form.driven
         X, R = work_places(form).of("sample_x", "r")
         SAMPLES = row_places(form).at["samples"]
         FIRST = row_places(form).at["early" if squared else "late"]
@@ -167,12 +168,12 @@ def _mean(squared: bool) -> Callable:
 def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
     n = form.n
     X, R = work_places(form).of("sample_x", "r")
-    BAND, SAMPLES, PERIOD = row_places(form).of("band", "samples", "period")
+    BANDS, SAMPLES, PERIOD = row_places(form).of("bands", "samples", "period")
 
     @own
     def take(row, work, k):
         for i in range(n):
-            if abs(work[X + i] - work[R + i]) > row[BAND]:
+            if abs(work[X + i] - work[R + i]) > row[BANDS + i]:
                 work[at] = k + 1.0  # the first sample that may be within for good
 
     @own

@@ -6,7 +6,8 @@
 A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator
 prepares them once, puts the gains of each candidate into the buffers that compiled code reads, and
 takes J from the logs. It has three engines: MuJoCo, in a Batch that lasts; the fast one of
-`equation`, which may only find gains; and `run`, for laws that do not compile. J is that of
+`equation`, which may only find gains, and leaves to MuJoCo the cases that it cannot run; and `run`,
+for laws that do not compile. J is that of
 `Objective.terms_of_run`.
 """
 
@@ -39,8 +40,8 @@ from smc_mujoco.simulation.scenario import Scenario
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "Python"  # engines
 Gains = tuple[float, ...]
 Costs = tuple[float, float]  # tracking and variation of a run
-# number of a case, when it failed, s, (K + 1, n) LOG -> costs
-Terms = Callable[[int, float | None, np.ndarray], Costs]
+# a case, when it failed, s, (K + 1, n) LOG -> costs
+Terms = Callable[[Scenario, float | None, np.ndarray], Costs]
 
 
 class Evaluator:
@@ -77,32 +78,41 @@ class Evaluator:
         for case in self.cases:
             prepared.append(prepare(case))
         with memory_for(prepared):
+            self._runs: list[tuple[list[int], Any]] = []  # indices of cases, and what runs them
             if any(item.why_not for item in prepared):
                 self.engine = PYTHON
-                self._run = None
-            elif by_equation and (run := self._by_equation()):
+                return
+            self.engine = MUJOCO
+            fast = self._fast() if by_equation else []
+            if fast:
+                from smc_mujoco.analysis.tuning.equation import Equations
+
+                some = [self.cases[i] for i in fast]
                 self.engine = EQUATION
-                self._run = run
-            else:
-                self.engine = MUJOCO
-                self._run = _Batches(prepared, self.names, self.threads, constraints, slots)
+                run = Equations(goal, some, self.names, self.threads, device)
+                self._runs.append((fast, run))
+            rest = [i for i in range(len(prepared)) if i not in fast]
+            if rest:
+                some = [prepared[i] for i in rest]
+                batches = _Batches(some, self.names, self.threads, constraints, slots)
+                self._runs.append((rest, batches))
 
-    def _by_equation(self) -> Any:
-        """Return the runs by the plant's equation, or None where it does not do for all of them."""
+    def _fast(self) -> list[int]:
+        """Return the indices of the cases that the fast engine can run."""
         from smc_mujoco.analysis.engine.group import why_not
-        from smc_mujoco.analysis.tuning.equation import Equations
 
-        if any(map(why_not, self.cases)):
-            return None
-        return Equations(self.goal, self.cases, self.names, self.threads, self.device)
+        return [i for i, case in enumerate(self.cases) if not why_not(case, (), self.device)]
 
     def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
-        if self._run is None:
-            terms = self._terms_of_traces(candidates)
-        else:
-            terms = self._run(candidates, self._terms)
         size = len(self.cases)
+        terms = [(0.0, 0.0)] * (size * len(candidates))
+        for indices, engine in self._runs:
+            for k, costs in enumerate(engine(candidates, self._terms)):
+                row, column = divmod(k, len(indices))
+                terms[row * size + indices[column]] = costs
+        if self.engine == PYTHON:
+            terms = self._terms_of_traces(candidates)
         made = []
         for k, gains in enumerate(candidates):
             tracking, variation = (
@@ -136,9 +146,8 @@ class Evaluator:
             traces = run(cases, self.threads)
         return [self.goal.terms_of_run(trace) for trace in traces]
 
-    def _terms(self, index: int, failed_at: float | None, log: np.ndarray) -> Costs:
+    def _terms(self, case: Scenario, failed_at: float | None, log: np.ndarray) -> Costs:
         """Return tracking and variation of the run of a case, see `Terms`."""
-        case = self.cases[index]
         if failed_at is not None:
             return self.goal.terms_of_failure(failed_at)
         finite = np.isfinite(log["x"] - log["r"]).all(axis=1)
@@ -146,7 +155,10 @@ class Evaluator:
             return self.goal.terms_of_failure(int(np.argmin(finite)) * case.control_period)
         if case.plant.pose:
             return self.goal.terms_of_pose(case, log["x"], log["r"], log["u"])
-        return self.goal.terms_of_sums(case, *sums(log, case.control_period))
+        start = sum(np.abs(log["x"][0]).tolist())
+        driven = log[:, : case.plant.driven]
+        itae, tv = sums(driven, case.control_period)
+        return self.goal.terms_of_sums(case, itae, start, tv)
 
 
 def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
@@ -195,7 +207,7 @@ class _Batches:
         groups: dict[Hashable, list[int]] = {}
         for index, item in enumerate(prepared):
             groups.setdefault(item.key, []).append(index)
-        self.cases = len(prepared)
+        self.cases = [item.scenario for item in prepared]
         self.slots = _that_fit(prepared, slots)
         self.groups = list(groups.values())
         with callback.installed():
@@ -207,13 +219,13 @@ class _Batches:
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
         made: list[Costs] = []
         for some in _batched(candidates, self.slots):
-            rows = [(0.0, 0.0)] * (len(some) * self.cases)
+            rows = [(0.0, 0.0)] * (len(some) * len(self.cases))
             for its, batch in zip(self.groups, self.batches, strict=True):
                 batch.again([gains for gains in some for _ in its])
                 for k in range(len(some) * len(its)):
                     index = its[k % len(its)]
-                    rows[k // len(its) * self.cases + index] = terms(
-                        index, batch.failed_at(k), batch.logs[k]
+                    rows[k // len(its) * len(self.cases) + index] = terms(
+                        self.cases[index], batch.failed_at(k), batch.logs[k]
                     )
             made += rows
         return made
@@ -257,9 +269,9 @@ class _Again(ScenarioBatch):
         return int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
 
 
-def sums(log: np.ndarray, period: float) -> tuple[float, float, float]:
-    """Return ITAE, sum |x0| and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of
-    its trace do.
+def sums(log: np.ndarray, period: float) -> tuple[float, float]:
+    """Return ITAE and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace
+    do.
 
     Terms are added in their order, so that the last bit, which a search may magnify, is the same on
     every machine.
@@ -268,7 +280,7 @@ def sums(log: np.ndarray, period: float) -> tuple[float, float, float]:
     weighted = np.arange(len(log)) * period * errors
     itae = np.cumsum(0.5 * (weighted[:-1] + weighted[1:]) * period)[-1]
     tv = np.cumsum(np.abs(np.diff(log["u"], axis=0)), axis=0)[-1].max()
-    return float(itae), sum(np.abs(log["x"][0]).tolist()), float(tv)
+    return float(itae), float(tv)
 
 
 def objectives(

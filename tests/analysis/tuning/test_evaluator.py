@@ -182,25 +182,28 @@ def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_
         assert failure in (trace.failure or "")
 
 
-def test_what_is_more_than_its_equation_is_run_by_mujoco():
-    for plant, condition in (
-        ("duffing", "coulomb"),
-        ("duffing", "encoder"),
-        ("double_pendulum", "nominal"),
-    ):
-        goal = Objective(conditions=("nominal", condition), duration=0.2)
-        law = smc.law("observer_free")
-        evaluate = Evaluator(
-            goal,
-            goal.scenarios(plant, law),
-            ("lam",),
-            by_equation=True,
-        )
-        assert evaluate.engine == MUJOCO
-        cases = evaluate.cases
-        assert evaluate([(5.0,)])[0].objective == pytest.approx(
-            by_runs(cases, ("lam",), (5.0,), goal), rel=1e-12
-        )
+@pytest.mark.parametrize(
+    ("plant", "law", "gain", "condition", "engine"),
+    [
+        ("duffing", "observer_free", "lam", "coulomb", EQUATION),
+        ("duffing", "observer_free", "lam", "encoder", EQUATION),
+        ("cart_pole", "hierarchical", "c1", "noise", EQUATION),
+        ("cart_pole", "hierarchical", "c1", "coulomb", MUJOCO),
+        ("double_pendulum", "observer_free", "lam", "noise", MUJOCO),
+    ],
+)
+def test_a_case_that_is_more_than_its_equation_is_run_by_mujoco(
+    plant, law, gain, condition, engine
+):
+    """It alone: the others, under the nominal condition, stay with the engine."""
+    conditions = (condition,) if engine == MUJOCO else ("nominal", condition)
+    goal = Objective(conditions=conditions, duration=0.2)
+    cases = goal.scenarios(plant, smc.law(law))
+    evaluate = Evaluator(goal, cases, (gain,), by_equation=True)
+    assert evaluate.engine == engine
+    found = [one.objective for one in evaluate([(5.0,), (4.0,)])]
+    expected = [by_runs(cases, (gain,), (value,), goal) for value in (5.0, 4.0)]
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore:.*does not compile")
