@@ -19,7 +19,7 @@ for i, block in enumerate(blocks((ROOT / "README.md").read_text(), "python"), 1)
     (folder / f"readme_{i}.py").write_text(block)
 for name, text in titled(ROOT / "docs" / "tutorial.md").items():
     (folder / name).write_text(text)
-strict = ["readme_1.py", "compare.py"]
+strict = ["readme_2.py", "compare.py"]
 settings = {
     "typeCheckingMode": "standard",
     "strict": strict,

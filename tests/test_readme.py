@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from helpers.commands import python
 from helpers.episodes import dm_control_suite
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
 from helpers.public import public_names, there
@@ -95,10 +96,11 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
         pytest.skip(gl.missing())
     if "dm_control_env" in block:
         dm_control_suite()
-    if "import gymnasium" in block:
-        pytest.importorskip(
-            "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
-        )
+    for package in ("gymnasium", "optuna"):
+        if f"import {package}" in block:
+            pytest.importorskip(
+                package, reason=f"{package} is not installed: pip install {package}"
+            )
     if "law_from_fmu" in block:
         pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'smc-mujoco[fmu]'")
         warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
@@ -121,7 +123,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
-    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|mat|svg|png|tex|c|fmu))"', block))
+    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|json|mat|svg|png|tex|c|fmu))"', block))
     wanted |= set(re.findall(r'study\(.*"(\w+)"', block)) | (
         {"compared"} if "smc.compare(" in block else set()
     )
@@ -164,6 +166,18 @@ def check_command(line: str, known: dict) -> None:
         )
     if word == "show":
         assert given[0] in results(Path(given[0]).parent)
+
+
+@pytest.mark.slow
+def test_readme_s_command_gives_the_winners_of_its_table(tmp_path):
+    (tmp_path / "my_law.py").write_text(titled(PAGES[0])["my_law.py"])
+    (line,) = [line for line in commands(README) if line.startswith("smc-mujoco compare ")]
+    done = python("-m", "smc_mujoco", *shlex.split(line)[1:], folder=tmp_path, COLUMNS="200")
+    printed = re.findall(r"^(.+?) on .*?: (\w+) wins: (\S+) of (\w+)", done.stdout, re.MULTILINE)
+    shown = re.findall(r"(\w[\w ]*): `(\w+)`\s+wins, with (\S+) of `(\w+)`", README)
+    assert sorted((metric.lower(), *rest) for metric, *rest in printed) == sorted(
+        (metric.lower(), *rest) for metric, *rest in shown
+    )
 
 
 def results(folder: Path) -> set[str]:

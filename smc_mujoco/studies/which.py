@@ -125,8 +125,8 @@ def which(
     relevant: Relevant = RELEVANT,
     seed: DrawSeed = 0,
 ) -> Advice:
-    """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how
-    sure the answer is.
+    """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
+    how sure the answer is.
 
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".

@@ -46,7 +46,7 @@ def list_(
 
     The line about an entry of another installed package ends with the name of that package, in
     brackets. A law is shown with its gains and source. The command "smc-mujoco which" compares laws
-    that suit a plant, and advises one.
+    that suit a plant, and recommends one.
 
     FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong
     with it (docs/c.md). That process is not a sandbox: the law can open files and connections, like

@@ -51,7 +51,8 @@ def which(
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
-    """Advise a law for a plant: which to use, with which gains, the second, and how sure that is.
+    """Recommend a law for a plant: which to use, with which gains, the second best, and how sure
+    that is.
 
     All laws that suit the plant are compared by the rules of `compare`, with gains of the package
     or tuned now. On a model of your own that takes minutes for each law: --quick takes a sixteenth
@@ -129,13 +130,14 @@ def compare(
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is
-    better, and how sure.
+    better, and how sure that is.
 
-    A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of
-    the package for the plant, or is tuned by the same rule, seconds to minutes for each law on each
-    plant. If you stop the command, it continues when you start it again. --law all compares every
-    general law. With --rig laws have the gains of the machine, or those of --searches on its
-    parameter sets, and a line for each metric says if one law wins on all sets.
+    A law with gains in brackets keeps them. Any other law, including one from your own file, has
+    the package's gains for the plant, or else is tuned by the same rule, which takes seconds to
+    minutes for each law on each plant. If you stop the command, it continues when you start it
+    again. --law all compares every general law. With --rig laws have the machine's gains, or those
+    that --searches finds on its parameter sets, and a line for each metric says whether one law
+    wins on all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder
