@@ -114,7 +114,7 @@ class Drive(JointPart, Actuator):
 
 def friction_function(
     *, numbers: Mapping[str, float] | None = None, memory: int = 0
-) -> Callable[[Callable], type[JointForce]]:
+) -> Callable[[Callable], Callable[..., JointForce]]:
     """Turn a function (y, p, memory) -> force on a joint, N m (N), into a kind of friction.
 
     Args:
@@ -130,7 +130,7 @@ def friction_function(
 
 def actuator_function(
     *, numbers: Mapping[str, float] | None = None, memory: int = 0, delay: float = 0.0
-) -> Callable[[Callable], type[Drive]]:
+) -> Callable[[Callable], Callable[..., Drive]]:
     """Turn a function (y, p, memory) -> force of a drive, N m (N), into a kind of actuator.
 
     Args:
