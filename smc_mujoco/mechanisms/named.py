@@ -5,6 +5,7 @@ as_plant("arm.xml:shoulder,elbow")
 as_plant("cart.urdf:slider(motor,partner=pole,u_max=20,x0=0.5)")
 as_plant("drone.xml:body@hover")
 as_plant("robot.xml:knee(motor)@home+held")
+as_plant("cart.xml:slide+hinge(measured)")
 """
 
 import dataclasses
@@ -20,6 +21,7 @@ MODEL = re.compile(
     re.DOTALL | re.IGNORECASE,
 )
 BETWEEN_JOINTS = re.compile(r"[+,](?![^(]*\))")
+MEASURED = re.compile(r"\s*([^(]*?)\s*\(\s*measured\s*\)\s*", re.DOTALL)
 JOINT = re.compile(r"\s*(?P<joint>[^(]*?)\s*(?:\((?P<fields>.*)\))?\s*", re.DOTALL)
 
 
@@ -55,9 +57,9 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     `plant_from`'s arguments.
 
     A comma or a plus sign is between the joints: plants are separated by commas on the command
-    line. Fields of a `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2). The law of
-    a channel and its reference are those of the scenario. The keyframe of the start follows after
-    @. What other joints do is last, as +held.
+    line. Fields of a `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2); one that is
+    only measured is hinge(measured). The law of a channel and its reference are those of the
+    scenario. The keyframe of the start follows after @. What other joints do is last, as +held.
     """
     if not (model := MODEL.fullmatch(text)):
         if set(text) & set(":./\\"):
@@ -75,9 +77,12 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         return from_text(rest, folder, **{"others": others.strip()} | values)
     path = model["path"]
     joints = list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
-    channels = dict(map(_channel, joints))
-    if len(channels) < len(joints):
+    measured = [item[1] for item in map(MEASURED.fullmatch, joints) if item]
+    channels = dict(_channel(joint) for joint in joints if not MEASURED.fullmatch(joint))
+    if len(channels) + len(measured) < len(joints):
         raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
+    if measured:
+        values = {"measured": measured} | values
     if model["keyframe"] is not None:
         values = {"keyframe": model["keyframe"].strip()} | values
     return plant_from(folder / path, channels or {"": None}, **values)  # an error names the joints

@@ -21,7 +21,8 @@ it moves whatever can move. Under "jitter" samples are late by up to half of the
 period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration,
 so gains for a force do not suit it: tune under it. Its rates are those of the firmware of rig
 stepper_furuta; it is 30 times as strong as other drives, near that machine's ratio of torque to
-inertia, as one of their strength loses steps here.
+inertia, as one of their strength loses steps here. Under "fault" every actuator loses half of its
+force at 2 s.
 """
 
 import ast
@@ -429,6 +430,11 @@ def _stepper(plant: Plant, duration: float) -> Fields:
     return {"actuator": motor, "u_max": motor.ramp}
 
 
+def _fault(plant: Plant, duration: float) -> Fields:
+    """Return the loss of half the force, at 2 s, or at half of a run that is too short for it."""
+    return {"fault": Fault(at=2.0 if duration > 2.0 else duration / 2, gain=0.5)}
+
+
 def _sized(signal: Signal, plant: Plant) -> Signal:
     """Return a disturbance of the study's plants; for a free body that share of its largest
     force.
@@ -489,6 +495,7 @@ REAL: dict[str, Recipe] = {
     "jitter": {"clock": Clock(jitter=0.5e-3)},
     "missed": {"clock": Clock(missed=0.1)},
     "contact": _contact,
+    "fault": _fault,
 }
 
 NAMED: dict[str, Condition] = {

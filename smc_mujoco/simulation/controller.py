@@ -566,7 +566,7 @@ def _arrive(sim, data, step):
     past = step - sim.delay
     arrives = past >= 0 and past % sim.steps == _late(sim, past // sim.steps)
     faulty = step >= sim.fault_step
-    if faulty and sim.stuck != 0:
+    if faulty and sim.stuck != 0 and sim.failing < 0:
         return
     if arrives or step == sim.fault_step:  # a fault begins on what is held
         sim.arrived = 1
@@ -574,8 +574,8 @@ def _arrive(sim, data, step):
         for i in range(sim.n):
             state = state_at(sim.states, i)
             u = buffer[i] if arrives else state.delayed
-            if faulty:
-                u = sim.fault_gain * u + sim.fault_bias
+            if faulty and (sim.failing < 0 or sim.failing == i):
+                u = state.delayed if sim.stuck != 0 else sim.fault_gain * u + sim.fault_bias
             state.delayed = u
             if sim.has_drives == 0 and i < (sim.driven if sim.mixer == 0 else sim.actuators):
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * u

@@ -391,6 +391,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "fault_gain": s.fault.gain if s.fault else 1.0,
         "fault_bias": s.fault.bias if s.fault else 0.0,
         "stuck": s.fault is not None and s.fault.stuck,
+        "failing": s.failing(),
         "scale": math.prod(part.scale for part in s.actuator),
         "accelerates": s.accelerates,
         "torque": s.torque._asdict(),

@@ -42,6 +42,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     Friction,
     NominalDrive,
     Part,
+    drive_ids,
     joint_names,
     moves_alone,
 )
@@ -153,7 +154,7 @@ class Scenario:
         `plant.added`, such as a payload in kg, the value is added instead. `mass` is the plant's
         mass.
       jump: a change of the true plant's parameters in mid-run, or None.
-      fault: a Fault of the actuators in mid-run: less gain, a bias, or stuck. Or None.
+      fault: a Fault of one or all actuators in mid-run: less gain, a bias, or stuck. Or None.
       tracks: "position", or "speed" for a speed loop: then x' is scored and drawn against r', so
         that settling time, overshoot and bounds are of the speed. The law reads the same.
       seed: of every random number of the run, 0 .. 2^53 - 1.
@@ -511,6 +512,16 @@ class Scenario:
             return 2**62
         return math.ceil(self.fault.at / self.resolved.physics_step - 1e-6)
 
+    def failing(self) -> int:
+        """Return the index of the actuator that the fault is on; -1 for all."""
+        if self.fault is None or self.fault.on is None:
+            return -1
+        names = list(joint_names(self.plant)[: self.plant.driven])
+        if self.plant.pose:
+            model = compiled(self.plant.spec())
+            names = [model.actuator(int(i)).name for i in drive_ids(model)]
+        return find("actuator of Fault", self.fault.on, {name: i for i, name in enumerate(names)})
+
     @property
     def jump_step(self) -> int:
         """The first physics step with the parameters of the jump; -1 without a jump."""
@@ -743,6 +754,7 @@ def check_clock(s: Resolved) -> None:
             f"fault at {s.fault.at:g} s comes after the end of the run at {s.duration:g} s: give "
             "an earlier time"
         )
+    s.failing()  # refuses an unknown one
     if s.sensor is not None:
         s.sensor.check(s.physics_step)
     s.clock.check(s.control_period, s.physics_step)

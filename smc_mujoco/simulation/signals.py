@@ -635,12 +635,14 @@ class Fault:
 
     Each gives `gain` times its command plus `bias`, N m, N or the unit of u; or, if `stuck`, what
     it was told last. The law does not know. Drives come after it: behind a Lag the force follows.
+    `on` is the name of the one joint, or of the one thruster, that fails; default: all do.
     """
 
     at: Natural
     gain: Annotated[float, Number(low=-10.0, high=10.0)] = 1.0
     bias: Annotated[float, Number(low=-1e9, high=1e9)] = 0.0
     stuck: Boolean = False
+    on: str | None = None
 
     def __post_init__(self):
         constrain(self)
@@ -653,13 +655,14 @@ class Fault:
     @property
     def words(self) -> str:
         """What it does, such as "actuator × 0.5"."""
+        who = self.on or "actuator"
         if self.stuck:
-            return "actuator stuck"
+            return f"{who} stuck"
         said = []
         if self.gain != 1.0:
-            said.append(f"actuator × {self.gain:g}")
+            said.append(f"{who} × {self.gain:g}")
         if self.bias:
-            said.append(f"actuator {'−' if self.bias < 0.0 else '+'} {abs(self.bias):g}")
+            said.append(f"{who} {'−' if self.bias < 0.0 else '+'} {abs(self.bias):g}")
         return ", ".join(said) or "no fault"
 
     @property

@@ -110,11 +110,13 @@ SIMULATION = np.dtype(
         ("delay_buffer", "i8"),
         ("limits", "i8"),
         ("scale", "f8"),
-        # a fault of the actuators: its first physics step, gain, bias, and whether they are stuck
+        # a fault of the actuators: its first physics step, gain, bias, whether they are stuck, and
+        # the index of the one that fails, -1 for all
         ("fault_step", "i8"),
         ("fault_gain", "f8"),
         ("fault_bias", "f8"),
         ("stuck", "i8"),
+        ("failing", "i8"),
         # a free body: its actuators, the address of their rows for rotation.mix, 0 for others, and
         # its keeps_torques
         ("actuators", "i8"),

@@ -227,7 +227,8 @@ class Trial(NamedTuple):
                 for law, found in zip(laws[plant.name], known[plant.name], strict=True):
                     if found is None:
                         untuned.append(law)
-                self._tell_time(plant, untuned, starts[plant.name], searches, budget)
+                seconds, evaluations = self.expected(plant, untuned, starts[plant.name], budget)
+                told(f"gains on {plant.name}", seconds * searches * evaluations)
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
@@ -240,23 +241,23 @@ class Trial(NamedTuple):
                 made[plant.name].append(candidate)
         return made
 
-    def _tell_time(
-        self, plant: Plant, laws: Laws, starts: Starts | None, searches: int, budget: int
-    ) -> None:
-        """Tell how long the tuning of several laws takes at most, from an evaluation of one."""
+    def expected(
+        self, plant: Plant, laws: Laws, starts: Starts | None, budget: int
+    ) -> tuple[float, int]:
+        """Return how long an evaluation of the first law takes, s, and how many of them a search of
+        each law makes at most.
+        """
         from smc_mujoco.analysis.tuning import search
 
         goal = self._goal(plant, starts)
-        seconds = []
+        seconds = 0.0
         sizes = 0
         for law in laws:
             with contextlib.suppress(ScenarioError):
                 task = search.task_of(plant, coerce.law(law), goal, budget, 0, self.threads)
                 sizes += task.size
-                if not seconds:
-                    seconds.append(search.expected(task, searches) / task.size)
-        if len(laws) > 1 and seconds:
-            told(f"gains of {len(laws)} laws on {plant.name}", seconds[0] * sizes)
+                seconds = seconds or search.expected(task, 1) / task.size
+        return seconds, sizes
 
     def _check_tunable(
         self,
@@ -352,7 +353,12 @@ class Trial(NamedTuple):
             return _default(law, f"{NOT_TUNED}{error}")
         return candidate_of(default, tuned)
 
-    def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int) -> Table:
+    def run(
+        self,
+        candidates: Mapping[str, Sequence[Candidate]],
+        seeds: int,
+        half_steps: bool = True,
+    ) -> Table:
         """Run the laws of each plant in each condition from that many seeds."""
         runs = all_combinations(
             self.plants,
@@ -362,7 +368,7 @@ class Trial(NamedTuple):
             self.duration,
             self.starts,
         )
-        return study(runs, self.folder, True, self.threads, self.progress, half_steps=True)
+        return study(runs, self.folder, True, self.threads, self.progress, half_steps=half_steps)
 
     def holdout(
         self, candidates: Mapping[str, Sequence[Candidate]], count: int

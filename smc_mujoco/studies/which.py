@@ -20,6 +20,7 @@ from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.common.progress import told
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template, gain_text
@@ -31,7 +32,7 @@ from smc_mujoco.simulation.conditions import Condition, applicable, find_conditi
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.compare import DrawSeed
-from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
+from smc_mujoco.studies.fair_gains import BRIEF, Laws, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.table import Table
 
@@ -40,6 +41,9 @@ DEFAULT_NEEDS = ("fast", "accurate", "calm")
 DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 MIN_SETTLED = 0.5  # of the share of runs that settle under the best law; chosen
+# laws that go on where quick tunes all of them first, and the seeds of their first runs; chosen
+FINALISTS, FEW = 5, 6
+QUICK_SEARCHES, QUICK_BUDGET = 3, 16  # budget: evaluations of a search for each gain
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -50,6 +54,7 @@ class Advice(Tables):
     leaderboard: Boards  # of the laws that settle often enough, a board for each need
     laws: tuple[Component, ...]  # with their gains: those of the boards, best first
     settles: Mapping[str, float]  # law -> the least share of its runs that settle in a condition
+    left_out: Sequence[str] = ()  # laws that did not go on after one search and FEW runs
 
     @property
     def law(self) -> Component:
@@ -105,7 +110,13 @@ class Advice(Tables):
     def tables(self) -> list[Tabular]:
         """The tables of the `leaderboard`, with the answer below the last."""
         *others, last = self.leaderboard.tables
-        return [*others, dataclasses.replace(last, notes=[*last.notes, "", *self.answer])]
+        notes = [*last.notes, ""]
+        if self.left_out:
+            notes.append(
+                f"Left out after one search and {FEW} runs in each condition: "
+                f"{', '.join(self.left_out)}"
+            )
+        return [*others, dataclasses.replace(last, notes=notes + self.answer)]
 
 
 @constrained
@@ -139,7 +150,8 @@ def which(
       duration: of a run, s. Default: 5, or 3 if quick.
       out: folder for gains and runs, which another call reads.
       quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64. On your own
-        model also a shorter objective, and by default the laws of the report's first page.
+        model also a shorter objective, and by default the laws of the report's first page. There
+        one search and six runs in each condition come first, and the best five laws go on.
       defaults: whether a law may win over rivals whose gains are their defaults.
       starts, relevant, threads, progress, seed: as in `compare`.
 
@@ -172,25 +184,52 @@ def which(
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress, seed, brief)
     trial.check({machine.name: chosen})
     if quick:
-        searches, budget = (3, 16)
+        searches, budget = QUICK_SEARCHES, QUICK_BUDGET
     else:
         searches, budget = (SEARCHES, BUDGET)
+
+    def judged(table: Table) -> tuple[dict[str, float], Boards]:
+        settles, fit = _fit(table)
+        metrics = compared or [NEEDS[name] for name in DEFAULT_NEEDS]
+        boards = leaderboard(table.select(law=fit), metrics, defaults=defaults, relevant=relevant)
+        if not boards:
+            raise ScenarioError(
+                f"no need has a number in any run on {machine.name}: ask for others"
+            )
+        return settles, boards
+
+    if brief and progress:
+        _tell_time(trial, machine, chosen, seeds)
+    left_out: list[str] = []
+    if brief and len(chosen) > FINALISTS:
+        first = trial.gains({machine.name: chosen}, defaults, 1, budget)
+        _, boards = judged(trial.run(first, min(FEW, seeds), half_steps=False))
+        best = _order(boards)[:FINALISTS]
+        left_out = [law.name for law in chosen if law.name not in best]
+        chosen = [law for law in chosen if law.name in best]
     candidates = trial.gains({machine.name: chosen}, defaults, searches, budget)
     table = trial.run(candidates, seeds)
-    settles, fit = _fit(table)
-    boards = leaderboard(
-        table.select(law=fit),
-        compared or [NEEDS[name] for name in DEFAULT_NEEDS],
-        defaults=defaults,
-        relevant=relevant,
-    )
-    if not boards:
-        raise ScenarioError(f"no need has a number in any run on {machine.name}: ask for others")
+    settles, boards = judged(table)
     found = {}
     for candidate in candidates[machine.name]:
         found[candidate.law.name] = candidate.law
     ordered = tuple(found[name] for name in _order(boards))
-    return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
+    return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles, left_out=left_out)
+
+
+def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
+    """Tell how long the quick answer for a user's model takes at most, by timing one evaluation."""
+    seconds, size = trial.expected(plant, laws, trial.starts, QUICK_BUDGET)
+    last = min(FINALISTS, len(laws))
+    searches = size * (1.0 + (QUICK_SEARCHES - 1) * last / len(laws))
+    runs = 3 * last * seeds  # with twice the steps once more
+    if len(laws) > last:
+        runs += len(laws) * FEW
+    runs *= len(trial.conditions) * trial.duration
+    told(
+        f"a law for {plant.name}",
+        seconds * (searches + runs / (len(BRIEF.conditions) * BRIEF.duration)),
+    )
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:

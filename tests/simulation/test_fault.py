@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.simulation.conditions import find_condition
 
 MASS = 2.0  # kg
 SLIDE = f"""<mujoco model="mass"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
@@ -77,6 +78,46 @@ def test_behind_a_lag_the_force_follows_the_faulty_command(gain):
     late = trace.t >= 0.7
     lagged = gain * 3.0 * (trace.t[late] - 0.02)
     assert np.allclose(trace.force[late, 0], lagged, atol=0.01)
+
+
+TWO = SLIDE.replace("</body>", "</body>" + SLIDE[SLIDE.index("<body>") : SLIDE.index("</world")], 1)
+TWO = TWO.replace('"slide"', '"left"', 1).replace('joint name="slide"', 'joint name="right"')
+TWO = TWO.replace('<motor joint="slide"', '<motor joint="left"/><motor joint="right"')
+
+
+@pytest.mark.parametrize("fields", [{"gain": 0.5}, {"bias": -0.7}, {"stuck": True}], ids=str)
+@pytest.mark.parametrize("on", ["left", "right"])
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_a_fault_on_one_motor_leaves_the_other_as_it_is(fields, on, lag, tmp_path):
+    plant = smc.plant_from(TWO, ["left", "right"])
+    run = {"plant": plant, "law": ramp, "duration": 1.0, "actuator": [smc.Lag(lag)] if lag else []}
+    faults = [smc.Fault(at=0.5, **fields, on=on), smc.Fault(at=0.5, **fields), None]
+    one, every, none = smc.run([smc.Scenario(fault=fault, **run) for fault in faults])
+    i = ["left", "right"].index(on)
+    assert np.array_equal(one.v[:, i], every.v[:, i])
+    assert np.array_equal(one.v[:, 1 - i], none.v[:, 1 - i])
+    assert not np.array_equal(one.v, none.v)
+    text = str(smc.condition("f", fault=one.scenario.fault))
+    assert find_condition(text).fields["fault"] == one.scenario.fault
+    assert on in one.scenario.fault.words
+
+
+def test_a_rotor_that_loses_half_of_its_thrust_tips_its_own_corner():
+    rotors = [f"rotor{i}" for i in range(1, 5)]
+    runs = []
+    for rotor in rotors:
+        fault = smc.Fault(at=0.0, gain=0.5, on=rotor)
+        runs.append(smc.Scenario(plant="quadrotor", law="geometric", fault=fault, duration=0.1))
+    ways = [np.sign(trace.x[-1, 3:5]) for trace in smc.run(runs)]
+    assert len({tuple(way) for way in ways}) == 4
+    with pytest.raises(smc.ScenarioError, match="rotor9.*" + rotors[0]):
+        smc.Scenario(plant="quadrotor", law="geometric", fault=smc.Fault(at=0.0, on="rotor9"))
+
+
+@pytest.mark.parametrize(("duration", "at"), [(10.0, 2.0), (3.0, 2.0), (1.0, 0.5)])
+def test_the_condition_takes_half_the_force_at_two_seconds(duration, at):
+    (run,) = smc.grid("duffing", "pid", "fault", duration=duration)
+    assert run.fault == smc.Fault(at=at, gain=0.5)
 
 
 def test_a_fault_is_kept_told_and_part_of_a_condition(tmp_path):

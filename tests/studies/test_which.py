@@ -127,6 +127,32 @@ def test_properties_choose_laws_and_laws_with_given_gains_keep_them(tmp_path):
     assert [isinstance(law, Template) for law in chosen] == [True, True, False, True, False]
 
 
+MASS = """<mujoco model="mass"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
+<geom size=".1" mass="2" contype="0" conaffinity="0"/></body></worldbody><actuator>
+<motor joint="slide" ctrlrange="-9 9"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("kept", [1, 2])
+def test_quick_drops_laws_after_few_runs_and_keeps_the_order(kept, tmp_path, monkeypatch):
+    plant = smc.plant_from(MASS, ["slide"])
+    laws = []
+    for kd in (8.0, 12.0, 40.0, 90.0):
+        laws.append(smc.law("pid", kp=40.0, ki=1.0, kd=kd).named(f"of{kd:g}"))
+    run = {"laws": laws, "needs": "fast", "quick": True, "conditions": ["nominal", "noise"]}
+    whole = smc.which(plant, **run, out=tmp_path / "all")
+    monkeypatch.setattr(module, "FINALISTS", kept)
+    said = []
+    monkeypatch.setattr(module, "told", lambda what, seconds: said.append((what, seconds)))
+    found = smc.which(plant, **run, out=tmp_path / "few", progress=True)
+    assert found.laws == whole.laws[:kept]
+    dropped = [law.name for law in laws if law not in found.laws]
+    assert found.left_out == dropped
+    assert len(found.table) == 2 * 24 * kept
+    note = found.tables[-1].notes[-5]
+    assert all(name in note for name in found.left_out)
+    assert [what for what, seconds in said if seconds > 0.0] == ["a law for mass"]
+
+
 REFUSED = [
     ({"needs": "quick"}, "quick"),
     ({"needs": "one-gain"}, "no law for duffing has one-gain"),

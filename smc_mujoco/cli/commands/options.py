@@ -145,7 +145,7 @@ PlantName = Annotated[
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or yours, a .xml or .urdf: "
         "FILE.xml:joint+joint@keyframe+held (or +locked), where a joint "
-        'may be "joint(motor,partner=pole,u_max=9,x0=0.2)".',
+        'may be "joint(motor,partner=pole,u_max=9,x0=0.2)", or "joint(measured)".',
     ),
 ]
 Quick = Annotated[

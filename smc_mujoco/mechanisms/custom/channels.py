@@ -322,7 +322,7 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
         ):
             raise ScenarioError(
                 f"actuator {name!r} of {label} is more than a force behind a lag: "
-                "make it a <general>"
+                "make it a <motor> without a refsite"
             )
     ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[drives]
     ends[model.actuator_ctrllimited[drives] == 0] = math.inf
@@ -434,6 +434,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
         raise ScenarioError(
             f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}"
         )
+    _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds)
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
     return Motor(
         joint, _limit(gives, CURE, *bounds, _of_actuator(model, actuators[0])), tuple(actuators)

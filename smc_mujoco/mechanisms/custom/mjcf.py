@@ -317,10 +317,11 @@ def _complaint(source: Source, failed: guard.Failed, timeout: float) -> Scenario
 
 def broken(where: str, error: str) -> ScenarioError:
     """Return the error for MuJoCo's message about a model."""
-    cure = next((CURES[words] for words in CURES if words in error), "fix the file")
+    cure = next((CURES[words] for words in CURES if words in error), "")
     for file in sorted(Path(where).parent.glob("*.xml")):
-        if any(part.get("file") == Path(where).name for part in _elements(file)):
-            cure = f"give {file.name}, which includes it"
+        if not cure and any(part.get("file") == Path(where).name for part in _elements(file)):
+            cure = f"give {file.name}, which includes it, or fix the file"
+    cure = cure or "fix the file"
     return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): {cure}")
 
 

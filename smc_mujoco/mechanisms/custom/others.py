@@ -70,7 +70,7 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
         moved[i] |= moved[model.body_parentid[i]]
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos
-    for what in ("start", "goal"):
+    for what, cure in (("start", "another x0 or keyframe"), ("goal", "another keyframe")):
         mujoco.mj_fwdPosition(model, at)
         for contact in at.contact:
             bodies = model.geom_bodyid[contact.geom]
@@ -81,7 +81,7 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
                 )
                 raise ScenarioError(
                     f"the {what} of {source.label} has {first!r} {-1e3 * contact.dist:.0f} mm "
-                    f"inside {second!r}: give another x0 or keyframe"
+                    f"inside {second!r}: give {cure}, or <exclude> that pair in the file"
                 )
         if model.joint(joints[0]).type[0] == own.FREE:
             return

@@ -134,7 +134,8 @@ class UserModel:
             path = os.path.relpath(self.source.path)
         else:
             path = "FILE.xml"
-        text = "+".join(own.as_text(joint, channel) for joint, channel in self.channels)
+        joints = [own.as_text(joint, channel) for joint, channel in self.channels]
+        text = "+".join(joints + [f"{joint}(measured)" for joint in self.measured])
         if self.keyframe is not None:
             text += f"@{self.keyframe}"
         if self.others:

@@ -60,6 +60,10 @@ class Urdf(NamedTuple):
                 "of which exceeds the sum of the others: all three are raised by the difference, "
                 "so correct them"
             )
+        if re.search(r' velocity="[^"]*[1-9]', self.text):
+            sentences.append(
+                f"the velocity limits of {label} hold nothing: give references that keep to them"
+            )
         if guessed:
             sentences.append(
                 f"{label} gives {_listed(guessed)} no <inertial>, and MuJoCo takes that of their "

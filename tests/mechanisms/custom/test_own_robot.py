@@ -56,6 +56,9 @@ def test_a_text_says_of_a_channel_what_python_says(folder):
     )
     assert said == smc.plant_from("mine.xml", {"lift": channel})
     assert said.argument == "mine.xml:lift(motor,partner=tilt,x0=0.1,partner_x0=-0.2)"
+    seen = as_plant("mine.xml:lift(motor)+tilt( measured )")
+    assert seen == smc.plant_from("mine.xml", {"lift": smc.Channel(motor=True)}, measured=["tilt"])
+    assert seen.argument == "mine.xml:lift(motor)+tilt(measured)"
     both = as_plant("mine.xml:lift(motor,u_max=30)+tilt(motor, u_max=5)")
     assert smc.Scenario(plant=both, **RUN).resolved.u_max == (30.0, 5.0)
 
