@@ -516,11 +516,11 @@ class Scenario:
         """Return the index of the actuator that the fault is on; -1 for all."""
         if self.fault is None or self.fault.on is None:
             return -1
-        names = list(joint_names(self.plant)[: self.plant.driven])
+        names = joint_names(self.plant)[: self.plant.driven]
         if self.plant.pose:
             model = compiled(self.plant.spec())
-            names = [model.actuator(int(i)).name for i in drive_ids(model)]
-        return find("actuator of Fault", self.fault.on, {name: i for i, name in enumerate(names)})
+            names = [model.actuator(i).name for i in drive_ids(model).tolist()]
+        return find("actuator of Fault", self.fault.on, dict(zip(names, itertools.count())))
 
     @property
     def jump_step(self) -> int:

@@ -28,7 +28,6 @@ from smc_mujoco.common.errors import (
     ScenarioWarning,
 )
 from smc_mujoco.common.progress import bar, told
-from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue, known_laws
@@ -120,32 +119,6 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
     return Candidate(made, (made,), remark)
 
 
-def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
-    """Return a law with the gains of each search, or with those that it had if no search found
-    better ones.
-    """
-    from smc_mujoco.analysis.tuning import search_space
-
-    found = tuned.law.source
-    if tuned.before < tuned.objective:
-        if default.source.kind == source.DEFAULT:
-            own = "defaults"
-        else:
-            own = "own gains"
-        kept = default.sourced(found.kind, found.search)
-        return Candidate(kept, (kept,), f"its {own}, better than those tried")
-    sets = []
-    for tried in tuned.sets:
-        gains = dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True))
-        with_gains = dataclasses.replace(default, gains=gains)
-        sets.append(with_gains.sourced(found.kind, found.search))
-    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
-    remark = ""
-    if names := list(search_space.without_unit(default)):
-        remark = f"no unit, so searched about the default: {joined(names)}"
-    return Candidate(best, tuple(sets), remark)
-
-
 class Trial(NamedTuple):
     """The plants and conditions of a comparison, and its folder; `threads` and `progress` are as in
     `run`.
@@ -227,8 +200,8 @@ class Trial(NamedTuple):
                 for law, found in zip(laws[plant.name], known[plant.name], strict=True):
                     if found is None:
                         untuned.append(law)
-                seconds, evaluations = self.expected(plant, untuned, starts[plant.name], budget)
-                told(f"gains on {plant.name}", seconds * searches * evaluations)
+                seconds, size = self.expected(plant, untuned, starts[plant.name], budget)
+                told(f"gains on {plant.name}", seconds * searches * size)
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
@@ -244,20 +217,10 @@ class Trial(NamedTuple):
     def expected(
         self, plant: Plant, laws: Laws, starts: Starts | None, budget: int
     ) -> tuple[float, int]:
-        """Return how long an evaluation of the first law takes, s, and how many of them a search of
-        each law makes at most.
-        """
+        """Return what `search.expected_of` does with the objective of this trial."""
         from smc_mujoco.analysis.tuning import search
 
-        goal = self._goal(plant, starts)
-        seconds = 0.0
-        sizes = 0
-        for law in laws:
-            with contextlib.suppress(ScenarioError):
-                task = search.task_of(plant, coerce.law(law), goal, budget, 0, self.threads)
-                sizes += task.size
-                seconds = seconds or search.expected(task, 1) / task.size
-        return seconds, sizes
+        return search.expected_of(plant, laws, self._goal(plant, starts), budget, self.threads)
 
     def _check_tunable(
         self,
@@ -269,12 +232,12 @@ class Trial(NamedTuple):
         """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a
         plant.
         """
+        from smc_mujoco.analysis.tuning import search
+
+        goal = self._goal(plant, starts)
         reasons = []
         for law, candidate in zip(laws, known, strict=True):
-            if candidate is None:
-                reason = self._why_not(plant, law, starts)
-            else:
-                reason = candidate.remark
+            reason = candidate.remark if candidate else search.why_not(plant, law, goal)
             if not reason:
                 return
             reasons.append(reason)
@@ -283,12 +246,6 @@ class Trial(NamedTuple):
                 f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default "
                 "gains"
             )
-
-    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
-        """Return why a law cannot be tuned on a plant, or ""."""
-        from smc_mujoco.analysis.tuning import search
-
-        return search.why_not(plant, law, self._goal(plant, starts))
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
@@ -309,6 +266,7 @@ class Trial(NamedTuple):
         it cannot.
         """
         from smc_mujoco.analysis.tuning import result, search
+        from smc_mujoco.studies.searched_gains import candidate_of
 
         goal = self._goal(plant, starts)
         default = coerce.law(law)

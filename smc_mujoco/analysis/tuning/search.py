@@ -189,6 +189,26 @@ def expected(task: "Task", searches: int) -> float:
     return (time.perf_counter() - start) * searches * task.size
 
 
+def expected_of(
+    plant: Plant,
+    laws: Sequence[Component | Template],
+    goal: Objective,
+    budget: int,
+    threads: int | None,
+) -> tuple[float, int]:
+    """Return how long an evaluation of the first law that can be tuned takes, s, and how many a
+    search of each law makes at most, in all.
+    """
+    seconds = 0.0
+    size = 0
+    for law in laws:
+        with contextlib.suppress(ScenarioError):
+            task = task_of(plant, coerce.law(law), goal, budget, 0, threads)
+            size += task.size
+            seconds = seconds or expected(task, 1) / task.size
+    return seconds, size
+
+
 @dataclasses.dataclass
 class Trials:
     """The evaluations of one search.

@@ -29,10 +29,10 @@ ARM = """<robot name="arm"><link name="base"/>
 </visual></link>
 <joint name="j1" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0 0 1.2"/>
 <axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" effort="40" velocity="10"/></joint>
+<limit lower="-2" upper="2" effort="40"/></joint>
 <joint name="j2" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="0 0 -0.5"/>
 <axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" effort="20" velocity="10"/></joint></robot>"""
+<limit lower="-2" upper="2" effort="20"/></joint></robot>"""
 RUN = {"law": "classical", "duration": 0.01}
 
 
@@ -160,6 +160,7 @@ CHANGED = {  # what differs from the URDF, and the words of the one sentence on 
     "dae": ({"visual": "package://a/m.dae", "collision": "no.stl"}, "'package://a/m.dae', 'no.stl'"),
     "inertia": ({"old": INERTIA, "new": 'ixx="0.01" iyy="0.01" izz="0.05"'}, "gives 'l2'"),
     "negative": ({"old": INERTIA, "new": 'ixx="-0.01" iyy="0.01" izz="0.01"'}, "gives 'l2'"),
+    "fast": ({"old": 'effort="20"', "new": 'effort="20" velocity="3.5"'}, "velocity limits of arm.urdf"),
     "bare": ({"old": INERTIAL, "new": "<collision><geometry><sphere radius='.1'/></geometry></collision>"}, "gives 'l2' no"),
 }  # fmt: skip
 
