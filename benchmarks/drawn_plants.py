@@ -1,14 +1,11 @@
 """Two plants whose numbers were drawn by lot, to check the sentences of
 docs/where_sliding_mode_loses.md on them.
 
-    python benchmarks/families.py benchmarks/drawn_plants.py:drawn_slide --lot 584051958 --condition
-    differenced_5ms python benchmarks/families.py benchmarks/drawn_plants.py:drawn_pendulum --lot
-    584110175 --condition light
+    python benchmarks/fronts.py benchmarks/drawn_plants.py:drawn_pendulum --lot SEED
 
-SEED is what the clock said before anything was run on them. A mass on a spring: M x'' = -k x - b x'
-+ u + d. A pendulum, m l^2 x'' = m g l sin x - b x' + u + d, that stands or hangs; one that half of
-u_max cannot hold is drawn again. From the same lot come the seeds of the levels (--lot) and the
-conditions, out of six. The slide's was drawn twice: the first, `jitter`, takes ten times as long.
+SEED is that of the lot, the first seven digits of the commit that fixed the code of the fronts. A
+mass on a spring: M x'' = -k x - b x' + u + d. A pendulum, m l^2 x'' = m g l sin x - b x' + u + d,
+that stands or hangs; one that half of u_max cannot hold is drawn again.
 """
 
 import math

@@ -50,9 +50,11 @@ from smc_mujoco.analysis.ranking import interval
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import BUDGET, OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.search import Task, task_of
+from smc_mujoco.common.scripts import execute
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation import state
 from smc_mujoco.simulation.grid import case
@@ -153,9 +155,16 @@ def by_lot(seed: int, plant: str) -> tuple[tuple[Condition, ...], dict[str, tupl
     return (*conditions, CONDITIONS[CALM]), prices
 
 
-def bandwidth(plant: str) -> float:
+def plant_of(text: str) -> Plant:
+    """Return the plant of a name, FILE.xml:joint or FILE.py:variable."""
+    file, _, variable = text.rpartition(":")
+    if file.endswith(".py"):
+        return execute(Path(file))[variable]
+    return as_plant(text)
+
+
+def bandwidth(made: Plant) -> float:
     """Return the bandwidth of the tuned ADRC on a plant, rad/s."""
-    made = as_plant(plant)
     if gain_sets.in_set(made, "adrc", "tuned"):
         return gain_sets.law(made, "adrc").gains["wc"]
     return smc.tune(made, "adrc", searches=1).law.gains["wc"]
@@ -199,7 +208,7 @@ class Bench:
 
     def __init__(self, job: Job):
         self.job = job
-        self.plant = as_plant(job.plant)
+        self.plant = plant_of(job.plant)
         self.task: Task = task_of(self.plant, smc.law(job.law), GOAL, BUDGET, 0, 1)
         self.goal: Objective = self.task.goal
         self.start = self.task.scales["X"]
@@ -348,7 +357,7 @@ def search(job: Job) -> Sets:
         parents = np.log(so_far.gains[on_front(so_far)])
         if not len(parents):
             break
-        size = count // (2 * len(GENERATIONS))
+        size = max(1, count // (2 * len(GENERATIONS)))
 
         def bred(parents=parents, size=size, spread=spread) -> np.ndarray:
             steps = rng.normal(0.0, spread, (size, len(low)))
@@ -646,8 +655,9 @@ def fronts(
 ) -> list[dict]:
     """Return the points of the fronts of some laws on a plant."""
     conditions, levels = (CONDITIONS, LEVELS) if lot is None else by_lot(lot, plant)
-    wc = bandwidth(plant)
-    by_mujoco = why_not(smc.Scenario(plant=as_plant(plant), law="pid", duration=1.0))
+    made = plant_of(plant)
+    wc = bandwidth(made)
+    by_mujoco = why_not(smc.Scenario(plant=made, law="pid", duration=1.0))
     if by_mujoco:
         conditions = tuple(one for one in conditions if one.kind in KINDS_BY_MUJOCO)
         print(f"{plant} is run by MuJoCo: {by_mujoco}")
@@ -655,7 +665,10 @@ def fronts(
     jobs = [Job(plant, law, model, wc, conditions, sets, device) for law in laws]
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         searched = list(pool.map(search, jobs))
-        least = min(float(np.nanmin(its.J)) for its in searched if not np.isnan(its.J).all())
+        J = np.concatenate([its.J for its in searched])
+        if np.isnan(J).all():
+            raise SystemExit(f"no set of gains costs less than {CAP:g} s²: give more --sets")
+        least = float(np.nanmin(J))
         work = [
             pool.submit(told, job, its, levels, least)
             for job, its in zip(jobs, searched, strict=True)
@@ -674,7 +687,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("plants", nargs="*", help="names, or FILE.xml:joint of your model")
+    parser.add_argument("plants", nargs="*", help="names, FILE.xml:joint or FILE.py:variable")
     parser.add_argument("--law", nargs="+", default=LAWS, help="names of laws")
     parser.add_argument("--model", default="none", choices=("none", "nominal"))
     parser.add_argument("--sets", type=int, help=f"sets of gains a law, {SETS} by default")
