@@ -8,6 +8,7 @@ pixels.
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -39,6 +40,10 @@ SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its referenc
 COINCIDENT_DISTANCE = 0.01
 # of agreeing curves' samples, so that controls that switch a sample apart agree; chosen
 COINCIDENT_SHARE = 0.99
+# of the largest value of two curves: they do not agree if their peaks are farther apart
+PEAK_DISTANCE = 0.02
+MIN_PEAK = 0.1  # of the distance of curves that coincide: peaks closer than it are equal
+PEAK_TIME = 0.01  # of a run: peaks are compared within so much time before and after; chosen
 # of a run: nothing is said of curves that all agree for less; chosen
 MIN_AGREEMENT = 0.15
 MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
@@ -68,7 +73,6 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "settling": "|x − r|",
     "largest": "largest |u|",
 }
-BLOWS = ("reaction", "contact")  # so short that runs which agree otherwise may differ in them
 PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
@@ -427,12 +431,9 @@ def over_time(
     traces = panel.traces
     means = [QUANTITIES[name](trace).mean(axis=1) for trace in traces]
     heights = limits(traces, name)
-    exact = means
     if name in PEAKS:
         ax.set_yscale("log")
         ax.yaxis.set_minor_formatter(NullFormatter())
-        exact = [np.log10(mean) for mean in means]
-        heights = np.log10(heights)
     ax.set_ylim(limits(among or traces, name))
     set_numbers(ax.yaxis, panel._replace(traces=among or traces))
     if name == "reaction":
@@ -455,9 +456,9 @@ def over_time(
             last = np.clip(mean[-1], *ax.get_ylim())
             look: dict[str, Any] = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
             artists += ax.plot(trace.t[-1], last, "X", **look)
-    if names and name not in BLOWS and (name in SINGLE or len(panel.group.channels) == 1):
-        lines = [(trace.t, y) for trace, y in zip(traces, exact, strict=True)]
-        tell_agreements(ax, agreements(lines, float(np.ptp(heights))), names)
+    if names and (name in SINGLE or len(panel.group.channels) == 1):
+        lines = [(trace.t, y) for trace, y in zip(traces, means, strict=True)]
+        tell_agreements(ax, agreements(lines, heights, name in PEAKS), names)
     return artists
 
 
@@ -498,14 +499,18 @@ Line = tuple[np.ndarray, np.ndarray]  # times and values
 Agreement = tuple[list[int], float]  # of these lines, until a time, s; inf where they never part
 
 
-def agreements(lines: Sequence[Line], height: float) -> list[Agreement]:
-    """Return until when all lines agree in a panel of this height, and which of them never part."""
+def agreements(
+    lines: Sequence[Line], limits: tuple[float, float], logarithmic: bool = False
+) -> list[Agreement]:
+    """Return until when all lines agree in a panel of these limits, and which of them never
+    part.
+    """
     if len(lines) < 2:
         return []
     last = max(float(t[-1]) for t, _ in lines)
     until = []
     for one in lines:
-        until.append([_parting(one, other, COINCIDENT_DISTANCE * height) for other in lines])
+        until.append([_parting(one, other, limits, logarithmic) for other in lines])
     found = []
     left = list(range(len(lines)))
     if MIN_AGREEMENT * last <= min(until[0]) < last:
@@ -518,14 +523,31 @@ def agreements(lines: Sequence[Line], height: float) -> list[Agreement]:
     return found
 
 
-def _parting(one: Line, other: Line, apart: float) -> float:
-    """Return until when, s, but for a small share of their points, two lines are no farther than
-    `apart` apart.
+def _parting(one: Line, other: Line, limits: tuple[float, float], logarithmic: bool) -> float:
+    """Return until when, s, two lines coincide in a panel, but for a small share of their points,
+    and have equal peaks, upwards and downwards.
     """
+    from scipy.ndimage import maximum_filter1d
+
     t = one[0][one[0] <= other[0][-1] + 1e-9]
-    near = np.abs(np.interp(t, *other) - one[1][: len(t)]) <= apart
-    share = np.cumsum(near) / np.arange(1, len(t) + 1)
-    return float(t[near & (share >= COINCIDENT_SHARE)].max(initial=-np.inf))
+    y = np.stack([one[1][: len(t)], np.interp(t, *other)])
+    drawn = y
+    sides = limits
+    if logarithmic:
+        drawn = np.log10(y)
+        sides = np.log10(limits)
+    apart = COINCIDENT_DISTANCE * float(np.ptp(sides))
+    highest = PEAK_DISTANCE * float(np.abs(y).max())
+    if not logarithmic:
+        highest = min(max(highest, MIN_PEAK * apart), apart)
+    window = 2 * math.ceil(PEAK_TIME * len(one[0])) + 1
+    held = np.ones(len(t), bool)
+    high = maximum_filter1d(y, window, mode="nearest")
+    low = maximum_filter1d(-y, window, mode="nearest")
+    for pair, room in ((drawn, apart), (high, highest), (low, highest)):
+        near = np.abs(pair[0] - pair[1]) <= room
+        held &= near & (np.cumsum(near) / np.arange(1, len(t) + 1) >= COINCIDENT_SHARE)
+    return float(t[held].max(initial=-np.inf))
 
 
 def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str]) -> None:

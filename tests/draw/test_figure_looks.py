@@ -292,20 +292,28 @@ def test_words_above_the_curves_tell_which_agree_and_until_when(one):
         (one.t, np.where(one.t < 0.9 * one.t[-1], 0.0, 1.0)),
         (one.t, np.where(one.t < 0.1, 0.0, -1.0)),
     ]
-    assert panels.agreements(brief, 1.0) == [], "for a short time alone, or not to the end"
+    assert panels.agreements(brief, (0.0, 1.0)) == [], "for a short time alone, or not to the end"
 
 
-@pytest.mark.parametrize("change", ["chatters", "blow"])
-def test_controls_of_which_one_chatters_and_runs_with_blows_do_not_agree(one, change):
+def test_controls_of_which_one_chatters_do_not_agree(one):
     chatters = dataclasses.replace(one, u=one.u + 0.5 * (-1.0) ** np.arange(len(one.t))[:, None])
-    name = "u"
-    if change == "blow":
-        blow = np.where(np.abs(one.t - 0.5) < 0.002, 300.0, 0.0)[:, None]
-        one = dataclasses.replace(one, reaction=blow)
-        chatters = dataclasses.replace(one, reaction=0.9 * blow)
-        name = "reaction"
-    (ax,) = figure([one, chatters], panels=[name]).axes
+    (ax,) = figure([one, chatters], panels=["u"]).axes
     assert not ax.texts
+
+
+@pytest.mark.parametrize("panel", ["reaction", "u", "x", "settling"])
+@pytest.mark.parametrize("share", [1.03, 0.9, 0.97, 1.005])
+def test_runs_whose_peaks_differ_by_3_percent_do_not_agree(one, panel, share):
+    """A blow takes .4 % of the run, and a third run makes the panel ten times as high."""
+    name = {"settling": "x"}.get(panel, panel)
+    blow = np.where(np.abs(one.t - 0.5 * one.t[-1]) < 0.002 * one.t[-1], 300.0, 0.0)[:, None]
+    runs = []
+    for factor in (1.0, share, -10.0):
+        runs.append(dataclasses.replace(one, r=0.0 * one.r, **{name: factor * blow + 1e-3}))
+    (ax,) = figure(runs, labels=list("abc"), panels=[panel]).axes
+    (words,) = [text.get_text() for text in ax.texts]
+    assert "until" in words
+    assert ("a and b agree" in words) is (abs(share - 1.0) < 0.01)
 
 
 def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(one):
