@@ -256,7 +256,7 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels below a film, from left to right: x of each group of channels, the error, u
-    of driven ones.
+    of driven ones; the force of a contact stands in place of the error.
 
     Of arms: how far the tip is off its path, and the force of its contact, or else the error. Of a
     network: how far its channels are apart, the error and u. Of two joints of your own model: x and
@@ -274,15 +274,14 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
             driven.append(place)
             errors.append(place._replace(quantity="settling"))
             controls.append(place._replace(quantity="u"))
-    contact = any(trace.scenario.contact for trace in traces)
-    of_tip = over_groups(traces, "tip")
-    if contact:
-        of_tip += over_groups(traces, "contact")
-    if of_tip:
-        return of_tip if len(of_tip) > 1 else [*of_tip, *errors]
+    forces = []
+    if any(trace.scenario.contact for trace in traces):
+        forces = over_groups(traces, "contact")
+    if of_tip := over_groups(traces, "tip"):
+        return [*of_tip, *(forces or errors)]
     if max(len(place.group.channels) for place in places) == 1:
-        if len(places) >= CROWDED_STRIP:
-            errors = []
+        if forces or len(places) >= CROWDED_STRIP:
+            errors = forces
         return [*places, *errors, *controls]
     panels = []
     for place in driven:
@@ -559,20 +558,22 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
     if not shared or height < MIN_WORDS * size:
         return
-    words = agreement_words(shared, names, named=True)
-    if style.width(words, size) > room:
-        words = agreement_words(shared, names, named=False)
+    forever = [one for one in shared if one[1] == np.inf]
+    choices = [agreement_words(shared, names, True), agreement_words(shared, names, False)]
+    choices += [agreement_words(forever, names, named) for named in (True, False)]
+    fitting = [words for words in choices if words and style.width(words, size) <= room]
+    if not fitting:
+        return
     for _, stop in shared:
         if stop < np.inf:
             ax.axvline(stop, color=style.RULE, lw=style.points(0.9), zorder=1.5)
-    words = style.cropped(words, room, size)
     free = 1.0 - 1.8 * size / height
     axis = ax.yaxis.get_transform()
     low, high = axis.transform(np.array(ax.get_ylim()))
     ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
     place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
     look = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
-    ax.annotate(words, (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
+    ax.annotate(fitting[0], (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
 
 
 def agreement_words(shared: Sequence[Agreement], names: Sequence[str], named: bool) -> str:

@@ -1,11 +1,11 @@
 """Films without what a test does not look at."""
 
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
 
 from smc_mujoco.draw.film import film
-from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 
 
@@ -31,6 +31,10 @@ def tracks(traces, colours):
     return found
 
 
-def staged(traces, colours, *placed):
-    """Return a stage for the machines of traces; `placed` are size, room and camera."""
-    return Stage(tracks(traces, colours), *placed)
+def staged(trace, size, colour="#0072B2", chosen=None, strip=0.0):
+    """Return the stage of a machine that has a picture of this size, px, to itself, but for a strip
+    at its foot.
+    """
+    caption = SimpleNamespace(size=size, top=0.0, strip=lambda width: strip, scale=1.0)
+    caption.place = lambda tiles: None
+    return next(film.staged(tracks([trace], [colour]), chosen, caption, np.zeros(1)))

@@ -22,6 +22,7 @@ PATH_WIDTH = 3.0
 WANTED_PATH_WIDTH = 1.6
 WANTED_OPACITY = 0.5
 OUTSIDE = 100  # px beyond the picture up to which a path is followed
+PATH_POINTS = 600  # of a path that is drawn, or a few more
 BAR_WIDTH = 15
 BAR_GAP = 6
 BAR_HEIGHT = 26  # from one limit to the other
@@ -29,8 +30,7 @@ LETTERS = 18
 LABEL_GAP = 3  # from a label to its bars
 BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.25 * LETTERS  # of bars with their numbers
 MAX_TIP_ERROR = 0.015  # m: only a tip farther off has a ghost; a nearer one would hide it
-FORCE_ARROW = 0.6  # m, length of the arrow for the largest force
-BLOW_ARROW = 0.4  # m, length of the arrow of a blow
+FORCE_ARROW = 0.6  # m, length of the arrow for the largest force or blow
 SHAFT_WIDTH = 4.0
 BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
 BLOW_TIME = 0.12  # s for which a blow is shown after its end
@@ -57,125 +57,94 @@ def key(traces: Sequence[Trace]) -> list[str]:
     return words
 
 
-class Trail:
-    """A path in the picture, (m, 2) px, at times (m,) s, that grows from frame to frame."""
-
-    def __init__(
-        self, points: np.ndarray, times: np.ndarray, colour: str, width: float, opacity: float = 1.0
-    ):
-        fine = arrows.SUPERSAMPLING
-        self.corner = np.floor(points.min(axis=0) - width).astype(int)
-        size = np.ceil(points.max(axis=0) + width).astype(int) - self.corner
-        self.fine = Image.new("L", tuple((fine * size).tolist()))  # opacities
-        self.points = fine * (points - self.corner)
-        self.times = times
-        self.reached = 0
-        self.colour = style.rgb(colour)
-        self.width = round(fine * width)
-        self.opacity = round(255 * opacity)
-
-    def draw(self, image: Image.Image, time: float) -> None:
-        """Draw the path until a time, s, which is not before that of the last picture."""
-        stop = int(np.searchsorted(self.times, time, side="right"))
-        if stop > self.reached:
-            new = self.points[max(self.reached - 2, 0) : stop]  # it joins what is there
-            line = list(map(tuple, new.tolist()))
-            ImageDraw.Draw(self.fine).line(line, self.opacity, self.width, joint="curve")
-            self.reached = stop
-            self.mask = self.fine.reduce(arrows.SUPERSAMPLING)
-        image.paste(self.colour, tuple(self.corner.tolist()), self.mask)
-
-
 class Overlay:
-    """What is drawn over pictures of the machines on a stage, between `edges`, (frames + 1,) s.
+    """What is drawn over pictures of a machine on its stage, between `edges`, (frames + 1,) s.
 
-    These are the paths of the tips of arms, or of the places of free bodies. Arms have their forces
-    too; `room` has what is shown below each label, (machines, 4) px.
+    These are the path of an arm's tip, or of the place of a free body. Arms have their forces too,
+    with arrows `newton` m long a newton; `room` has what is shown below the label, left, top,
+    right, bottom px.
     """
 
-    def __init__(
-        self,
-        traces: Sequence[Trace],
-        colours: Sequence[str],
-        stage: Stage,
-        edges: np.ndarray,
-        room: np.ndarray,
-    ):
-        self.traces = traces
-        self.colours = colours
+    def __init__(self, stage: Stage, edges: np.ndarray, room: np.ndarray, newton: float):
         self.stage = stage
+        self.trace = trace = stage.track.trace
         self.edges = edges
         self.room = room
+        self.newton = newton
         self.scale = stage.scale
-        self.trails = []  # the wanted path of each machine, and its own
-        self.shares = []  # torques as shares of their limits, (frames, joints), -1 .. 1: means
-        self.errors = []  # of tips, (frames,) m
-        self.forces = {}  # of a contact, (frames, 3) N
-        self.newton = 0.0  # m of an arrow
-        barred = all(map(has_bars, traces))
-        largest = 0.0
-        for k, (trace, colour) in enumerate(zip(traces, colours, strict=True)):
-            if trace.scenario.plant.tip:
-                path, wanted = tip.tip_paths(trace)
-                error = tip.tip_error(trace)[:, None]
-                self.errors.append(windows(trace.t, error, edges).mean[:, 0])
-            else:
-                path = trace.x[:, :3]
-                wanted = trace.r[:, :3]
-            look = (style.INK, WANTED_PATH_WIDTH, WANTED_OPACITY)
-            pair = (self.trail(k, wanted, *look), self.trail(k, path, colour, PATH_WIDTH))
-            self.trails.append(pair)
-            if barred:
-                share = windows(trace.t, trace.applied, edges).mean / trace.scenario.limits
-                self.shares.append(np.clip(share, -1.0, 1.0))
-            if tip.knows_contacts(trace.scenario):
-                self.forces[k] = windows(trace.t, tip.contacts(trace).push, edges).mean
-                largest = max(largest, np.linalg.norm(self.forces[k], axis=1).max())
-        if largest:
-            self.newton = FORCE_ARROW / largest
+        self.errors = None  # of the tip, (frames,) m
+        self.shares = None  # torques as shares of their limits, (frames, joints), -1 .. 1: means
+        self.forces = None  # of a contact, (frames, 3) N
+        path = trace.x[:, :3]
+        wanted = trace.r[:, :3]
+        if trace.scenario.plant.tip:
+            path, wanted = tip.tip_paths(trace)
+            error = tip.tip_error(trace)[:, None]
+            self.errors = windows(trace.t, error, edges).mean[:, 0]
+        some = slice(None, None, 1 + len(trace.t) // PATH_POINTS)
+        self.times = trace.t[some]
+        floor = np.array([-np.inf, -np.inf, 0.0])
+        above = np.array([0.0, 0.0, stage.puppet.height])
+        self.path = np.maximum(path[some] + above, floor)
+        self.wanted = np.maximum(wanted[some] + above, floor)
+        if has_bars(trace):
+            share = windows(trace.t, trace.applied, edges).mean / trace.scenario.limits
+            self.shares = np.clip(share, -1.0, 1.0)
+        if tip.knows_contacts(trace.scenario):
+            self.forces = windows(trace.t, tip.contacts(trace).push, edges).mean
 
-    def trail(
-        self, k: int, points: np.ndarray, colour: str, width: float, opacity: float = 1.0
-    ) -> Trail:
-        """Return a path of machine k in the picture, from points (m, 3) m."""
-        above = np.maximum(points + self.stage.where[k], (-np.inf, -np.inf, 0.0))
-        places = self.stage.project(above).clip(-OUTSIDE, np.add(self.stage.size, OUTSIDE))
-        return Trail(places, self.traces[k].t, colour, width * self.scale, opacity)
-
-    def lost(self, k: int, frame: int) -> bool:
-        """Return whether a machine is so far off its path that a ghost shows where it should be."""
-        return not self.errors or bool(self.errors[k][frame] > MAX_TIP_ERROR)
+    def lost(self, frame: int) -> bool:
+        """Return whether the machine is so far off its path that a ghost shows where it should
+        be.
+        """
+        return self.errors is None or bool(self.errors[frame] > MAX_TIP_ERROR)
 
     def over(self, picture: np.ndarray, frame: int) -> np.ndarray:
-        """Return the picture of a frame with all this, as the machines stand on the stage."""
+        """Return the picture of a frame with all this, as the machine stands on the stage."""
         time = float(self.edges[frame + 1])
         image = Image.fromarray(picture)
-        for wanted, own in self.trails:
-            wanted.draw(image, np.inf)
-            own.draw(image, time)
-        for k, forces in self.forces.items():
-            size = float(np.linalg.norm(forces[frame]))
+        self.trail(image, self.wanted, style.INK, WANTED_PATH_WIDTH, WANTED_OPACITY)
+        until = self.path[self.times <= time]
+        self.trail(image, until, self.stage.track.colour, PATH_WIDTH)
+        if self.forces is not None:
+            size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
-                at = self.stage.find(k, self.traces[k].scenario.plant.tip)
-                self.arrow(image, at, at - self.newton * forces[frame], size, after=True)
-        for k, trace in enumerate(self.traces):
-            for blow in style.pushes([trace]):
-                end = blow.time + blow.width + BLOW_TIME
-                if self.edges[frame] <= end and time >= blow.time:
-                    peak = np.array([blow.x, blow.y, blow.z])
-                    size = float(np.linalg.norm(peak))
-                    place = self.stage.find(k, blow.body) - BLOW_DISTANCE * peak / size
-                    start = place - BLOW_ARROW * peak / size
-                    self.arrow(image, start, place, size, after=False)
-            if self.errors:
-                self.gauges(ImageDraw.Draw(image), k, frame)
+                at = self.stage.find(self.trace.scenario.plant.tip)
+                self.arrow(image, at, at - self.newton * self.forces[frame], size, after=True)
+        for blow in style.pushes([self.trace]):
+            end = blow.time + blow.width + BLOW_TIME
+            if self.edges[frame] <= end and time >= blow.time:
+                peak = np.array([blow.x, blow.y, blow.z])
+                size = float(np.linalg.norm(peak))
+                place = self.stage.find(blow.body) - BLOW_DISTANCE * peak / size
+                self.arrow(image, place - self.newton * peak, place, size, after=False)
         return np.asarray(image)
+
+    def trail(
+        self,
+        image: Image.Image,
+        points: np.ndarray,
+        colour: str,
+        width: float,
+        opacity: float = 1.0,
+    ) -> None:
+        """Draw a path, (m, 3) m, with smooth edges."""
+        if len(points) < 2:
+            return
+        fine = arrows.SUPERSAMPLING
+        sides = np.array(image.size)
+        line = self.stage.project(points).clip(-OUTSIDE, sides + OUTSIDE) * fine
+        mask = Image.new("L", tuple((fine * sides).tolist()))
+        places = list(map(tuple, line.tolist()))
+        thick = round(fine * width * self.scale)
+        ImageDraw.Draw(mask).line(places, round(255 * opacity), thick, joint="curve")
+        image.paste(style.rgb(colour), (0, 0), mask.reduce(fine))
 
     def arrow(
         self, image: Image.Image, tail: np.ndarray, tip: np.ndarray, force: float, after: bool
     ) -> None:
         """Draw an arrow with smooth edges between two points, (3,) m, and its force, N, beyond it
-        or before it.
+        or before it, within the picture.
         """
         s = self.scale
         start, end = self.stage.project(np.array([tail, tip]))
@@ -186,31 +155,43 @@ class Overlay:
         wide = style.width(words, LETTERS * s, bold=True)
         x, y = (end if after else start).tolist()
         x += 6 * s if (end[0] >= start[0]) == after else -6 * s - wide
-        x = min(x, image.width - wide - 2 * s)
+        x = min(max(x, 2 * s), image.width - wide - 2 * s)
+        y = min(max(y, LETTERS * s), image.height - LETTERS * s)
         letters = style.font(LETTERS * s, bold=True)
         rim = {"stroke_width": round(2 * s), "stroke_fill": style.PAPER}
         ImageDraw.Draw(image).text((x, y), words, style.REACTION, letters, anchor="lm", **rim)
 
-    def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
+    def beside(self, picture: np.ndarray, frame: int) -> np.ndarray:
+        """Return the whole picture with the arm's bars, and how far its tip is off its path, below
+        its label.
+        """
+        if self.errors is None:
+            return picture
+        image = Image.fromarray(picture)
+        self.gauges(ImageDraw.Draw(image), frame)
+        return np.asarray(image)
+
+    def gauges(self, draw: ImageDraw.ImageDraw, frame: int) -> None:
         """Draw the bars of a machine, and how far its tip is off its path."""
         s = self.scale
-        left, top, right, bottom = self.room[k].tolist()
-        off = 1e3 * self.errors[k][frame]  # mm
+        left, top, right, bottom = self.room.tolist()
+        assert self.errors is not None
+        off = 1e3 * self.errors[frame]  # mm
         words = f"{off:.1f} mm" if off < 9.95 else f"{off:.0f} mm"
         bold = style.font(LETTERS * s, bold=True)
         letters = style.font(LETTERS * s)
-        if not self.shares:
+        if self.shares is None:
             middle = ((left + right) / 2, (top + bottom) / 2)
             draw.text(middle, f"tip {words}", style.INK, bold, anchor="mm")
             return
         half = BAR_HEIGHT * s / 2
         zero = top + LABEL_GAP * s + half
         x = left + BAR_GAP * s
-        for i, value in enumerate(self.shares[k][frame], 1):
+        for i, value in enumerate(self.shares[frame], 1):
             end = x + BAR_WIDTH * s
             draw.rectangle((x, zero - half, end, zero + half), style.PAPER, style.RULE)
             low, high = sorted((zero, zero - value * half))
-            colour = style.FAILED if abs(value) > 0.999 else self.colours[k]
+            colour = style.FAILED if abs(value) > 0.999 else self.stage.track.colour
             draw.rectangle((x + 1, low, end - 1, high), colour)
             place = ((x + end) / 2, zero + half + 2 * s)
             draw.text(place, str(i), style.MUTED, letters, anchor="ma")
@@ -221,16 +202,26 @@ class Overlay:
             draw.text((x + 6 * s, zero + 2 * s), words, style.INK, bold, anchor="lt")
 
 
-def room(traces: Sequence[Trace], slot: float) -> tuple[float, float]:
-    """Return width and height of what is shown below each label, px of a full-size film; `slot` is
-    a machine's width.
-
-    The tip's distance stands beside the bars where the slot has room for it.
+def room(traces: Sequence[Trace]) -> tuple[float, float]:
+    """Return width and height of what is shown below each label, px of a full-size film: the bars,
+    and beside them the tip's distance.
     """
     number = style.width("000 mm", LETTERS, bold=True) + 8
     if not all(map(has_bars, traces)):
         return number + style.width("tip ", LETTERS, bold=True), 1.6 * LETTERS
     bars = traces[0].scenario.plant.n * (BAR_WIDTH + BAR_GAP) + BAR_GAP
-    if bars + number < slot:
-        return bars + number, BARS_HEIGHT
-    return bars, BARS_HEIGHT
+    return bars + number, BARS_HEIGHT
+
+
+def overlays(stages: Sequence[Stage], edges: np.ndarray, rooms: np.ndarray) -> list[Overlay]:
+    """Return what is drawn over each stage; arrows of forces have one scale."""
+    largest = 0.0
+    for stage in stages:
+        trace = stage.track.trace
+        if tip.knows_contacts(trace.scenario):
+            push = windows(trace.t, tip.contacts(trace).push, edges).mean
+            largest = max(largest, float(np.linalg.norm(push, axis=1).max()))
+        for blow in style.pushes([trace]):
+            largest = max(largest, float(np.linalg.norm([blow.x, blow.y, blow.z])))
+    newton = FORCE_ARROW / largest if largest else 0.0
+    return [Overlay(stage, edges, room, newton) for stage, room in zip(stages, rooms, strict=True)]

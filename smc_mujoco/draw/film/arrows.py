@@ -41,6 +41,7 @@ USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its exten
 BENT_SIZE = 0.1  # largest radius of a bent arrow, of the size of what moves
 MAX_BENT_SHARE = 0.08  # the same, of the picture's height
 RIM = 2.0  # px, of paper around an arrow that lies over a link, of a film of full size
+MIN_PIXELS = 9.0  # px, of a film of full size: shorter arrows are not drawn
 MIN_SHAFT = 8.0  # px, of a film of full size; of an arrow that is long enough
 MAX_SWEEP = 2.0  # rad, of the longest bent arrow
 BENT_WIDTH = 0.2  # of a bent arrow, in radii
@@ -67,7 +68,7 @@ class Arrow(NamedTuple):
     high: float
     rgba: tuple[float, ...]  # red, green, blue, opacity, 0 .. 1
     layer: int = 0  # distance from the body, in arrows
-    size: float = 1.0
+    size: float = 1.0  # of its shaft
     head: bool = True
     way: np.ndarray | None = None  # of a force on a free body, (3,), in the axes of the world
 
@@ -109,8 +110,8 @@ def mounts(
         slide = Mount(0, SLIDE_LENGTH * rail, thick, before, plant.network)
         turning = NETWORK_FACTOR if plant.n > 1 else 1.0
         usual = catalogue().get(plant.name)
-        if plant.n == 1 and "l" in plant.parameters and usual:  # no smaller on a short rod
-            turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])
+        if plant.n == 1 and "l" in plant.parameters and usual:  # as large on any rod
+            turning = usual.parameters["l"] / plant.parameters["l"]
         hinge = slide._replace(unit=turning)
     found = []
     for joint, slides_here in zip(joints, slides, strict=True):
@@ -132,49 +133,62 @@ def loads(trace: Trace, edges: np.ndarray) -> dict[str, Envelope]:
 
 
 class Scale(NamedTuple):
-    """Values of the longest arrows, in the units of u and of a force: the largest of the runs that
-    lasted.
+    """The largest values that arrows show, in the units of u and of a force, and those of the
+    longest arrows: `longest` of forces, one in a picture, and `full` of the control.
 
-    Short peaks do not count, such as that of an estimator at the start. Blows are far larger than
-    what drives the machine, so the reaction's longest arrow is not longer than the control's.
+    They are of the runs that lasted. Short peaks, such as that of an estimator at the start, do not
+    set the longest arrow, nor do blows, which are far larger than what drives the machine.
     """
 
     control: float
     disturbance: float
     reaction: float = 0.0
     drive: bool = False  # whether a drive's force is shown, such as a motor's
+    longest: float = 0.0
+    full: float = 0.0
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     """Return the scale of the arrows for each group of channels."""
-    by_group = {}
+    found = {}
+    lasting = [0.0]  # forces that drive and disturb
+    brief = [0.0]
     for group, parts in style.split(traces).items():
         if traces[0].scenario.plant.pose:
             pushes = [np.linalg.norm(trace.d[:, :3], axis=1).max() for trace in traces]
-            by_group[group] = Scale(0.0, float(max(pushes)) if group.unit == "m" else 0.0)
+            push = float(max(pushes)) if group.unit == "m" else 0.0
+            found[group] = Scale(0.0, push)
+            lasting.append(push)
             continue
         reaction = max(map(abs, panels.span(parts, "reaction")))
+        brief.append(reaction)
         if not group.driven:
-            by_group[group] = Scale(0.0, 0.0, reaction)
+            found[group] = Scale(0.0, 0.0, reaction)
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        control = _longest(parts, "applied")
-        if control and same:
-            reaction = min(reaction, control)
+        control = _usual(parts, "applied")
         if drive:
-            control = max(control, _longest(parts, "force"))
-        by_group[group] = Scale(control, _longest(parts, "d"), reaction, drive)
-    return by_group
+            control = max(control, _usual(parts, "force"))
+        push = max(map(abs, panels.span(parts, "d")))
+        brief.append(push)
+        if same:
+            lasting += [control, _usual(parts, "d")]
+        found[group] = Scale(control, push, reaction, drive, full=0.0 if same else control)
+    longest = max(lasting) or max(brief)
+    scaled = {}
+    for group, scale in found.items():
+        scaled[group] = scale._replace(longest=longest, full=scale.full or longest)
+    return scaled
 
 
 def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale) -> list[tuple[int, Arrow]]:
     """Return the arrow of a free body in one frame with its channel: that of the disturbance."""
     push = loads["disturbance"].mean[frame, :3]
     size = float(np.linalg.norm(push))
-    if size <= MIN_LENGTH * scale.disturbance:
+    if size <= MIN_LENGTH * scale.longest:
         return []
-    length = size / scale.disturbance
+    length = size / scale.longest
     return [(0, Arrow(0.0, length, rgba(style.DISTURBANCE), way=push / size))]
 
 
@@ -183,7 +197,7 @@ def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
     return (*(np.array(style.rgb(colour)) / 255).tolist(), opacity)
 
 
-def _longest(traces: Sequence[Trace], name: str) -> float:
+def _usual(traces: Sequence[Trace], name: str) -> float:
     """Return the largest magnitude of a quantity in runs that last, without brief values of over
     twice it.
 
@@ -193,7 +207,7 @@ def _longest(traces: Sequence[Trace], name: str) -> float:
     usual = 0.0
     for y in panels.lasting(traces, name):
         usual = max(usual, float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()))
-    return usual if peak > 2.0 * usual > 0.0 else peak
+    return usual if peak > 2.0 * usual else peak
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
@@ -210,15 +224,18 @@ def arrows(
     """Return the arrows of one channel in one frame, the control's nearest to the body, with its
     range behind it.
     """
-    layers = [("control", scale.control, rgba(colour), 1.0)]
+    layers = []
     if scale.drive:
-        command = ("control", scale.control, rgba(colour, COMMAND_OPACITY), 0.65)
-        layers = [("force", scale.control, rgba(colour), 1.0), command]
-    layers.append(("disturbance", scale.disturbance, rgba(style.DISTURBANCE), 0.65))
-    layers.append(("reaction", scale.reaction, rgba(style.REACTION), 0.8))
+        layers.append(("force", scale.longest, rgba(colour), 1.0))
+        layers.append(("control", scale.longest, rgba(colour, COMMAND_OPACITY), 0.65))
+    elif scale.control:
+        layers.append(("control", scale.full, rgba(colour), 1.0))
+    if scale.disturbance:
+        layers.append(("disturbance", scale.longest, rgba(style.DISTURBANCE), 0.65))
+    if scale.reaction:
+        layers.append(("reaction", scale.longest, rgba(style.REACTION), 0.8))
     drawn = []
-    acting = [layer for layer in layers if layer[1]]
-    for layer, (name, longest, shade, size) in enumerate(acting):
+    for layer, (name, longest, shade, size) in enumerate(layers):
         low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
         drawn.append(Arrow(0.0, mean, shade, layer, size))
         if layer == 0 and scale.control and high - low > MIN_BAR:
@@ -235,7 +252,7 @@ def path(
     axis = data.xaxis[mount.joint]
     anchor = data.xanchor[mount.joint]
     owner = model.jnt_bodyid[mount.joint]
-    low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
+    low, high = np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if arrow.way is not None:
         start = data.xpos[owner] + mount.unit * FLIGHT_DISTANCE * arrow.way

@@ -1,17 +1,20 @@
-"""Geometry of a camera: the place from which it sees given points, and where they are in its
-picture.
+"""Geometry of cameras: the place from which one sees given points, where they are in its picture,
+and the tiles of a film, one a machine.
 
 A `turn` is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right, up and backwards.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 
-FOVY = 9.0  # degrees, chosen: a long lens, so that no machine looks larger than its neighbours
+FOVY = 9.0  # degrees, chosen: a long lens
+TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen
+TILE_GAP = 2  # px between tiles
+MIN_HEIGHT = 0.25  # of a tile's, for a machine whose words have no room; chosen
 Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees
 
 
@@ -22,6 +25,14 @@ class Room(NamedTuple):
     top: float
     right: float
     bottom: float
+
+
+class View(NamedTuple):
+    """A camera's picture, px, its turn and its place, (3,) m, before a machine."""
+
+    size: tuple[int, int]
+    turn: np.ndarray
+    place: np.ndarray
 
 
 def checked(chosen: Camera | None) -> Camera | None:
@@ -95,3 +106,38 @@ def project(
 def pixel(size: tuple[int, int]) -> float:
     """Return the tangent of one px at the picture's middle."""
     return float(np.tan(np.radians(FOVY) / 2) / (size[1] / 2))
+
+
+def tiles(
+    count: int,
+    size: tuple[int, int],
+    top: float,
+    strip: Callable[[float], float],
+    points: np.ndarray,
+    turn: np.ndarray,
+) -> tuple[np.ndarray, View]:
+    """Return the tiles of so many machines below `top` px of a picture, (count, 4) px, and the view
+    of points (m, 3) m in each.
+
+    They are in as many rows as make the machines largest. `strip` returns the height of the words
+    at the foot of a tile of a width, px; inf if they are wider.
+    """
+    layouts = []
+    for rows in range(1, count + 1):
+        columns = -(-count // rows)
+        wide = int(size[0] / columns) - TILE_GAP
+        tall = int((size[1] - top) / rows) - TILE_GAP
+        edge = TILE_EDGE * tall
+        foot = max(tall - edge - strip(wide), MIN_HEIGHT * tall)
+        place = fit(points, turn, (wide, tall), Room(edge, edge, wide - edge, foot))
+        distance = float((place - points.mean(axis=0)) @ turn[:, 2])
+        scale = 1.0 / (pixel((wide, tall)) * distance)
+        layouts.append((scale, columns, View((wide, tall), turn, place)))
+    _, columns, view = max(layouts, key=lambda one: one[0])
+    wide, tall = view.size
+    found = []
+    for k in range(count):
+        left = (k % columns) * (wide + TILE_GAP)
+        upper = round(top) + (k // columns) * (tall + TILE_GAP)
+        found.append((left, upper, left + wide, upper + tall))
+    return np.array(found), view

@@ -1,5 +1,5 @@
-"""Text on a film's frames: title, key to the arrows, the label and state of each machine, the
-clock; with Pillow.
+"""Text on a film's frames: title, key to the arrows, the clock, and at the foot of each machine's
+tile its label and state; with Pillow.
 """
 
 import math
@@ -11,7 +11,6 @@ from PIL import Image, ImageDraw
 from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.arrows import Scale
-from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
 from smc_mujoco.metrics.conventions import Group
@@ -20,15 +19,14 @@ from smc_mujoco.simulation.trace import Trace
 
 # Sizes are px of a film of full size, and chosen.
 LETTERS = 18  # height
+KEY_LETTERS = 16
 TITLE_SIZE = 24
 EDGE = 24  # from the picture's edge to text
 PILL = 1.75 * LETTERS  # height of a label
 KEY_TOP = 46  # of the key's first line
-KEY_PITCH = 24  # from line to line
-KEY_TIME = 2.0  # s of a film for which the key is shown
-FADE_TIME = 0.4  # s, in which it fades
-MIN_ROOM = 0.73  # of the picture's height, for machines: a longer key lies over them
-MAX_LABEL_SHARE = 0.3  # of the picture's width, for a label beside its machine
+KEY_PITCH = 22  # from line to line
+GAP = 8  # around labels
+LEAST_LETTERS = 0.7  # of their size: labels and titles in smaller ones are cut
 STRIP_WIDTH = 110  # of an encoder's strip
 STRIP_COUNTS = 6
 LOOKS = {  # mood -> colours of a badge and of its rim
@@ -39,12 +37,10 @@ LOOKS = {  # mood -> colours of a badge and of its rim
 
 
 class Caption:
-    """The text over the stage of a film; `room` is the part of the picture that is free for the
-    machines.
+    """The text of a film: above the tiles of the machines, from `top` px on, and at their feet.
 
-    Machines stand in a `row` across the picture, or behind each other. `below`, width and height in
-    px of a full-size film, is what others draw in place of badges. The `parts` of the key are by
-    default what arrows and ghosts mean.
+    `below`, width and height in px of a full-size film, is what others draw in place of badges. The
+    `parts` of the key are by default what arrows and ghosts mean.
     """
 
     def __init__(
@@ -57,23 +53,20 @@ class Caption:
         scale: float,
         scales: Mapping[Group, Scale],
         states: Sequence[Sequence[State | None]] = (),
-        row: bool = True,
         below: tuple[float, float] | None = None,
         parts: Sequence[str] | None = None,
     ):
         self.traces = traces
-        self.names = names
+        self.names = style.distinct(names)
         self.colours = colours
         self.size = size
         self.scale = s = scale
-        self.beside = not row  # machines behind each other have their labels at the left
-        self.arms = below is not None
         self.changes = style.marks(traces, names, blows=False)
         inside = size[0] - 2 * EDGE * s
         self.clock = style.width("00.000 s", TITLE_SIZE * s, bold=True) + EDGE * s
         self.clock += self.wide("8× slower") + 2 * LETTERS * s
         title = title or style.head([trace.scenario for trace in traces])
-        self.title = style.cropped(title, inside - self.clock, TITLE_SIZE * s, bold=True)
+        self.title, self.title_size = fitted(title, inside - self.clock, TITLE_SIZE * s)
         note = 0.0
         for time, words in self.changes.items():
             note = max(note, self.wide(f"{words} since {time:g} s"))
@@ -82,29 +75,10 @@ class Caption:
         self.source = by_words(dict(zip(names, sources, strict=True)))
         if parts is None:
             parts = key(traces, scales)
-        self.key = wrapped(parts, inside - self.note_room, LETTERS * s)
+        self.key = wrapped(parts, inside - self.note_room, KEY_LETTERS * s)
         self.badge = self.badges_sizes(states, below)
-        self.max_label = MAX_LABEL_SHARE * size[0]
-        bottom = size[1] - 20 * s
-        left = 40 * s
-        if self.beside:
-            self.in_line = False
-            left = max(self.widths() + self.badge[:, 0]) + 30 * s
-        else:
-            self.max_label = (size[0] - left) / len(traces) - 0.8 * LETTERS * s
-            if max(self.wide(name) for name in names) + 2.5 * LETTERS * s > self.max_label:
-                self.names = style.distinct(names)
-            both = self.widths() + self.badge[:, 0] + 0.4 * PILL * s
-            self.in_line = bool((both < self.max_label).all())  # labels with their badges
-            high = self.badge[:, 1].max()
-            if self.in_line:
-                bottom = size[1] - 12 * s - max(PILL * s, high)
-            elif self.arms:
-                bottom = size[1] - 1.15 * PILL * s - high
-            else:
-                bottom = size[1] - 12 * s - PILL * s - high
-        top = min((KEY_TOP + KEY_PITCH * len(self.key) + 6) * s, bottom - MIN_ROOM * size[1])
-        self.room = Room(left, max(top, (KEY_TOP + 4) * s), size[0] - 40 * s, bottom)
+        lines = max(len(self.key), bool(self.changes))
+        self.top = (KEY_TOP + KEY_PITCH * lines + 4 * (lines > 0)) * s
 
     def badges_sizes(
         self, states: Sequence[Sequence[State | None]], below: tuple[float, float] | None
@@ -131,71 +105,58 @@ class Caption:
             sizes[:, 1] = 1.6 * LETTERS * s
         return sizes
 
-    @property
-    def apart(self) -> float:
-        """The width, px, that an arm in a row needs for its label and what is below it; 0 for other
-        machines.
-        """
-        if not self.arms:
-            return 0.0
-        both = np.maximum(self.widths(), self.badge[:, 0])
-        if self.in_line:
-            both = self.widths() + self.badge[:, 0]
-        return float(both.max()) + 1.2 * LETTERS * self.scale
-
     def wide(self, text: str) -> float:
         """Return the width of bold letters, px."""
         return style.width(text, LETTERS * self.scale, bold=True)
 
-    def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
-        """Return the labels, with the time of failure of machines that have failed; default: of all
-        that will fail.
+    def text(self, k: int, failed: bool = True) -> str:
+        """Return a machine's label, with the time at which it failed if it has `failed`."""
+        trace = self.traces[k]
+        if failed and trace.diverged_at is not None:
+            return f"{self.names[k]}: {style.ending(trace)}"
+        return self.names[k]
+
+    def widths(self, share: float = 1.0) -> np.ndarray:
+        """Return the widths of the labels with letters of a share of their size, (machines,) px."""
+        both = []
+        for k in range(len(self.names)):
+            both.append(max(self.wide(self.text(k)), self.wide(self.names[k])))
+        return share * np.array(both) + 2.5 * LETTERS * self.scale
+
+    def strip(self, width: float) -> float:
+        """Return the height, px, of labels and badges at the foot of tiles of a width, px; inf if
+        they are wider.
         """
-        words = []
-        for k, (name, trace) in enumerate(zip(self.names, self.traces, strict=True)):
-            end = ""
-            if trace.diverged_at is not None and (failed is None or failed[k]):
-                end = f": {style.ending(trace)}"
-            room = self.max_label - self.wide(end) - 2.5 * LETTERS * self.scale
-            words.append(style.cropped(name, room, LETTERS * self.scale, bold=True) + end)
-        return words
+        room = width - 2 * GAP * self.scale
+        if max(self.widths(LEAST_LETTERS).max(), self.badge[:, 0].max()) > room:
+            return math.inf
+        tall = float(self.badge[:, 1].max())
+        both = self.widths() + self.badge[:, 0] + GAP * self.scale * (tall > 0.0)
+        if (both <= room).all():
+            return max(PILL * self.scale, tall) + GAP * self.scale
+        return PILL * self.scale + tall + 1.5 * GAP * self.scale
 
-    def widths(self) -> np.ndarray:
-        """Return the widths of the labels, (machines,) px."""
-        return np.array([self.wide(text) for text in self.texts()]) + 2.5 * LETTERS * self.scale
-
-    def place(self, boxes: np.ndarray) -> None:
-        """Place the labels under machines in a row, else at the left of each; `boxes` are their
-        places, (n, 4) px.
-
-        A badge is below its label, or at its right.
+    def place(self, tiles: np.ndarray) -> None:
+        """Place labels and badges at the feet of tiles, (machines, 4) px: beside each other where
+        the strip is low, else the badge below.
         """
-        widths = self.widths()
-        height = PILL * self.scale
-        gap = 0.4 * height
-        middle = (boxes[:, :2] + boxes[:, 2:]) / 2
+        self.tiles = tiles
+        s = self.scale
+        room = float(tiles[0, 2] - tiles[0, 0]) - 2 * GAP * s
         wide, high = self.badge.T
-        foot = boxes[:, 3].max()
-        y = np.empty(len(widths))
-        if self.in_line:
-            whole = widths + np.where(wide > 0, wide + 0.3 * height, 0.0)
-            x = spread(middle[:, 0], whole + gap, self.size[0]) - (whole - widths) / 2
-            tall = max(height, high.max())
-            y[:] = min(foot + 0.35 * height + tall / 2, self.size[1] - tall / 2 - gap / 2)
-            across = x + widths / 2 + 0.3 * height + wide / 2
-            down = y
-        elif not self.beside:
-            x = spread(middle[:, 0], np.maximum(widths, wide) + gap, self.size[0])
-            y[:] = min(foot + 0.85 * height, self.size[1] - 0.6 * height - high.max())
-            across = x
-            down = y + (height + high) / 2 + 0.1 * height * (high > 0)
+        widths = self.widths().clip(0.0, room)
+        tall = self.strip(room + 2 * GAP * s)
+        middle = (tiles[:, 0] + tiles[:, 2]) / 2
+        foot = tiles[:, 3] - GAP * s / 2
+        if tall <= max(PILL * s, high.max()) + GAP * s:
+            gap = GAP * s * (wide > 0.0)
+            start = middle - (widths + gap + wide) / 2
+            y = foot - max(PILL * s, high.max()) / 2
+            self.pills = around(start + widths / 2, y, widths, PILL * s)
+            self.badges = around(start + widths + gap + wide / 2, y, wide, high)
         else:
-            x = np.maximum(boxes[:, 0] - gap, widths + wide + gap) - wide - widths / 2
-            y = spread(middle[:, 1], np.full(len(x), 1.15 * height), self.size[1])
-            across = x + (widths + wide) / 2 + 0.1 * height
-            down = y
-        self.pills = around(x, y, widths, height)
-        self.badges = around(across, down, wide, high)
+            self.pills = around(middle, foot - high.max() - (PILL + GAP) * s / 2, widths, PILL * s)
+            self.badges = around(middle, foot - high.max() / 2, wide, high)
 
     def over(
         self,
@@ -204,47 +165,42 @@ class Caption:
         failed: Sequence[bool],
         states: Sequence[State | None] = (),
         speed: float = 1.0,
-        shown: float = 0.0,
     ) -> np.ndarray:
         """Return the picture with the text on it: machines that have failed, their states, and the
         playback speed.
-
-        The picture is `shown` so long after the film's beginning, s.
         """
         image = Image.fromarray(picture)
         draw = ImageDraw.Draw(image)
         self.head(draw, time, speed)
-        for k, text in enumerate(self.texts(failed)):
-            if failed[k]:
-                colour = style.FAILED
-            else:
-                colour = self.colours[k]
-            self.label(draw, tuple(self.pills[k]), text, colour)
+        for k in range(len(self.names)):
+            colour = style.FAILED if failed[k] else self.colours[k]
+            self.label(draw, tuple(self.pills[k]), self.text(k, failed[k]), colour)
             state = states[k] if states else None
             if state:
                 self.box(draw, self.badges[k], state.words, *LOOKS[state.mood])
             if self.gauges[k] and not failed[k]:
-                self.strip(draw, k, time)
-        ink = min(1.0, (KEY_TIME + FADE_TIME - shown) / FADE_TIME)
-        if ink > 0.0:
-            image = Image.blend(image, self.keyed(image), ink)
+                self.strip_of(draw, k, time)
         return np.asarray(image)
 
     def head(self, draw: ImageDraw.ImageDraw, time: float, speed: float) -> None:
-        """Write the title and where gains come from, the clock, the playback speed, and the last
-        change of the plant.
+        """Write the title and where gains come from, the key, the clock, the playback speed, and
+        the last change of the plant.
         """
         s = self.scale
         big = style.font(TITLE_SIZE * s, bold=True)
-        draw.text((EDGE * s, 16 * s), self.title, style.INK, big)
-        left = 2 * EDGE * s + style.width(self.title, TITLE_SIZE * s, bold=True)
+        letters = style.font(KEY_LETTERS * s)
+        title = style.font(self.title_size, bold=True)
+        draw.text((EDGE * s, 30 * s), self.title, style.INK, title, anchor="lm")
+        for line, text in enumerate(self.key):
+            place = (EDGE * s, (KEY_TOP + KEY_PITCH * line) * s)
+            draw.text(place, text, style.DISTURBANCE, letters)
+        left = 2 * EDGE * s + style.width(self.title, self.title_size, bold=True)
         right = self.size[0] - EDGE * s
         room = right - self.clock - left
-        if room > 4 * TITLE_SIZE * s:
-            words = style.cropped(self.source, room, LETTERS * s)
-            draw.text((left, 21 * s), words, style.DISTURBANCE, style.font(LETTERS * s))
+        if style.width(self.source, KEY_LETTERS * s) < room:
+            draw.text((left, 30 * s), self.source, style.DISTURBANCE, letters, anchor="lm")
         draw.text(
-            (right, 16 * s), f"{time:.{3 if speed < 0.2 else 2}f} s", style.INK, big, anchor="ra"
+            (right, 30 * s), f"{time:.{3 if speed < 0.2 else 2}f} s", style.INK, big, anchor="rm"
         )
         if abs(speed - 1.0) > 1e-9:
             pace = f"{speed:.3g}× faster"
@@ -255,14 +211,14 @@ class Caption:
             end = right - style.width("00.000 s", TITLE_SIZE * s, bold=True) - LETTERS * s
             half = 0.85 * LETTERS * s
             start = end - self.wide(pace) - LETTERS * s
-            self.box(draw, (start, 28 * s - half, end, 28 * s + half), pace, *look, radius=half)
+            self.box(draw, (start, 30 * s - half, end, 30 * s + half), pace, *look, radius=half)
         change = max((at for at in self.changes if at <= time), default=None)
         if change is not None:
             words = f"{self.changes[change]} since {change:g} s"
-            words = style.cropped(words, self.note_room - 8 * s, LETTERS * s, bold=True)
-            start = right - self.wide(words) - 8 * s
+            words, size = fitted(words, self.note_room - 8 * s, LETTERS * s)
+            start = right - style.width(words, size, bold=True) - 8 * s
             box = (start, 45 * s, right + 8 * s, 67 * s)
-            self.box(draw, box, words, style.INK, None)
+            self.box(draw, box, words, style.INK, None, size=size)
 
     def box(
         self,
@@ -272,6 +228,7 @@ class Caption:
         fill: str,
         rim: str | None,
         radius: float | None = None,
+        size: float | None = None,
     ) -> None:
         """Draw a box, left, top, right, bottom px, with words in it."""
         s = self.scale
@@ -279,7 +236,7 @@ class Caption:
         corner = 5 * s if radius is None else radius
         draw.rounded_rectangle((left, top, right, bottom), corner, fill, rim, max(1, round(s)))
         middle = ((left + right) / 2, (top + bottom) / 2)
-        letters = style.font(LETTERS * s, bold=True)
+        letters = style.font(size or LETTERS * s, bold=True)
         draw.text(middle, words, style.letters_on(fill), letters, anchor="mm")
 
     def label(
@@ -292,25 +249,10 @@ class Caption:
         draw.rounded_rectangle(box, half, style.PAPER, style.RULE, max(1, round(s)))
         disc(draw, left + 1.3 * half, top + half, 0.6 * half, colour)
         place = (left + half + 1.1 * LETTERS * s, top + half)
-        draw.text(place, text, style.INK, style.font(LETTERS * s, bold=True), anchor="lm")
+        text, size = fitted(text, box[2] - box[0] - 2.5 * LETTERS * s, LETTERS * s)
+        draw.text(place, text, style.INK, style.font(size, bold=True), anchor="lm")
 
-    def keyed(self, image: Image.Image) -> Image.Image:
-        """Return the image with the key, on paper where it lies over the machines."""
-        s = self.scale
-        paper = image.copy()
-        letters = style.font(LETTERS * s)
-        places = (KEY_TOP + KEY_PITCH * np.arange(len(self.key))) * s
-        for y, text in zip(places.tolist(), self.key, strict=True):
-            if y + KEY_PITCH * s > self.room.top:
-                right = (EDGE + 4) * s + style.width(text, LETTERS * s)
-                box = ((EDGE - 4) * s, y - 1, right, y + KEY_PITCH * s)
-                ImageDraw.Draw(paper).rectangle(box, style.PAPER)
-        paper = Image.blend(image, paper, 0.75)
-        for y, text in zip(places.tolist(), self.key, strict=True):
-            ImageDraw.Draw(paper).text((EDGE * s, y), text, style.DISTURBANCE, letters)
-        return paper
-
-    def strip(self, draw: ImageDraw.ImageDraw, k: int, time: float) -> None:
+    def strip_of(self, draw: ImageDraw.ImageDraw, k: int, time: float) -> None:
         """Draw the counts of machine k's encoder around its position at a time, s, and which of
         them is read.
         """
@@ -349,34 +291,25 @@ def around(x: np.ndarray, y: np.ndarray, wide: np.ndarray, high: np.ndarray | fl
 
 
 def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
-    """Return what arrows and ghosts mean, and how much of a network is shown."""
+    """Return what arrows and ghosts mean, and how much of a network is shown.
 
-    def longest(quantity: str) -> str:
-        """Return the values of the longest arrows, one a group, such as "6 N"; "" if there are
-        none.
-        """
-        unit = "u" if quantity == "control" else "force"
-        words = []
-        for group, scale in scales.items():
-            if size := getattr(scale, quantity):
-                words.append(f"{style.short(size)} {style.units(group)[unit]}")
-        return ", ".join(words)
-
+    Arrows are to scale; of those whose largest value is another, it is said.
+    """
     words = []
     plant = traces[0].scenario.plant
-    if sizes := longest("control"):
+    if sizes := largest(scales, "control"):
         drive = any(scale.drive for scale in scales.values())
-        what = "force of the drive" if drive else "mean control"
+        what = "force of the drive" if drive else "control"
         words.append(f"arrow: {what}, longest {sizes}")
         words.append("bar: its range")
         if drive:
-            words.append("pale arrow: command")
+            words.append("pale: command")
     if plant.pose:
         words.append("line: path; dark: the wanted path")
-    if sizes := longest("disturbance"):
-        words.append(f"dark arrow: disturbance, longest {sizes}")
-    if sizes := longest("reaction"):
-        words.append(f"violet arrow: reaction, longest {sizes}")
+    if sizes := largest(scales, "disturbance"):
+        words.append(f"dark arrow: disturbance up to {sizes}")
+    if sizes := largest(scales, "reaction"):
+        words.append(f"violet: reaction up to {sizes}")
     words.append("translucent: reference")
     if plant.scenery:
         words.append(plant.scenery)
@@ -386,6 +319,18 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     if count > MAX_CHANNELS and not plant.direct:
         words.append(f"machines: the first {MAX_CHANNELS} of {count} pendulums")
     return words
+
+
+def largest(scales: Mapping[Group, Scale], kind: str) -> str:
+    """Return the largest values of a kind of arrows, one a group, such as "6 N"; "" if there are
+    none.
+    """
+    unit = "u" if kind == "control" else "force"
+    words = []
+    for group, scale in scales.items():
+        if size := getattr(scale, kind):
+            words.append(f"{style.short(size)} {style.units(group)[unit]}")
+    return ", ".join(words)
 
 
 def gauges(scenario: Scenario) -> bool:
@@ -406,19 +351,11 @@ def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:
     return lines
 
 
-def spread(centres: np.ndarray, widths: np.ndarray, room: float) -> np.ndarray:
-    """Return the centres, moved as little as needed for intervals of these widths to lie apart
-    within 0 .. room.
+def fitted(text: str, room: float, size: float) -> tuple[str, float]:
+    """Return the text on one line and the size of bold letters with which it fits the room; cut if
+    it is too wide in small ones.
     """
-    order = np.argsort(centres)
-    half = widths / 2
-    placed = centres.astype(float)
-    edge = 0.0
-    for i in order:
-        placed[i] = max(placed[i], edge + half[i])
-        edge = placed[i] + half[i]
-    edge = room
-    for i in order[::-1]:
-        placed[i] = min(placed[i], edge - half[i])
-        edge = placed[i] - half[i]
-    return placed
+    text = " ".join(text.split())
+    share = min(1.0, room / max(style.width(text, size, bold=True), 1.0))
+    least = max(share, LEAST_LETTERS) * size
+    return style.cropped(text, room + 1.0, least, bold=True), least

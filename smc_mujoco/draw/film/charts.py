@@ -132,9 +132,11 @@ class Charts:
         ax.set_xscale("function", functions=(self.share, self.time))
         ax.set_xlim(0.0, self.end)
         wide = ax.get_window_extent().width  # px
-        last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * ax.figure.dpi / 72) / wide
+        point = ax.figure.dpi / 72
+        last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * point) / wide
         stop = min(1.01 * self.window, self.end)
-        ticks = np.asarray(MaxNLocator(TIME_TICKS).tick_values(0.0, self.window))
+        count = min(TIME_TICKS, int(wide * self.shares[1] / style.width("0.0000", LETTERS * point)))
+        ticks = np.asarray(MaxNLocator(max(count, 1)).tick_values(0.0, self.window))
         ticks = ticks[(self.share(ticks) < last) & (ticks < stop)].tolist()
         ax.set_xticks([*ticks, self.end], [*(f"{tick:g}" for tick in ticks), f"{self.end:g} s"])
         for label in ax.get_xticklabels()[-1:]:

@@ -1,8 +1,10 @@
-"""Films: the machines of all traces side by side in MuJoCo, above charts that grow with the clock.
+"""Films: the machines of all traces in MuJoCo, each in its tile, above charts that grow with the
+clock.
 
 In order: pace.py sets the speed; track.py says what each run does at each frame; caption.py has the
-text, charts.py the charts; scene.py composes the model, puppet.py poses a machine, stage.py all of
-them with the arrows of arrows.py, and canvas.py renders; arm.py draws over arms; encoder.py writes.
+text, charts.py the charts; camera.py lays out the tiles; scene.py composes a machine's model,
+puppet.py poses it, stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over
+arms and what flies; encoder.py writes.
 Frames are made and written one by one, so that memory does not grow with a film's length.
 """
 
@@ -23,12 +25,13 @@ from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
-from smc_mujoco.draw.film import arrows, pace, scene
+from smc_mujoco.draw.film import arrows, camera, pace, scene
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder, mediapy
 from smc_mujoco.draw.film.pace import Clock
+from smc_mujoco.draw.film.puppet import Puppet
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.simulation.trace import Trace
@@ -296,61 +299,79 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     tracks = []
     for trace, colour in zip(traces, colours, strict=True):
         tracks.append(MachineTrack(trace, colour, edges, grid, scales, arms))
-    row = scene.in_a_row(scenario, scene.turn(scenario, frames.camera))
+    overlay = None
     below = None
     words = None
-    if arms:
-        from smc_mujoco.draw.film import arm
-
-        below = arm.room(traces, width / len(traces) / scale)
-        words = arm.key(traces)
+    if arms or scenario.plant.pose:
+        from smc_mujoco.draw.film import arm as overlay
+    if overlay and arms:
+        below = overlay.room(traces)
+        words = overlay.key(traces)
     grid_states = [track.grid_states for track in tracks]
     title = frames.title
     caption = Caption(
-        traces, names, colours, title, above, scale, scales, grid_states, row, below, words
+        traces, names, colours, title, above, scale, scales, grid_states, below, words
     )
     charts = Charts(traces, names, colours, (width, low), scale)
-    with Stage(tracks, above, caption.room, frames.camera, caption.apart, scale) as stage:
-        caption.place(stage.boxes)
-        over = None
-        if arms or scenario.plant.pose:
-            from smc_mujoco.draw.film.arm import Overlay
-
-            over = Overlay(traces, colours, stage, edges, caption.badges)
+    with contextlib.ExitStack() as opened:
+        stages = []
+        for stage in staged(tracks, frames.camera, caption, times):
+            stages.append(opened.enter_context(stage))
+        overlays = overlay.overlays(stages, edges, caption.badges) if overlay else []
         for frame, time in enumerate(times.tolist()):
-            picture = stage.render(posed(stage, tracks, over, frame, time))
-            if over:
-                picture = over.over(picture, frame)
+            picture = np.full((height - low, width, 3), 255, np.uint8)
+            for k, (left, top, right, bottom) in enumerate(caption.tiles.tolist()):
+                over = overlays[k] if overlays else None
+                picture[top:bottom, left:right] = shot(stages[k], over, frame, time)
             speed = float(frames.clock.speeds[frame])
-            shown = float(frames.clock.shown[frame])
             failed = [track.failed(time) for track in tracks]
             states = [track.states[frame] for track in tracks]
-            picture = caption.over(picture, time, failed, states, speed, shown)
+            picture = caption.over(picture, time, failed, states, speed)
+            for over in overlays:
+                picture = over.beside(picture, frame)
             yield np.concatenate([picture, charts.at(time)])
 
 
-def posed(
-    stage: Stage,
-    tracks: Sequence[MachineTrack],
-    over: "arm.Overlay | None",
-    frame: int,
-    time: float,
-) -> list[tuple[int, int, arrows.Arrow]]:
-    """Pose all machines for a frame, and return their arrows, each with machine and channel.
+def staged(
+    tracks: Sequence[MachineTrack], chosen: Camera | None, caption: Caption, times: np.ndarray
+) -> Iterator[Stage]:
+    """Yield the stages of machines, whose tiles the caption learns."""
+    turn = scene.turn(tracks[0].trace.scenario, chosen)
+    puppets = [Puppet(track.trace.scenario, turn[:, 2]) for track in tracks]
+    for track, puppet in zip(tracks, puppets, strict=True):
+        puppet.watch(track)
+    followed = any(puppet.travels for puppet in puppets)
+    reaches = []
+    for track, puppet in zip(tracks, puppets, strict=True):
+        reaches.append(puppet.reach(track, followed))
+    points = np.concatenate(reaches)
+    tiles, view = camera.tiles(len(tracks), caption.size, caption.top, caption.strip, points, turn)
+    caption.place(tiles)
+    for track, puppet in zip(tracks, puppets, strict=True):
+        path = puppet.path(times) if followed else None
+        yield Stage(track, puppet, view, points, caption.scale, len(tracks) == 1, path)
+
+
+def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> np.ndarray:
+    """Return the picture of a machine at a frame.
 
     A machine that has failed is grey, without a ghost or arrows. An arm has a ghost where its tip
     is far from its path.
     """
+    track = stage.track
+    stage.look(frame)
+    stage.set_shape(time)
+    stage.pose(track.x[frame], track.ahead[frame], time)
     drawn = []
-    for k, track in enumerate(tracks):
-        stage.set_shape(k, time)
-        stage.pose(k, track.x[frame], track.ahead[frame], time)
-        if track.failed(time):
-            stage.set_colour(k, style.FAILED)
-            stage.aim(k, None)
-            continue
-        stage.set_colour(k, track.colour)
-        lost = over is None or over.lost(k, frame)
-        stage.aim(k, track.r[frame] if lost else None, time)
-        drawn += [(k, *pair) for pair in track.drawn[frame].arrows]
-    return drawn
+    if track.failed(time):
+        stage.set_colour(style.FAILED)
+        stage.aim(None)
+    else:
+        stage.set_colour(track.colour)
+        lost = over is None or over.lost(frame)
+        stage.aim(track.r[frame] if lost else None, time)
+        drawn = track.drawn[frame].arrows
+    picture = stage.render(drawn)
+    if over:
+        picture = over.over(picture, frame)
+    return picture

@@ -21,6 +21,8 @@ POSES = 96  # poses of a trace that must be in the picture
 MAX_FIXED_SIZE = 4.0
 NEAR_SHARE = 0.3
 STAND_SHARE = 0.8
+FOLLOWED_TRAVEL = 1.0  # sizes of a machine: one that goes farther is followed; chosen
+FOLLOW_TIME = 0.5  # s, over which the followed place is a mean; chosen
 
 
 def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | np.ndarray) -> list[int]:
@@ -62,10 +64,9 @@ class Puppet:
                 self.rotors.append((k, model.jnt_qposadr[rotor]))
         self.links = moved_bodies(model, self.ids)
         self.free = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
-        self.place = np.zeros(3)  # m, of the machine in the film, to which `qpos` moves free bodies
         ids = self.ids.tolist()
         self.mounts = arrows.mounts(self.scenario, ids, self.slides, self.rail, front)
-        self.lowered = 0.0
+        self.height = 0.0  # m, of the machine over the film's floor
 
     def qpos(
         self, x: np.ndarray, ahead: np.ndarray | float = 0.0, rest: np.ndarray | None = None
@@ -85,8 +86,7 @@ class Puppet:
         leads = x + ahead
         for k, place in self.rotors:
             pose[place] = leads[k]
-        for first in self.free.tolist():
-            pose[first : first + 3] += self.place
+        pose[self.free + 2] += self.height
         return pose
 
     def posed(
@@ -102,54 +102,97 @@ class Puppet:
         scene.forward(self.shapes[now].model, data[now])
         return self.shapes[now].model, data[now]
 
-    def reach(self, track: MachineTrack, cut: bool = False) -> np.ndarray:
-        """Return what must be in the picture, (points, 3) m from the machine's place.
-
-        These are the corners of the boxes of all that the channels move, over the poses of its
-        trace and its reference, and its arrows. Of other things only the part close to these
-        counts, such as the upper half of a stand; with `cut`, rails and columns end there.
+    def watch(self, track: MachineTrack) -> None:
+        """Find where a trace takes the machine, its reference and what else moves: the corners of
+        their boxes at POSES times, m.
         """
         trace = track.trace
         model = self.model
-        data = [mujoco.MjData(shape.model) for shape in self.shapes]
+        self.data = data = [mujoco.MjData(shape.model) for shape in self.shapes]
         plane = model.geom_type == scene.PLANE
-        fixed = scene.still(model)
         links = np.isin(model.geom_bodyid, self.links) & ~plane
         if not links.any():
             raise ScenarioError(
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
                 "give its bodies geoms, or its links <visual>"
             )
-        loose = ~links & ~plane & ~fixed
+        loose = ~links & ~plane & ~scene.still(model)
         falling = np.array([model.body(i).name.startswith(OWN) for i in model.geom_bodyid])
-        moved = []
-        others = []
+        roots = model.body_rootid[model.geom_bodyid]
+        body = links | (loose & np.isin(roots, roots[links]))
+        self.times = []
+        self.places = []
+        self.goals = []
+        self.others = []
         for share in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             sample = round(share * (len(trace.t) - 1))
+            time = float(trace.t[sample])
             goal = trace.r[sample, : self.shown]
-            places = [trace.x[sample, : self.shown]]
             if np.isfinite(goal).all():
-                places.insert(0, goal)
-            world = np.empty((0, 0, 3))
-            for x in places:
-                world = scene.boxes(*self.posed(track, data, x, float(trace.t[sample])))
-                moved.append(world[links].reshape(-1, 3))
-            others.append(world[loose])
+                world = scene.boxes(*self.posed(track, data, goal, time))
+                self.goals.append(world[links].reshape(-1, 3))
+            world = scene.boxes(*self.posed(track, data, trace.x[sample, : self.shown], time))
+            self.times.append(time)
+            self.places.append(world[body].reshape(-1, 3))
+            self.others.append(world[loose])
             loose = loose & ~falling  # later it is anywhere
-        sides = np.ptp(np.concatenate(moved), axis=0)
-        points = np.concatenate([*moved, *self.lines(track, data, sides)])
+
+    @property
+    def travels(self) -> bool:
+        """Return whether a machine that nothing holds in place goes so far that the camera follows
+        it.
+        """
+        plant = self.scenario.plant
+        if plant.on_stage and not plant.pose:
+            return False
+        own = max(float(np.ptp(points, axis=0).max()) for points in self.places)
+        way = np.array([points.mean(axis=0) for points in self.places])
+        return float(np.ptp(way, axis=0).max()) > FOLLOWED_TRAVEL * own
+
+    def path(self, times: np.ndarray) -> np.ndarray:
+        """Return the places to which the camera follows the machine, (times, 3) m, at times in
+        s.
+        """
+        way = np.array([points.mean(axis=0) for points in self.places])
+        times = np.clip(times, self.times[0], self.times[-1])
+        half = np.minimum(times - self.times[0], self.times[-1] - times)
+        half = half.clip(0.0, 0.5 * FOLLOW_TIME)[:, None]
+        at = times[:, None] + half * np.linspace(-1.0, 1.0, 9)
+        means = [np.interp(at, self.times, part).mean(axis=1) for part in way.T]
+        return np.stack(means, axis=1) + np.array([0.0, 0.0, self.height])
+
+    def reach(self, track: MachineTrack, followed: bool) -> np.ndarray:
+        """Return what must be in the picture, (points, 3) m over the film's floor, and find the
+        machine's height over it.
+
+        These are the corners of the boxes of all that the channels move, over the poses of its
+        trace and its reference, and its arrows. Of other things only the part close to these
+        counts, such as the upper half of a stand; rails and columns end there. Of a machine that
+        the camera follows, the machine alone counts.
+        """
+        sides = np.ptp(np.concatenate(self.places), axis=0)
+        lines = self.lines(track, sides)
+        if followed:
+            way = self.path(np.array([*self.times, *(time for time, _ in lines)]))
+            seen = [*self.places, *(line for _, line in lines)]
+            points = np.concatenate([part - at for part, at in zip(seen, way, strict=True)])
+            self.height = max(0.0, -float(np.concatenate(self.places)[:, 2].min()))
+            return points
+        model = self.model
+        points = np.concatenate([*self.places, *self.goals, *(line for _, line in lines)])
         groups = model.geom_group.copy()
-        if cut:
-            axes = data[0].xaxis[self.ids[self.slides]]
-            machines = [shape.model for shape in self.shapes]
-            self.lowered = scene.cut(machines, points, axes, self.scenario.plant.on_stage)
-            scene.forward(model, data[0])
-        standing = scene.boxes(model, data[0])[fixed & (model.geom_group == groups)]
+        on_stage = self.scenario.plant.on_stage
+        axes = self.data[0].xaxis[self.ids[self.slides]]
+        machines = [shape.model for shape in self.shapes]
+        raised = scene.cut(machines, points, axes, on_stage)
+        scene.forward(model, self.data[0])
+        kept = scene.still(model) & (model.geom_group == groups)
+        standing = scene.boxes(model, self.data[0])[kept]
         low = points.min(axis=0)
         high = points.max(axis=0)
         size = (high - low).max()
-        around = np.concatenate(others)
-        if not self.scenario.plant.on_stage:
+        around = np.concatenate(self.others)
+        if not on_stage:
             far = MAX_FIXED_SIZE * size
 
             def close(boxes: np.ndarray) -> np.ndarray:
@@ -162,13 +205,18 @@ class Puppet:
             standing[..., :2] = standing[..., :2].clip(low[:2] - beside, high[:2] + beside)
         stand = STAND_SHARE * size
         standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
-        return np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
+        points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
+        self.height = -raised
+        if not on_stage:  # it stands on the floor, or hangs close above it
+            self.height = -float(points[:, 2].min())
+        points = points + np.array([0.0, 0.0, self.height])
+        if self.scenario.plant.tip:
+            points[:, 2] = points[:, 2].clip(0.0)
+        return points
 
-    def lines(
-        self, track: MachineTrack, data: Sequence[mujoco.MjData], sides: np.ndarray
-    ) -> list[np.ndarray]:
-        """Return the lines of arrows on a machine, (m, 3) m each; bent ones suit the `sides` of
-        what moves, m.
+    def lines(self, track: MachineTrack, sides: np.ndarray) -> list[tuple[float, np.ndarray]]:
+        """Return the lines of arrows on a machine, (m, 3) m each, with their times, s; bent ones
+        suit the `sides` of what moves, m.
         """
         radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
         self.mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
@@ -176,11 +224,12 @@ class Puppet:
         for drawn in track.framing:
             t = track.trace.t
             sample = min(int(np.searchsorted(t, drawn.time - 1e-9)), len(t) - 1)
-            at = self.posed(track, data, track.trace.x[sample, : self.shown], drawn.time)
+            x = track.trace.x[sample, : self.shown]
+            at = self.posed(track, self.data, x, drawn.time)
             for i, arrow in drawn.arrows:
                 found = arrows.path(*at, self.mounts[i], arrow)
                 if found:
-                    lines.append(found[0])
+                    lines.append((drawn.time, found[0]))
         return lines
 
     def shape(self, time: float) -> int:

@@ -1,7 +1,6 @@
-"""The model of a film: one machine a trace, side by side, without their surroundings, and a camera
-that suits them.
+"""The model of a machine in a film, without its surroundings, and a camera that suits it.
 
-Machines are the scenarios' mechanisms with all that they touch. The camera looks in the direction
+It is the scenario's mechanism with all that it touches. The camera looks in the direction
 of the plant's own camera `look`, or of the chosen one. Rails and columns are cut to what moves: a
 film shows the motion. A user's model keeps its cameras; its lights, sky and floor are the film's.
 """
@@ -24,9 +23,6 @@ from smc_mujoco.simulation.scenario import Scenario
 
 # Numbers of presentation here are chosen.
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
-ROW_GAP = 0.15  # between machines in a row, of their width or height
-ARM_GAP = 0.04  # the same between arms, which have no arrows beside them
-MIN_DISTANCE = 0.05  # m between machines
 HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}
 SUN = "sun"  # the light whose shadows lie on the floor, see canvas.py
@@ -51,11 +47,9 @@ HINGE = mujoco.mjtJoint.mjJNT_HINGE
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))  # of a box
 
 
-def compose(
-    scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, int]
-) -> mujoco.MjModel:
-    """Return one model with machine k at place k, (3,) m, its names prefixed m<k>/, and a camera
-    `film`.
+def compose(scenario: Scenario, height: float, size: tuple[int, int]) -> mujoco.MjModel:
+    """Return the model of a machine at a height over the floor, m, its names prefixed m/, with a
+    camera `film`.
 
     Pictures are of `size` px.
     """
@@ -63,20 +57,18 @@ def compose(
     for name, value in QUALITY.items():
         setattr(spec.visual.quality, name, value)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-    for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
-        machine = models.spec(scenario)
-        frame = spec.worldbody.add_frame(pos=place)
-        if not scenario.plant.on_stage:
-            spec.attach(users_machine(machine, spec), frame=frame, prefix=f"m{k}/")
-            continue
+    machine = models.spec(scenario)
+    frame = spec.worldbody.add_frame(pos=(0.0, 0.0, height))
+    if scenario.plant.on_stage:
         surroundings = [machine.geom("floor"), machine.material("floor"), *machine.textures]
         strip(machine, *machine.lights, *surroundings)
-        if k == 0:
-            spec.option = machine.option
-            spec.compiler = machine.compiler
+        spec.option = machine.option
+        spec.compiler = machine.compiler
         for body in machine.worldbody.bodies:
             if body.name == "machine" or body.name.startswith(OWN):
-                frame.attach_body(body, f"m{k}/", "")
+                frame.attach_body(body, "m/", "")
+    else:
+        spec.attach(users_machine(machine, spec), frame=frame, prefix="m/")
     spec.material("floor").emission = 0.13  # nearly as white as the page below
     for light in spec.lights:
         if light.castshadow and light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
@@ -119,15 +111,14 @@ def users_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def set_floor(
-    model: mujoco.MjModel,
-    turn: np.ndarray,
-    place: np.ndarray,
-    size: tuple[int, int],
-    points: np.ndarray,
+    model: mujoco.MjModel, view: camera.View, points: np.ndarray, moved: np.ndarray
 ) -> None:
-    """Suit the floor to machines whose points are (m, 3) m: its grid, and the haze into which it
-    fades behind them.
+    """Suit the floor to machines whose points are (m, 3) m, moved with the camera: its grid, and
+    the haze into which it fades behind them.
     """
+    size, turn, place = view
+    points = points + moved
+    place = place + moved
     model.stat.center[:] = (points.min(axis=0) + points.max(axis=0)) / 2
     model.stat.extent = extent = np.ptp(points, axis=0).max()
     cells = np.outer(10.0 ** np.arange(-4, 5), (1.0, 2.0, 5.0)).ravel()  # m
@@ -183,50 +174,6 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
     if abs(z) > PARALLEL_COSINE:
         return ABOVE
     return float(np.degrees(np.arctan2(abs(y), x * np.sign(y or 1.0)))), LOW_ELEVATION
-
-
-def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:
-    """Return whether machines stand in a row across the picture, and not behind each other.
-
-    They do if the plant's lane lies across it, if they carry something that would hide the machine
-    behind, or if the model is the user's.
-    """
-    if not scenario.plant.on_stage or scenario.plant.free:
-        return True
-    step = np.array(scenario.plant.lane)
-    return bool(abs(step @ turn[:, 0]) > 0.5 * np.linalg.norm(step))
-
-
-def lane(
-    scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.ndarray
-) -> np.ndarray:
-    """Return the step from one machine to the next, (3,) m.
-
-    Machines in a row stand as close as they can without hiding each other. Others stand the plant's
-    lane apart, or further if they are realistic and would intersect.
-    """
-    step = np.array(scenarios[0].plant.lane)
-    if in_a_row(scenarios[0], turn):
-        right = np.array([*turn[:2, 0], 0.0])
-        if not right.any():
-            right[0] = 1.0
-        right /= np.linalg.norm(right)
-        sides = [points @ right for points in reaches]
-        wide = 0.0
-        for left, other in itertools.pairwise(sides):
-            wide = max(wide, left.max() - other.min())
-        tall = 0.0
-        for points in reaches:
-            tall = max(tall, float(np.ptp(points[:, 2])))
-        gap = ARM_GAP if scenarios[0].plant.tip else ROW_GAP
-        return (wide + gap * max(wide, tall)) * right
-    length = float(np.linalg.norm(step))
-    if any(scenario.realistic for scenario in scenarios):
-        sides = [fixed_boxes(models.compile_model(one)) @ (step / length) for one in scenarios]
-        for j, k in itertools.combinations(range(len(sides)), 2):
-            needed = sides[j].max() - sides[k].min() + MIN_DISTANCE
-            length = max(length, needed / (k - j))
-    return step * (length / np.linalg.norm(step))
 
 
 def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -1,8 +1,7 @@
-"""The stage of a film: poses and renders the machines of all traces under one camera that sees them
-all.
+"""The stage of a film: poses and renders one machine under its camera, with its arrows.
 
-The camera stands at the nearest place from which every machine stays inside the room that the page
-leaves, wherever its trace takes it.
+All machines of a film have the same view. The camera stands at the nearest place from which every
+machine stays in its tile, wherever its trace takes it; it follows machines that go far.
 """
 
 import warnings
@@ -21,7 +20,6 @@ from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as models
 
-ROW_SHARE = 0.95  # of the width, which the places of machines in a row take at least; chosen
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
@@ -31,80 +29,61 @@ SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
 
 
 class Stage:
-    """The compiled scene and its renderer: a context, which closes the renderer.
+    """The compiled scene of one machine and its renderer: a context, which closes the renderer.
 
-    The machines are at `where`, (machines, 3) m, in the picture at `boxes`, (machines, 4) px: left,
-    top, right, bottom.
+    `points`, (m, 3) m, are what the machines of a film reach in this view; `alone` is whether the
+    film has no other machine; `followed`, (frames, 3) m, is where the camera goes with the machine.
     """
 
     def __init__(
         self,
-        tracks: Sequence[MachineTrack],
-        size: tuple[int, int],
-        room: camera.Room,
-        chosen: camera.Camera | None = None,
-        apart: float = 0.0,
+        track: MachineTrack,
+        puppet: Puppet,
+        view: camera.View,
+        points: np.ndarray,
         scale: float = 1.0,
+        alone: bool = True,
+        followed: np.ndarray | None = None,
     ):
-        self.tracks = tracks
-        self.size = size
+        self.track = track
+        self.puppet = puppet
+        self.size, self.turn, self.place = view
+        self.start = view.place
         self.scale = scale
-        first = tracks[0].trace.scenario
-        self.is_users = not first.plant.on_stage
-        self.turn = turn = scene.turn(first, chosen)
-        cut = scene.in_a_row(first, turn)
-        self.puppets = []
-        scenarios = []
-        reaches = []
-        self.shown = []
-        self.blocks = []  # of the positions of all
-        start = 0
-        for track in tracks:
-            puppet = Puppet(track.trace.scenario, turn[:, 2])
-            self.puppets.append(puppet)
-            scenarios.append(puppet.scenario)
-            reaches.append(puppet.reach(track, cut))
-            self.shown.append(puppet.shown)
-            self.blocks.append(slice(start, start + puppet.model.nq))
-            start += puppet.model.nq
-        self.where, seen, self.place = placed(self.puppets, reaches, turn, size, room, apart)
-        self.model = scene.compose(scenarios, self.where, size)
+        self.alone = alone
+        self.followed = followed
+        self.is_users = not puppet.scenario.plant.on_stage
+        self.model = scene.compose(puppet.scenario, puppet.height, self.size)
         if not self.is_users:
             scene.restyle(self.model)
         self.data = mujoco.MjData(self.model)
         self.goal = mujoco.MjData(self.model)
-        self.aimed = np.zeros(len(tracks), bool)
+        self.aimed = False
         material = self.model.geom_matid
         painted = self.model.mat_rgba[material]
         self.paint = np.where((material >= 0)[:, None], painted, self.model.geom_rgba)
         visible = (self.model.geom_group < GROUPS) & (self.paint[:, 3] > 0.0)
-        radius = self.largest_radius(
-            float((self.place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2])
-        )
-        self.links = []
-        self.mounts = []
-        for k in range(len(tracks)):
-            self.find_joints(k, visible, radius)
-        self.shape = [-1] * len(tracks)
-        self.colours = [""] * len(tracks)
-        for k, track in enumerate(tracks):
-            self.set_shape(k, 0.0)
-            self.set_colour(k, track.colour)
-            self.pose(k, track.trace.x[0, : self.shown[k]])
+        radius = self.largest_radius(float((self.place - points.mean(axis=0)) @ self.turn[:, 2]))
+        self.find_joints(visible, radius)
+        self.shape = -1
+        self.colour = ""
+        self.set_shape(0.0)
+        self.set_colour(track.colour)
+        self.pose(track.trace.x[0, : puppet.shown])
         film = self.model.camera("film")
-        film.pos = self.place
-        mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
-        self.boxes = np.stack(list(map(self.box, seen)))
+        self.camera = film.id
+        mujoco.mju_mat2Quat(self.model.cam_quat[film.id], self.turn.ravel())
+        self.look(0)
         scene.forward(self.model, self.data)
-        scene.set_floor(self.model, turn, self.place, size, np.concatenate(seen))
-        if self.is_users and not any(map(len, self.links)):
+        scene.set_floor(self.model, view, points, self.place - self.start)
+        if self.is_users and not len(self.links):
             warnings.warn(
-                f"the picture of {first.plant.name} shows no part that moves: "
+                f"the picture of {puppet.scenario.plant.name} shows no part that moves: "
                 "give it geoms in groups 0 to 2 that are not transparent",
                 ScenarioWarning,
                 users_stacklevel(),
             )
-        self.canvas = Canvas(self.model, self.data, size, arms=bool(first.plant.tip))
+        self.canvas = Canvas(self.model, self.data, self.size, bool(puppet.scenario.plant.tip))
 
     def __enter__(self) -> "Stage":
         return self
@@ -112,94 +91,96 @@ class Stage:
     def __exit__(self, *_: object) -> None:
         self.canvas.close()
 
-    def find_joints(self, k: int, visible: np.ndarray, radius: float) -> None:
-        """Find the geoms that the joints of machine k move, and the mounts of its arrows; bent ones
-        have at most this radius, m.
+    def find_joints(self, visible: np.ndarray, radius: float) -> None:
+        """Find the geoms that the joints move, and the mounts of arrows; bent ones have at most
+        this radius, m.
         """
-        puppet = self.puppets[k]
-        puppet.place = self.where[k]
         ids = []
-        mounts = []
-        for joint, mount in zip(joints(models.spec(puppet.scenario)), puppet.mounts, strict=True):
-            ids.append(self.model.joint(f"m{k}/{joint.name}").id)
-            mounts.append(mount._replace(joint=ids[-1], radius=min(mount.radius, radius)))
+        self.mounts = []
+        found = joints(models.spec(self.puppet.scenario))
+        for joint, mount in zip(found, self.puppet.mounts, strict=True):
+            ids.append(self.model.joint(f"m/{joint.name}").id)
+            bent = min(mount.radius, radius)
+            self.mounts.append(mount._replace(joint=ids[-1], radius=bent))
         moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
-        self.links.append(np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible))
-        self.mounts.append(mounts)
+        self.links = np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible)
 
     def largest_radius(self, distance: float) -> float:
         """Return the largest radius of a bent arrow at a distance from the camera, m."""
         layers = 0
-        for track in self.tracks:
-            for drawn in track.framing:
-                layers = max([layers, *(arrow.layer for _, arrow in drawn.arrows)])
+        for drawn in self.track.framing:
+            layers = max([layers, *(arrow.layer for _, arrow in drawn.arrows)])
         most = arrows.MAX_BENT_SHARE * self.size[1] / (1.0 + arrows.BENT_DISTANCE * layers)  # px
         return most * camera.pixel(self.size) * distance
 
-    def set_shape(self, k: int, time: float) -> None:
-        """Give machine k its shape at a time, s: its rod may be longer than the plant's, and may
+    def look(self, frame: int) -> None:
+        """Put the camera where it is at a frame."""
+        if self.followed is not None:
+            self.place = self.start + self.followed[frame]
+        self.model.cam_pos[self.camera] = self.place
+
+    def set_shape(self, time: float) -> None:
+        """Give the machine its shape at a time, s: its rod may be longer than the plant's, and may
         change in a jump.
         """
-        now = self.puppets[k].shape(time)
-        if now == self.shape[k]:
+        now = self.puppet.shape(time)
+        if now == self.shape:
             return
-        self.shape[k] = now
-        single = self.puppets[k].shapes[now].model
+        self.shape = now
+        single = self.puppet.shapes[now].model
         for geom in range(single.ngeom):
             name = single.geom(geom).name
-            copy = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, f"m{k}/{name}")
+            copy = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, f"m/{name}")
             if name and copy >= 0:
                 for field in SHAPE_FIELDS:
                     getattr(self.model, field)[copy] = getattr(single, field)[geom]
                 if single.geom_bodyid[geom] == 0:
-                    self.model.geom_pos[copy] += self.where[k]
+                    self.model.geom_pos[copy, 2] += self.puppet.height
 
-    def set_colour(self, k: int, colour: str) -> None:
-        """Colour the accent of machine k.
+    def set_colour(self, colour: str) -> None:
+        """Colour the accent of the machine.
 
         A user's model has none: colour its links, those unpainted if it is alone.
         """
-        if self.colours[k] == colour:
+        if self.colour == colour:
             return
-        self.colours[k] = colour
+        self.colour = colour
         rgb = np.array(style.rgb(colour)) / 255
         if not self.is_users:
-            self.model.mat(f"m{k}/accent").rgba[:3] = rgb
+            self.model.mat("m/accent").rgba[:3] = rgb
             return
-        links = self.links[k]
-        if len(self.colours) == 1 and colour != style.FAILED:
+        links = self.links
+        if self.alone and colour != style.FAILED:
             links = links[(self.paint[links] == DEFAULT_RGBA).all(axis=1)]
         self.model.geom_matid[links] = -1
         self.model.geom_rgba[links] = self.paint[links]
         own = (1.0 - LAW_SHARE) * self.paint[links, :3]
         self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + own
 
-    def rest(self, k: int, time: float) -> np.ndarray | None:
-        """Return the pose of machine k at a time, s, in joints that have no channel."""
-        motion = self.tracks[k].motion
+    def rest(self, time: float) -> np.ndarray | None:
+        """Return the pose at a time, s, in joints that have no channel."""
+        motion = self.track.motion
         return None if motion is None else motion.at(time)
 
-    def aim(self, k: int, r: np.ndarray | None, time: float = 0.0) -> None:
-        """Show where the reference r, (shown,) rad or m, wants machine k, as a ghost; None: show no
-        ghost.
+    def aim(self, r: np.ndarray | None, time: float = 0.0) -> None:
+        """Show where the reference r, (shown,) rad or m, wants the machine, as a ghost; None: show
+        no ghost.
         """
-        self.aimed[k] = r is not None
+        self.aimed = r is not None
         if r is not None:
-            self.goal.qpos[self.blocks[k]] = self.puppets[k].qpos(r, rest=self.rest(k, time))
+            self.goal.qpos[:] = self.puppet.qpos(r, rest=self.rest(time))
 
-    def pose(
-        self, k: int, x: np.ndarray, ahead: np.ndarray | float = 0.0, time: float = 0.0
-    ) -> None:
-        """Put machine k's channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over
-        their joints.
+    def pose(self, x: np.ndarray, ahead: np.ndarray | float = 0.0, time: float = 0.0) -> None:
+        """Put the channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their
+        joints.
 
         Joints without a channel are where they were at that time, s.
         """
-        self.data.qpos[self.blocks[k]] = self.puppets[k].qpos(x, ahead, self.rest(k, time))
+        self.data.qpos[:] = self.puppet.qpos(x, ahead, self.rest(time))
 
-    def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel,
-        arrow); read-only.
+    def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> np.ndarray:
+        """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
+        read-only.
         """
         scene.forward(self.model, self.data)
         scene.forward(self.model, self.goal)
@@ -207,8 +188,8 @@ class Stage:
         if not drawn:
             return picture
         image = Image.fromarray(picture)
-        for k, i, arrow in sorted(drawn, key=lambda item: item[2].head):  # bars are behind arrows
-            self.draw_arrow(image, self.mounts[k][i], arrow)
+        for i, arrow in sorted(drawn, key=lambda item: item[1].head):  # bars are behind arrows
+            self.draw_arrow(image, self.mounts[i], arrow)
         return np.asarray(image)
 
     def draw_arrow(self, image: Image.Image, mount: arrows.Mount, arrow: arrows.Arrow) -> None:
@@ -218,7 +199,7 @@ class Stage:
             return
         points, width = found
         line = self.project(points)
-        if np.ptp(line, axis=0).max() <= 1.0:
+        if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() < arrows.MIN_PIXELS * self.scale:
             return
         across = self.project(np.array([points[0], points[0] + width * self.turn[:, 1]]))
         thick = max(float(np.ptp(across[:, 1])), arrows.MIN_SHAFT * self.scale * arrow.size)
@@ -234,22 +215,16 @@ class Stage:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""
         return camera.project(points, self.turn, self.place, self.size)
 
-    def box(self, points: np.ndarray) -> np.ndarray:
-        """Return the box around points (m, 3) m in the picture, px: left, top, right, bottom."""
-        flat = self.project(points)
-        return np.append(flat.min(axis=0), flat.max(axis=0))
-
-    def find(self, k: int, name: str) -> np.ndarray:
-        """Return where a site of machine k is, or the centre of mass of a body, (3,) m."""
-        if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, f"m{k}/{name}") >= 0:
-            return self.data.site(f"m{k}/{name}").xpos
-        return self.data.body(f"m{k}/{name}").xipos
+    def find(self, name: str) -> np.ndarray:
+        """Return where a site of the machine is, or the centre of mass of a body, (3,) m."""
+        if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, f"m/{name}") >= 0:
+            return self.data.site(f"m/{name}").xpos
+        return self.data.body(f"m/{name}").xipos
 
     def add_ghosts(self, shown: mujoco.MjvScene) -> None:
-        """Add translucent copies of the machines that are aimed, as their references want them."""
+        """Add a translucent copy of the machine that is aimed, as its reference wants it."""
         model = self.model
-        links = [self.links[k] for k in np.flatnonzero(self.aimed)]
-        for i in np.concatenate([*links, []]).astype(int).tolist():
+        for i in self.links.tolist() if self.aimed else ():
             if shown.ngeom >= shown.maxgeom:
                 return
             shape = shown.geoms[shown.ngeom]
@@ -262,44 +237,3 @@ class Stage:
             shape.transparent = 1
             shape.specular = 0.0
             shown.ngeom += 1
-
-
-def placed(
-    puppets: Sequence[Puppet],
-    reaches: Sequence[np.ndarray],
-    turn: np.ndarray,
-    size: tuple[int, int],
-    room: camera.Room,
-    apart: float,
-) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Return the places of the machines, (machines, 3) m, their points there, and the place of the
-    camera, (3,) m.
-
-    Machines stand side by side on the floor. In a row they are at least `apart` px apart, and fill
-    ROW_SHARE of the room if that makes them no smaller.
-    """
-    scenarios = [puppet.scenario for puppet in puppets]
-    step = scene.lane(scenarios, reaches, turn)
-    where = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
-    where[:, 2] -= [puppet.lowered for puppet in puppets]
-    if not scenarios[0].plant.on_stage:  # the floor hides what is below it
-        where[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
-    floor = 0.0 if scenarios[0].plant.tip else -np.inf
-
-    def fitted(where: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-        lowest = (-np.inf, -np.inf, floor)
-        seen = [np.maximum(points + at, lowest) for points, at in zip(reaches, where, strict=True)]
-        return where, seen, camera.fit(np.concatenate(seen), turn, size, room)
-
-    fit = fitted(where)
-    if len(where) == 1:
-        return fit
-    pitch = np.diff(camera.project(where, turn, fit[2], size)[:, 0]).mean()
-    filled = ROW_SHARE * (room.right - room.left) / len(where)
-    if 0.0 < pitch < apart:  # else labels would not be below their machines
-        return fitted(where * (apart / pitch, apart / pitch, 1.0))
-    if 0.0 < pitch < filled and scene.in_a_row(scenarios[0], turn):
-        wide = fitted(where * (filled / pitch, filled / pitch, 1.0))
-        if (wide[2] - fit[2]) @ turn[:, 2] < 1e-9 * np.abs(fit[2]).max():
-            return wide
-    return fit

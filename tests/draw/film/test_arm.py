@@ -46,48 +46,46 @@ def struck(trace, **fields):
 
 def overlay(trace, edges=EDGES, body=(9.0, 0.0, 9.0)):
     """What is drawn over an arm at the origin, of which every body is at one place, m."""
-    find = lambda k, name: np.array(body)  # noqa: E731
     stage = SimpleNamespace(
-        where=np.zeros((1, 3)),
+        track=SimpleNamespace(trace=trace, colour=COLOUR),
+        puppet=SimpleNamespace(height=0.0),
         project=project,
-        size=SIZE,
         scale=1.0,
-        find=find,
+        find=lambda name: np.array(body),
     )
-    return arm.Overlay([trace], [COLOUR], stage, edges, np.array([[100.0, 150.0, 300.0, 210.0]]))
+    (shown,) = arm.overlays([stage], edges, [np.array([100.0, 150.0, 300.0, 210.0])])
+    return shown
 
 
 def paper():
     return np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
 
 
-def drawn(trail, time):
+def drawn(shown, points):
     image = Image.fromarray(paper())
-    trail.draw(image, time)
+    shown.trail(image, points, COLOUR, 3.0)
     return np.asarray(image)
 
 
-def test_a_trail_is_drawn_until_now():
-    corners = np.array([[20.0, 30.0], [60.0, 30.0], [60.0, 90.0]])
-    times = np.linspace(0.0, 2.0, 41)
-    points = np.stack([np.interp(times, [0.0, 1.0, 2.0], place) for place in corners.T], axis=1)
-    trail = arm.Trail(points, times, COLOUR, 3.0)
-    early = drawn(trail, 0.5)
-    late = drawn(trail, 2.0)
+def test_a_trail_is_drawn_until_now(trace):
+    """A path goes right, then down."""
+    corners = np.array([[0.0, 1.7], [0.4, 1.7], [0.4, 1.1]])
+    points = np.stack(
+        [np.interp(np.linspace(0.0, 2.0, 41), [0.0, 1.0, 2.0], part) for part in corners.T], axis=1
+    )
+    points = np.insert(points, 1, 0.0, axis=1)
+    shown = overlay(trace)
+    early = drawn(shown, points[:11])
+    late = drawn(shown, points)
     for picture, x, y, inked in (
-        (early, 25, 29, True),
-        (early, 45, 29, False),
-        (late, 45, 29, True),
-        (late, 60, 80, True),
-        (late, 45, 34, False),
+        (early, 55, 30, True),
+        (early, 75, 30, False),
+        (late, 75, 30, True),
+        (late, 90, 80, True),
+        (late, 75, 34, False),
     ):
         assert (picture[y, x].tolist() == list(style.rgb(COLOUR))) is inked
-    assert (
-        drawn(arm.Trail(points, times, COLOUR, 3.0), 2.0) == late
-    ).all()  # at once or part by part
-    assert (
-        drawn(arm.Trail(points - 1000.0, times, COLOUR, 3.0), 2.0) == 255
-    ).all()  # outside the picture
+    assert (drawn(shown, points - 1000.0) == 255).all()  # outside the picture
 
 
 def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
@@ -95,8 +93,8 @@ def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
     monkeypatch.setattr(tip, "tip_paths", lambda trace: (low, low))
     shown = overlay(dataclasses.replace(trace, t=np.array([0.0, 0.1, 0.2])))
     floor = project(np.zeros((1, 3)))[0, 1]
-    for trail in shown.trails[0]:
-        rows = np.flatnonzero((drawn(trail, 1.0) != 255).any(axis=(1, 2)))
+    for path in (shown.path, shown.wanted):
+        rows = np.flatnonzero((drawn(shown, path) != 255).any(axis=(1, 2)))
         assert floor - 55 <= rows.min() <= floor - 45
         assert rows.max() <= floor + 2
 
@@ -109,14 +107,14 @@ def test_bars_are_shares_of_each_joints_limit(trace):
     )
     bars = overlay(trace)
     expected = trace.applied[:20].mean(axis=0) / np.array([4.0, 2.0, 9.0])
-    assert bars.shares
-    np.testing.assert_allclose(bars.shares[0][0], expected, atol=0.05)
+    assert bars.shares is not None
+    np.testing.assert_allclose(bars.shares[0], expected, atol=0.05)
     beyond = np.where(trace.t[:, None] < EDGES[1], 1.5, -1.5) * [4.0, 2.0, 9.0]
     np.testing.assert_array_equal(
-        overlay(dataclasses.replace(trace, applied=beyond)).shares, [[[1.0] * 3, [-1.0] * 3]]
+        overlay(dataclasses.replace(trace, applied=beyond)).shares, [[1.0] * 3, [-1.0] * 3]
     )
-    bars.shares[0][0] = (0.5, -1.0, 0.0)
-    image = bars.over(paper() // 2, 0)
+    bars.shares[0] = (0.5, -1.0, 0.0)
+    image = bars.beside(paper() // 2, 0)
     zero = 150.0 + arm.LABEL_GAP + arm.BAR_HEIGHT / 2
     middles = []
     for i in range(3):

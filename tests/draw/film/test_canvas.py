@@ -6,29 +6,27 @@ from helpers.films import staged
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera
 from smc_mujoco.draw.film.stage import Stage
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SIZE = (640, 230)
-ROOM = camera.Room(20, 20, 620, 210)
 SEEN = 24  # of 255: a sample of a smoothed edge more or less is no difference
 
 
 def stage(plant: str, **fields) -> Stage:
     trace = smc.run(smc.Scenario(plant=plant, duration=1.0, **{"law": "none"} | fields))
-    return staged([trace, trace], ["#0072B2", "#D55E00"], SIZE, ROOM)
+    return staged(trace, SIZE, strip=20.0)
 
 
 def test_a_changed_colour_or_shape_is_drawn():
     jump = smc.Jump(0.5, {"l": 1.5})
     with stage("inverted_pendulum", jump=jump) as shown:
-        shown.set_shape(0, 0.0)
+        shown.set_shape(0.0)
         first = shown.render()
-        shown.set_colour(0, "#A9AFB6")
+        shown.set_colour("#A9AFB6")
         grey = shown.render()
         assert (np.abs(first.astype(int) - grey).max(axis=2) > 50).sum() > 50
-        shown.set_shape(0, 0.6)
+        shown.set_shape(0.6)
         longer = shown.render()
         assert (np.abs(longer.astype(int) - grey).max(axis=2) > 50).sum() > 50
 
@@ -47,17 +45,16 @@ def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges()
 
 def test_a_ghost_stands_where_the_reference_is_and_inside_a_machine_that_is_there():
     with stage("van_der_pol") as shown:
-        for k in range(2):
-            shown.pose(k, np.array([1.5]))
+        shown.pose(np.array([1.5]))
         alone = shown.render().astype(int)
-        shown.aim(0, np.array([-1.0]))
+        shown.aim(np.array([-1.0]))
         ghost = np.abs(shown.render().astype(int) - alone).max(axis=2) > 20
         columns = np.flatnonzero(ghost.any(axis=0))
         assert ghost.sum() > 100
-        assert columns.max() < SIZE[0] / 2
-        shown.aim(0, np.array([1.5]))
+        assert columns.max() < 0.6 * SIZE[0]
+        shown.aim(np.array([1.5]))
         assert (
             np.abs(shown.render().astype(int) - alone).max(axis=2) > 20
         ).sum() < 0.1 * ghost.sum()
-        shown.aim(0, None)
+        shown.aim(None)
         assert (np.abs(shown.render().astype(int) - alone).max(axis=2) > SEEN).mean() < 3e-4

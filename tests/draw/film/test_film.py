@@ -11,13 +11,13 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers.films import staged, tracks, without_charts
+from helpers.films import staged, without_charts
 from helpers.sketch import failed
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import camera, encoder, film, pace, puppet, scene, stage
+from smc_mujoco.draw.film import encoder, film, pace, scene
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales, scales_by_channel
 from smc_mujoco.draw.film.caption import key
 from smc_mujoco.draw.film.pace import Clock
@@ -88,13 +88,14 @@ def share(picture: np.ndarray, colour: str) -> float:
 def test_arrows_are_to_scale_and_a_bar_shows_switching():
     (trace,) = runs("van_der_pol", "sine", LAWS[:1])
     u = np.where(np.arange(301) % 2, 6.0, -3.0)[:, None]
-    acting = loads(dataclasses.replace(trace, applied=u), np.array([0.0, 0.1, 0.2]))
-    arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 0.2), "#0072B2")
+    strong = dataclasses.replace(trace, applied=u, d=10.0 * trace.d)
+    acting = loads(strong, np.array([0.0, 0.1, 0.2]))
+    arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 1.0, longest=6.0, full=6.0), "#0072B2")
     assert arrow.high == pytest.approx(0.25, abs=0.02)
     assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
     # each arrow is beyond the one before
     assert [part.layer for part in (arrow, bar, push)] == [0, 0, 1]
-    assert push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
+    assert 3.0 * push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
 
 
 @renders
@@ -112,14 +113,14 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
         """Return the mean column of what differs from the pendulum upright, from the middle."""
         return np.nonzero(np.abs(picture.astype(int) - upright).max(axis=2) > 60)[1].mean() - 320
 
-    with staged([trace], ["#0072B2"], (640, 360), camera.Room(200, 100, 440, 300)) as scene:
-        scene.pose(0, np.array([0.0]))
+    with staged(trace, (640, 360)) as scene:
+        scene.pose(np.array([0.0]))
         upright = scene.render().astype(int)
         left, right = (
-            column(scene.render([(0, 0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))]))
+            column(scene.render([(0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))]))
             for end in (-1.0, 1.0)
         )
-        scene.pose(0, np.array([0.4]))
+        scene.pose(np.array([0.4]))
         leaning = column(scene.render())
     assert leaning * right > 0.0 > leaning * left
 
@@ -131,11 +132,10 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
     monkeypatch.setattr(
         Stage,
         "aim",
-        lambda stage, k, r, time=0.0: goals.append((k, r is None or r[0] - traces[k].r[0, 0])),
+        lambda stage, r, time=0.0: goals.append(r is None or r[0] - stage.track.trace.r[0, 0]),
     )
-    traces = good, bad
     before, after, later = pictures([good, failed(bad, 150)], [0.1, 0.2, 0.3])
-    assert goals == [(0, 0.0), (1, 0.0), *[(0, 0.0), (1, True)] * 2]
+    assert goals == [0.0, 0.0, *[0.0, True] * 2]
     orange = style.law_colour(LAWS[1])
     assert share(before, orange) > 3e-4
     assert share(after, orange) < 0.2 * share(before, orange)  # brass is left
@@ -168,7 +168,6 @@ def test_a_film_that_is_stopped_leaves_nothing(tmp_path, monkeypatch):
 
 # realistic mechanisms
 
-ROOM = camera.Room(10, 10, 470, 160)
 VARIANTS = [
     (plant, field, name)
     for plant in smc.plants()
@@ -211,48 +210,14 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
         duration=0.1,
         **{field: name},
     )
-    model = scene.compose([scenario] * 2, np.array([[0.0, 0, 0], [0, 9, 0]]), SIZE)
+    model = scene.compose(scenario, 0.0, SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = []
     for geom in models.spec(scenario).geoms:
         if geom.name not in ("", "floor"):
             wanted.append(geom.name)
-    assert [
-        f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown
-    ] == []
-    assert model.nskin == 2 * len(models.spec(scenario).skins)
-
-
-def stood(scenarios) -> np.ndarray:
-    """Where machines stand."""
-    turn = scene.turn(scenarios[0])
-    found = []
-    for scenario in scenarios:
-        found.append(puppet.Puppet(scenario, turn[:, 2]))
-    (track,) = tracks([smc.run(scenarios[0])], ["#0072B2"])
-    reaches = [found[0].reach(track)] * len(found)
-    return stage.placed(found, reaches, turn, SIZE, ROOM, 0.0)[0]
-
-
-@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::6], ids=str)
-def test_machines_side_by_side_keep_apart(plant, field, name):
-    start = None if smc.plant(plant).ranges else 0.5
-    scenario = smc.Scenario(
-        plant=plant,
-        law="none",
-        x0=start,
-        duration=0.1,
-        **{field: name},
-    )
-    corners = scene.fixed_boxes(models.compile_model(scenario))[..., :2]
-    low = corners.min(axis=1)
-    high = corners.max(axis=1)
-    step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]
-    for by in (step, 2 * step):
-        apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(
-            axis=2
-        )
-        assert apart.min() >= 0.0
+    assert [geom for geom in wanted if f"m/{geom}" not in shown] == []
+    assert model.nskin == len(models.spec(scenario).skins)
 
 
 def test_only_dry_friction_sticks():
@@ -315,10 +280,10 @@ def test_a_failed_machine_has_no_state(stuck):
 @renders
 def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
-    with staged([slack], ["#0072B2"], (480, 170), ROOM) as shown:
-        rotor, joint = (shown.data.joint(f"m0/{name}") for name in ("rotor:hinge", "hinge"))
+    with staged(slack, (480, 170)) as shown:
+        rotor, joint = (shown.data.joint(f"m/{name}") for name in ("rotor:hinge", "hinge"))
         for flank in (-1.0, 0.0, 1.0):
-            shown.pose(0, np.array([0.3]), np.array([flank * 0.1]))
+            shown.pose(np.array([0.3]), np.array([flank * 0.1]))
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
     edges = np.append(-1e-3, slack.t)
@@ -333,17 +298,17 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1
     resting = realistic(contact="floor", duration=0.2)
-    with staged([resting], ["#0072B2"], (480, 170), ROOM) as shown:
-        shown.pose(0, np.array([0.4]))
-        assert shown.data.joint("m0/lift").qpos[0] == 0.0
+    with staged(resting, (480, 170)) as shown:
+        shown.pose(np.array([0.4]))
+        assert shown.data.joint("m/lift").qpos[0] == 0.0
 
 
 def test_friction_draws_an_arrow_of_its_own_and_the_key_says_so(stuck):
     scale = scales([stuck])[driven([stuck])]
     *_, violet = arrows(loads(stuck, np.array([0.1, 0.11])), 0, 0, scale, "#0072B2")
     assert violet.rgba[:3] == pytest.approx(np.array(style.rgb(style.REACTION)) / 255)
-    assert abs(violet.high) == pytest.approx(1.0, abs=0.05)  # it slides
-    assert "violet arrow: reaction, longest 0.5 N" in key([stuck], scales([stuck]))
+    assert abs(violet.high) == pytest.approx(0.5 / scale.longest, rel=0.05)  # it slides
+    assert "violet: reaction up to 0.5 N" in key([stuck], scales([stuck]))
 
 
 @pytest.mark.parametrize(("joint", "channel"), [("slide", 0), ("hinge", 1)])
@@ -358,14 +323,16 @@ def test_the_arrow_of_friction_is_at_the_joint_that_rubs(joint, channel):
     with_arrow = [i for i in range(2) if arrows(acting, 0, i, sizes[i], "#0072B2")]
     assert with_arrow == [channel]
     unit = "N" if joint == "slide" else "N·m"
-    assert f"violet arrow: reaction, longest 0.02 {unit}" in key([trace], scales([trace]))
+    assert f"violet: reaction up to 0.02 {unit}" in key([trace], scales([trace]))
 
 
 def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
     found = scales([hit])
     scale = found[driven([hit])]
-    assert scale.reaction == scale.control < np.abs(hit.reaction).max()
-    assert f"violet arrow: reaction, longest {scale.control:.2g} N" in key([hit], found)
+    assert scale.longest == scale.control < np.abs(hit.reaction).max()
+    assert f"violet: reaction up to {style.short(np.abs(hit.reaction).max())} N" in key(
+        [hit], found
+    )
 
 
 @pytest.mark.parametrize(
@@ -386,12 +353,11 @@ def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples,
     force[:, 1] = np.where(np.arange(1001) < samples, -peak, 2.0)
     found = scales([dataclasses.replace(trace, applied=force, d=force)])
     scale = found[driven([trace])]
-    assert scale.control == longest
-    assert scale.disturbance == longest
+    assert scale.longest == scale.full == longest
     said = key([trace], found)
     assert {
-        f"arrow: mean control, longest {words}",
-        f"dark arrow: disturbance, longest {words}",
+        f"arrow: control, longest {words}",
+        f"dark arrow: disturbance up to {peak:g} N·m",
     } <= {*said}
 
 
@@ -406,7 +372,7 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert pale.rgba[3] == 0.45
     assert solid.layer == 0
     assert pale.layer == 1
-    assert "pale arrow: command" in key([slow], found)
+    assert "pale: command" in key([slow], found)
     strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
     for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):

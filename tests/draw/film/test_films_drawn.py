@@ -19,7 +19,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite
-from smc_mujoco.draw.film import arm, arrows, camera, charts, film
+from smc_mujoco.draw.film import arm, arrows, charts, film
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
 from smc_mujoco.metrics import tip
@@ -55,10 +55,8 @@ def apart(boxes: np.ndarray) -> bool:
     return min(gaps) >= -1e-9
 
 
-@pytest.mark.parametrize("row", [True, False])
-def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_their_machines(
-    row, pen
-):
+@pytest.mark.parametrize("wide", [320, 180])
+def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
     jump = smc.Jump(0.2, {"mass": 2.0})
     parts = {
         "jump": jump,
@@ -73,19 +71,16 @@ def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_thei
     ]
     reported = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
     caption = Caption(
-        traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), reported, row
+        traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), reported
     )
-    machines = np.array([[90.0, 80, 190, 180], [140, 120, 340, 230]])
-    caption.place(machines)
+    tiles = np.array([[0, 60, wide, 300], [wide + 2, 60, 2 * wide + 2, 300]])
+    caption.place(tiles)
     boxes = np.concatenate([caption.pills, caption.badges])
     assert apart(boxes)
-    assert (boxes >= 0.0).all()
-    assert (boxes[:, 2:] <= SIZE).all()
-    assert (
-        (caption.pills[:, 1].min() > machines[:, 3].max())
-        if row
-        else (caption.pills[:, 0].min() < machines[0, 0])
-    )
+    both = np.concatenate([tiles, tiles])
+    assert (boxes[:, 0] >= both[:, 0]).all()
+    assert (boxes[:, 2:] <= both[:, 2:]).all()
+    assert (boxes[:, 1] >= 300.0 - caption.strip(wide)).all()
     said = []
     for time, gone, speed in (
         (0.1, False, 1.0),
@@ -119,7 +114,7 @@ def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_a
     caption = Caption(
         [trace], ["one"], COLOURS[:1], "A title", SIZE, 1.0, arrows.scales([trace]), [[None]]
     )
-    caption.place(np.array([[200.0, 60, 420, 220]]))
+    caption.place(np.array([[0, 60, 640, 300]]))
     caption.over(paper(), 0.25, (False,), (None,))
     lines = []
     for note in pen:
@@ -173,27 +168,26 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)
     )
     edges = np.array([0.08, 0.1, 0.11, 0.24])
-    low = np.array([[100.0, 220.0, 260.0, 290.0]])
+    low = np.array([100.0, 220.0, 260.0, 290.0])
 
     def project(points):
         return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
-    place = np.array([[0.1, 0.0, 0.2]])
     stage = SimpleNamespace(
-        where=place,
+        track=SimpleNamespace(trace=trace, colour=COLOURS[0]),
+        puppet=SimpleNamespace(height=0.2),
         project=project,
-        size=SIZE,
         scale=0.8,
     )
-    stage.find = lambda k, name: np.array([0.4, 0.0, 0.9])
-    over = arm.Overlay([trace], COLOURS[:1], stage, edges, low)
+    stage.find = lambda name: np.array([0.4, 0.0, 0.9])
+    (over,) = arm.overlays([stage], edges, [low])
     within = []
     for a, b in itertools.pairwise(edges):
         within.append((trace.t >= a) & (trace.t < b))
     forces = [np.linalg.norm(20.0 * trace.x[frame].mean(axis=0)) for frame in within]
     for frame, force in enumerate(forces):
         pen.clear()
-        over.over(paper(), frame)
+        over.beside(over.over(paper(), frame), frame)
         said = "\n".join(pen)
         assert "'50 N'" in said  # hypot(30, 40), seen for a while after it
         (touch,) = [
@@ -268,40 +262,20 @@ KINDS = {
 
 @pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 @pytest.mark.parametrize("kind", KINDS)
-def test_two_machines_stand_apart_in_their_room_with_their_arrows(kind):
-    traces = []
-    for _ in range(2):
-        traces.append(machine(law="none", **KINDS[kind]))
-    room = camera.Room(30, 60, 610, 270)
+def test_a_machine_stays_in_its_tile_with_its_arrows(kind):
+    trace = machine(law="none", **KINDS[kind])
     red = (1.0, 0.0, 0.0, 1.0)
-    with staged(traces, COLOURS, SIZE, room) as stage:
-        first, second = stage.shown
-        stage.pose(0, np.linspace(0.2, 0.3, first))
-        stage.pose(1, np.linspace(-0.3, 0.4, second), np.full(second, 0.1), 0.2)
-        stage.aim(1, np.full(second, 0.1))
+    with staged(trace, SIZE, strip=40.0) as stage:
+        n = stage.puppet.shown
+        stage.pose(np.linspace(-0.3, 0.4, n), np.full(n, 0.1), 0.2)
+        stage.aim(np.full(n, 0.1))
         before = stage.render()
-        assert (np.diff(stage.where, axis=0) != 0.0).any()
-        assert (stage.boxes[:, :2] >= np.array(room[:2]) - 1).all()
-        assert (stage.boxes[:, 2:] <= np.array(room[2:]) + 1).all()
-        assert set(np.concatenate(stage.links)).isdisjoint(
-            np.flatnonzero(stage.model.geom_group > 2)
-        )
+        assert set(stage.links).isdisjoint(np.flatnonzero(stage.model.geom_group > 2))
         drawn = [
-            (0, 0, arrows.Arrow(0.0, 0.8, red)),
-            (
-                1,
-                0,
-                arrows.Arrow(
-                    -0.7,
-                    0.3,
-                    red,
-                    1,
-                    0.65,
-                    head=False,
-                ),
-            ),
+            (0, arrows.Arrow(0.0, 0.8, red)),
+            (0, arrows.Arrow(-0.7, 0.3, red, 1, 0.65, head=False)),
         ]
-        stage.pose(0, np.linspace(0.25, 0.3, first))
+        stage.pose(np.linspace(0.25, 0.3, n))
         red_parts = []
         for picture in map(np.asarray, (before, stage.render(drawn))):
             red_parts.append(

@@ -12,12 +12,13 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import arrows, caption, film, stage
+from smc_mujoco.draw.film import arrows, film, scene, track
 from smc_mujoco.draw.film.pace import Clock
+from smc_mujoco.simulation import model as models
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SIZE = (1280, 720)
-STAGE = 460  # px, its height in a film 1280 px wide
+REACHED = []  # points of the machines of the film
 CRATE = """<mujoco model="crate"><worldbody><geom type="plane" size="2 2 .1"/>
   <body pos="0 0 .5"><joint name="arm" axis="0 1 0"/><geom type="capsule" size=".03"
     fromto="0 0 0 0 0 .4"/></body>
@@ -31,6 +32,20 @@ TWO_LINKS = """<mujoco model="two"><worldbody><body pos="0 0 1"><joint name="a" 
     ctrlrange="-5 5"/></actuator></mujoco>"""
 
 
+def dog(free):
+    """A body with four legs of two links, one of which is driven."""
+    legs = ""
+    for k, (x, y) in enumerate(itertools.product((-0.2, 0.2), (-0.1, 0.1))):
+        legs += f"""<body pos="{x} {y} 0"><joint name="hip{k}" axis="0 1 0" stiffness="200"/>
+          <geom type="capsule" size=".02" fromto="0 0 0 .05 0 -.2" mass=".5"/><body pos=".05 0 -.2">
+          <joint name="{"knee" if k == 3 else f"knee{k}"}" axis="0 1 0" stiffness="200"/><geom
+          type="capsule" size=".015" fromto="0 0 0 -.05 0 -.2" mass=".2"/></body></body>"""
+    return f"""<mujoco model="dog"><worldbody><geom type="plane" size="0 0 .1"/>
+      <body pos="0 0 .45">{"<freejoint/>" if free else ""}
+      <geom type="box" size=".22 .08 .05" mass="6"/>{legs}</body></worldbody>
+      <actuator><motor joint="knee" ctrlrange="-20 20"/></actuator></mujoco>"""
+
+
 def two(plant, **fields):
     """Two runs of made-up motion, with u as large as its limit."""
     laws = ("super_twisting", "pid")
@@ -39,21 +54,29 @@ def two(plant, **fields):
 
 @contextlib.contextmanager
 def filmed(traces, monkeypatch, times=(0.1, 0.2)):
-    """Give the stage of a film of the traces, whose first two pictures were drawn, and its
+    """Give the stages of a film of the traces, whose first two pictures were drawn, and its
     caption.
     """
-    seen = {}
-    made_by = stage.Stage
+    seen = []
+    made_by = film.staged
+    fitted = film.camera.tiles
+
+    def kept(tracks, chosen, words, times):
+        for stage in made_by(tracks, chosen, words, times):
+            seen.append(stage)
+            yield stage
+        seen.append(words)
+
     with without_charts, monkeypatch.context() as patch:
-        patch.setattr(film, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
+        patch.setattr(film, "staged", kept)
         patch.setattr(
-            film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given))
+            film.camera, "tiles", lambda *given: REACHED.append(given[4]) or fitted(*given)
         )
         frames = film.Frames(traces, size=SIZE, at=0.0)
         frames.clock = Clock(np.array(times), np.ones(len(times)))
         made_of = iter(frames)
         assert [*itertools.islice(made_of, 2)]
-        yield seen["stage"], seen["caption"]
+        yield seen[:-1], seen[-1]
         made_of.close()
 
 
@@ -61,46 +84,77 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     "plant",
     ["inverted_pendulum", "cart_pole", "furuta", "pendulum_network", "overhead_crane", "panda"],
 )
-def test_machines_fill_the_height_or_the_width(plant, monkeypatch):
+def test_a_machine_fills_the_height_or_the_width_of_its_tile(plant, monkeypatch):
     law = {"furuta": "rotary_swing_up", "panda": "none"}.get(
         plant, "hierarchical" if smc.plant(plant).free else "classical"
     )
     traces = [made(smc.Scenario(plant=plant, law=law, duration=1.0))] * 3
-    with filmed(traces, monkeypatch) as (shown, _):
-        low = shown.boxes[:, :2].min(axis=0)
-        high = shown.boxes[:, 2:].max(axis=0)
-        wide, tall = high - low
-        assert tall >= 0.7 * STAGE or wide >= 0.85 * SIZE[0]
+    with filmed(traces, monkeypatch) as (stages, words):
+        shown = stages[0]
+        places = shown.project(REACHED[-1])
+        wide, tall = np.ptp(places, axis=0)
+        size = np.array(shown.size) - (0.0, words.strip(shown.size[0]))
+        assert max(wide / size[0], tall / size[1]) > 0.9
+        assert places.min() >= -1.0
+        assert (places.max(axis=0) <= size + 1.0).all()
+
+
+@pytest.mark.parametrize("base", ["free", "fixed"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_stranger_that_goes_far_is_followed_and_fills_half_of_its_tile(base, count, monkeypatch):
+    """A quadruped whose knee is driven: on a free base it slides away by ten of its lengths."""
+    plant = smc.plant_from(dog(base == "free"), ["knee"])
+    traces = [smc.run(smc.Scenario(plant=plant, law="pid", duration=2.0, x0=0.3))] * count
+    if base == "free":
+        poses = []
+        monkeypatch.setattr(track, "motion", lambda trace, times: poses[0])
+        start = models.initial_state(models.compile_model(traces[0].scenario), traces[0].scenario)[
+            0
+        ]
+        times = np.linspace(0.0, 2.0, 60)
+        moved = np.tile(start, (60, 1))
+        moved[:, 0] += 5.0 * times
+        poses.append(track.Motion(times, moved))
+    with filmed(traces, monkeypatch) as (stages, _):
+        for shown in stages:
+            boxes = scene.boxes(shown.model, shown.data)
+            plane = shown.model.geom_type == scene.PLANE
+            moving = boxes[~scene.still(shown.model) & ~plane].reshape(-1, 3)
+            box = np.ptp(shown.project(moving), axis=0) / shown.size
+            assert box.max() > 0.5
+            assert (shown.project(moving) > -1.0).all()
 
 
 def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypatch):
     """The cart stays within 1 m of 0 on a rail of 4.2 m."""
-    with filmed(two("cart_pole"), monkeypatch) as (shown, _):
+    with filmed(two("cart_pole"), monkeypatch) as (stages, _):
+        shown = stages[0]
         whole = smc.plant("cart_pole").load()
         cut = shown.model
         rail, post, mark = (
-            cut.geom(f"m0/{name}").id for name in ("front_rail", "left_post", "half5")
+            cut.geom(f"m/{name}").id for name in ("front_rail", "left_post", "half5")
         )
         assert cut.geom_size[rail, 1] < 0.7 * whole.geom("front_rail").size[1]
         end = shown.data.geom_xpos[rail, 0] - cut.geom_size[rail, 1]
         assert shown.data.geom_xpos[post, 0] == pytest.approx(end)
-        assert shown.data.geom_xpos[mark, 0] - shown.where[0][0] == pytest.approx(0.5)  # m
-        board = cut.geom("m0/board").id
+        assert shown.data.geom_xpos[mark, 0] == pytest.approx(0.5)  # m
+        board = cut.geom("m/board").id
         assert shown.data.geom_xpos[board, 0] == pytest.approx(shown.data.geom_xpos[rail, 0])
-        rod = cut.geom("m0/rod").id
+        rod = cut.geom("m/rod").id
         ends = shown.data.geom_xpos[rod] + np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
         # px of a pole of 1 m: 81 with the whole rail
         assert np.ptp(shown.project(ends)[:, 1]) > 120.0
 
 
 def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeypatch):
-    with filmed(two("inverted_pendulum"), monkeypatch) as (shown, words):
-        foot = shown.model.geom("m0/foot")
+    with filmed(two("inverted_pendulum"), monkeypatch) as (stages, words):
+        shown = stages[0]
+        foot = shown.model.geom("m/foot")
         below = shown.project(shown.data.geom_xpos[[foot.id]] - [0.0, 0.0, foot.size[1]])[0]
-        assert below[1] < words.pills[0, 1]
+        assert words.tiles[0, 1] + below[1] < words.pills[0, 1]
         assert shown.data.geom_xpos[foot.id, 2] == pytest.approx(0.014, abs=1e-3)  # on the floor
-        assert shown.model.geom("m0/face").rgba[3] == pytest.approx(0.4)
-        assert shown.model.geom("m0/bob").size[0] == pytest.approx(1.3 * 0.065)
+        assert shown.model.geom("m/face").rgba[3] == pytest.approx(0.4)
+        assert shown.model.geom("m/bob").size[0] == pytest.approx(1.3 * 0.065)
 
 
 def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
@@ -108,13 +162,13 @@ def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
     traces = []
     for law in ("super_twisting", "pid"):
         traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3)))
-    with filmed(traces, monkeypatch) as (shown, _):
-        crates = np.array([shown.data.body(f"m{k}/crate").xpos for k in range(2)])
-        assert crates - shown.where == pytest.approx(np.array([[0.5, 0.0, 0.1]] * 2), abs=0.01)
-        assert abs(crates[1, 0] - crates[0, 0]) > 0.5
+    with filmed(traces, monkeypatch) as (stages, _):
+        for shown in stages:
+            place = shown.data.body("m/crate").xpos - (0.0, 0.0, shown.puppet.height)
+            assert place == pytest.approx([0.5, 0.0, 0.1], abs=0.01)
 
 
-def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
+def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
     traces = []
     for law in ("super_twisting", "pid"):
@@ -128,8 +182,8 @@ def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
                 )
             )
         )
-    with filmed(traces, monkeypatch) as (shown, words):
-        for mount in [mount for its in shown.mounts for mount in its]:
+    with filmed(traces, monkeypatch) as (stages, _):
+        for shown, mount in itertools.product(stages, stages[0].mounts):
             for part in (-1.0, 1.0):
                 line, _ = arrows.path(
                     shown.model, shown.data, mount, arrows.Arrow(0.0, part, (0.0,) * 4)
@@ -137,7 +191,5 @@ def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
                 assert line is not None
                 anchor = shown.project(shown.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(shown.project(line) - anchor, axis=1)
-                assert radius.max() <= 0.08 * STAGE + 1.0
-                assert shown.project(line)[:, 1].min() > caption.KEY_TOP + caption.KEY_PITCH * len(
-                    words.key
-                )
+                assert radius.max() <= 0.08 * shown.size[1] + 1.0
+                assert shown.project(line).min() > 0.0
