@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.mechanisms.plant import Field, Plant
 
-SEED, GRAVITY, HELD = 1795644229, 9.81, 3.0  # of the lot; m/s^2; N m
+SEED, GRAVITY, HELD = 33840112, 9.81, 3.0  # of the lot; m/s^2; N m
 MODEL = """
 <mujoco>
   <option timestep="0.001" integrator="RK4"/>
