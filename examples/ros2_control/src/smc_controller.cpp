@@ -1,0 +1,81 @@
+// A ros2_control controller of one joint around the law in controller.c, which includes the exported super_twisting.c.
+// The hardware must offer JOINT/position, JOINT/velocity and JOINT/effort, and update_rate must be the law's 1000 Hz.
+#include <atomic>
+#include <string>
+
+#include "controller_interface/controller_interface.hpp"
+#include "pluginlib/class_list_macros.hpp"
+#include "std_msgs/msg/float64.hpp"
+
+extern "C" {
+void controller_start(void);
+void controller(double t, double x, double v, double r, double dr, double *u, double *s);
+}
+
+namespace smc_controller
+{
+using controller_interface::CallbackReturn;
+using controller_interface::InterfaceConfiguration;
+using controller_interface::interface_configuration_type;
+using controller_interface::return_type;
+
+class SmcController : public controller_interface::ControllerInterface
+{
+public:
+  CallbackReturn on_init() override
+  {
+    auto_declare<std::string>("joint", "joint1");
+    return CallbackReturn::SUCCESS;
+  }
+
+  CallbackReturn on_configure(const rclcpp_lifecycle::State &) override
+  {
+    joint_ = get_node()->get_parameter("joint").as_string();
+    if (get_update_rate() != 1000) {
+      return CallbackReturn::ERROR;
+    }
+    subscription_ = get_node()->create_subscription<std_msgs::msg::Float64>(
+      "~/reference", 1, [this](const std_msgs::msg::Float64 & message) { reference_ = message.data; });
+    return CallbackReturn::SUCCESS;
+  }
+
+  InterfaceConfiguration command_interface_configuration() const override
+  {
+    return {interface_configuration_type::INDIVIDUAL, {joint_ + "/effort"}};
+  }
+
+  InterfaceConfiguration state_interface_configuration() const override
+  {
+    return {interface_configuration_type::INDIVIDUAL, {joint_ + "/position", joint_ + "/velocity"}};
+  }
+
+  CallbackReturn on_activate(const rclcpp_lifecycle::State &) override
+  {
+    controller_start();
+    reference_ = state_interfaces_[0].get_value();  // hold the pose until a reference comes
+    return CallbackReturn::SUCCESS;
+  }
+
+  CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override
+  {
+    command_interfaces_[0].set_value(0.0);
+    return CallbackReturn::SUCCESS;
+  }
+
+  return_type update(const rclcpp::Time & time, const rclcpp::Duration &) override
+  {
+    double u, s;
+    controller(
+      time.seconds(), state_interfaces_[0].get_value(), state_interfaces_[1].get_value(), reference_, 0.0, &u, &s);
+    command_interfaces_[0].set_value(u);
+    return return_type::OK;
+  }
+
+private:
+  std::string joint_;
+  std::atomic<double> reference_{0.0};
+  rclcpp::Subscription<std_msgs::msg::Float64>::SharedPtr subscription_;
+};
+}  // namespace smc_controller
+
+PLUGINLIB_EXPORT_CLASS(smc_controller::SmcController, controller_interface::ControllerInterface)

@@ -1,0 +1,31 @@
+// Prints the interfaces of the controller, then its command for each line "t x v" read; 1 if it takes another rate.
+#include <cstdio>
+
+#include "controller_interface/controller_interface.hpp"
+
+std::unique_ptr<controller_interface::ControllerInterface> made();
+
+int main()
+{
+  auto controller = made();
+  using controller_interface::CallbackReturn;
+  controller->on_init();
+  controller->rate = 500;
+  if (controller->on_configure({}) != CallbackReturn::ERROR) return 1;
+  controller->rate = 1000;
+  if (controller->on_configure({}) != CallbackReturn::SUCCESS) return 2;
+  for (auto & name : controller->command_interface_configuration().names) std::printf("%s ", name.c_str());
+  for (auto & name : controller->state_interface_configuration().names) std::printf("%s ", name.c_str());
+  std::printf("\n");
+  controller->on_activate({});
+  controller->node->last->callback({0.0});
+  double t, x, v;
+  while (std::scanf("%lf %lf %lf", &t, &x, &v) == 3) {
+    controller->state_interfaces_[0].value = x;
+    controller->state_interfaces_[1].value = v;
+    controller->update({t}, {});
+    std::printf("%.17g\n", controller->command_interfaces_[0].value);
+  }
+  controller->on_deactivate({});
+  return controller->command_interfaces_[0].value != 0.0;
+}

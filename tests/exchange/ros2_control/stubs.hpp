@@ -1,0 +1,55 @@
+// What examples/ros2_control uses of ROS 2, so that it compiles where there is no ROS.
+#pragma once
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace rclcpp_lifecycle { struct State {}; }
+namespace std_msgs { namespace msg { struct Float64 { double data; }; } }
+namespace rclcpp
+{
+struct Time { double at; double seconds() const { return at; } };
+struct Duration {};
+template <class M> struct Subscription
+{
+  using SharedPtr = std::shared_ptr<Subscription<M>>;
+  std::function<void(const M &)> callback;
+};
+}
+struct Parameter { std::string value; std::string as_string() const { return value; } };
+struct Node
+{
+  rclcpp::Subscription<std_msgs::msg::Float64>::SharedPtr last;
+  Parameter get_parameter(const std::string &) const { return {"elbow"}; }
+  template <class M, class F> typename rclcpp::Subscription<M>::SharedPtr create_subscription(const std::string &, int, F f)
+  {
+    return last = std::make_shared<rclcpp::Subscription<M>>(rclcpp::Subscription<M>{f});
+  }
+};
+struct Interface { double value; double get_value() const { return value; } void set_value(double x) { value = x; } };
+namespace controller_interface
+{
+enum class CallbackReturn { SUCCESS, ERROR };
+enum class interface_configuration_type { INDIVIDUAL };
+enum class return_type { OK };
+struct InterfaceConfiguration { interface_configuration_type type; std::vector<std::string> names; };
+struct ControllerInterface
+{
+  virtual ~ControllerInterface() = default;
+  virtual CallbackReturn on_init() = 0;
+  virtual CallbackReturn on_configure(const rclcpp_lifecycle::State &) = 0;
+  virtual CallbackReturn on_activate(const rclcpp_lifecycle::State &) = 0;
+  virtual CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) = 0;
+  virtual InterfaceConfiguration command_interface_configuration() const = 0;
+  virtual InterfaceConfiguration state_interface_configuration() const = 0;
+  virtual return_type update(const rclcpp::Time &, const rclcpp::Duration &) = 0;
+  template <class T> void auto_declare(const std::string &, const T &) {}
+  std::shared_ptr<Node> get_node() const { return node; }
+  unsigned get_update_rate() const { return rate; }
+  std::shared_ptr<Node> node = std::make_shared<Node>();
+  unsigned rate = 1000;
+  std::vector<Interface> state_interfaces_{2}, command_interfaces_{1};
+};
+}
+#define PLUGINLIB_EXPORT_CLASS(type, base) std::unique_ptr<base> made() { return std::make_unique<type>(); }
