@@ -40,7 +40,7 @@ from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import stream
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.signals import Constant, Fault, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
@@ -122,6 +122,7 @@ class Kind:
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
     signed: bool = False  # whether a level is tolerated only if its negative is, too
+    forces: bool = False  # whether levels are of the study's bound, so of a user's model its own
     # of which a level is a multiple; 0: any level
     quantum: Callable[[Scenario], float] = lambda base: 0.0
     # largest level by linear theory, if there is any
@@ -149,9 +150,12 @@ class Kind:
             return Search(
                 levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none
             )
-        first = self.levels[0]
+        size = 1.0
+        if self.forces and base.plant.is_user_model:
+            size = default_u_max(base.plant) / MAX_FORCE
+        levels = [size * level for level in self.levels]
         return Search(
-            levels=self.levels, resolution=lambda low: resolution * max(low, first), low=self.none
+            levels=levels, resolution=lambda low: resolution * max(low, levels[0]), low=self.none
         )
 
     def expected(self, base: Scenario) -> float | None:
@@ -249,10 +253,16 @@ MARGIN_KINDS: dict[str, Kind] = {
         levels=FORCES,
         put=_with_force,
         signed=True,
+        forces=True,
         theory=_tolerated_force,
     ),
     "friction": Kind(
-        label="dry friction", unit="{u}", levels=FORCES, put=with_friction, theory=_tolerated_force
+        label="dry friction",
+        unit="{u}",
+        levels=FORCES,
+        put=with_friction,
+        forces=True,
+        theory=_tolerated_force,
     ),
     "mass": Kind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
     "noise": Kind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),

@@ -15,14 +15,14 @@ The levels of the suite are those of a machine of the study's size. Dry friction
 sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N in the study. The
 viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn
 gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
-inexpensive encoder. On a free body, whose size may be any, a disturbance is the same share of the
-largest force as it is of u_max in the study. The pulse of "contact" is as strong as u_max, so that
-it moves whatever can move. Under "jitter" samples are late by up to half of the suite's control
-period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration,
-so gains for a force do not suit it: tune under it. Its rates are those of the firmware of rig
-stepper_furuta; it is 30 times as strong as other drives, near that machine's ratio of torque to
-inertia, as one of their strength loses steps here. Under "fault" every actuator loses half of its
-force at 2 s.
+inexpensive encoder. On a free body and on a user's model, whose size may be any, a disturbance is
+the same share of the largest force as it is of u_max in the study. The pulse of "contact" is as
+strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half
+of the suite's control period. Under "missed" one sample in ten does not run. Under "stepper" u is
+the wanted acceleration, so gains for a force do not suit it: tune under it. Its rates are those of
+the firmware of rig stepper_furuta; it is 30 times as strong as other drives, near that machine's
+ratio of torque to inertia, as one of their strength loses steps here. Under "fault" every actuator
+loses half of its force at 2 s.
 """
 
 import ast
@@ -436,10 +436,10 @@ def _fault(plant: Plant, duration: float) -> Fields:
 
 
 def _sized(signal: Signal, plant: Plant) -> Signal:
-    """Return a disturbance of the study's plants; for a free body that share of its largest
-    force.
+    """Return a disturbance of the study's plants; for a free body and a user's model that share of
+    the largest force.
     """
-    if not plant.pose:
+    if not (plant.pose or plant.is_user_model):
         return signal
     name = "sigma" if isinstance(signal, OrnsteinUhlenbeck) else "amplitude"
     size = getattr(signal, name) * default_u_max(plant) / U_MAX

@@ -268,3 +268,21 @@ def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
             search.levels, np.round(np.divide(search.levels, least)) * least, rtol=1e-12, atol=0.0
         )
         assert search.resolution(0.0) % least == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("size", [1e-3, 50.0])
+def test_levels_of_force_are_shares_of_the_bound_of_ones_own_machine(size):
+    def mass(size):
+        text = f"""<mujoco model="mass"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
+<geom size=".1" mass="{size}" contype="0" conaffinity="0"/></body></worldbody><actuator>
+<motor joint="slide" ctrlrange="{-6 * size} {6 * size}"/></actuator></mujoco>"""
+        law = smc.law("pid", kp=200.0 * size, ki=0.0, kd=25.0 * size)
+        return smc.plant_from(text, ["slide"]), law
+
+    kinds = ["disturbance", "friction"]
+    ours = smc.margins(*mass(1.0), kinds, quick=True)
+    theirs = smc.margins(*mass(size), kinds, quick=True)
+    assert [m.value / size for m in theirs] == pytest.approx([m.value for m in ours], rel=1e-6)
+    assert all(0.0 < m.value < 6.0 for m in ours)
+    (run,) = smc.grid(*mass(size), "sine")
+    assert run.disturbance[0].amplitude == pytest.approx(0.2 * size)
