@@ -47,6 +47,7 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
     "not found Element 'plugin'": "load its library before (mujoco.mj_loadPluginLibrary)",
     "positive eigenvalues": "give that body three moments of inertia above 0",
 }
+OF_A_PART = "not found", "invalid qpos size", "mujocoinclude"  # words on a file that is no model
 
 _passed: set[str] = set()  # hashes of models that passed
 _known: dict[str, Path] = {}  # hash of a file that this process has read -> where it was
@@ -322,6 +323,8 @@ def broken(where: str, error: str) -> ScenarioError:
         if not cure and any(part.get("file") == Path(where).name for part in _elements(file)):
             cure = f"give {file.name}, which includes it, or fix the file"
     cure = cure or "fix the file"
+    if cure == "fix the file" and any(words in error for words in OF_A_PART):
+        cure += ", or give the one that includes it"
     return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): {cure}")
 
 

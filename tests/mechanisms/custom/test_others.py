@@ -263,17 +263,6 @@ def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
         dataclasses.replace(runs[0], disturbance=sine)
 
 
-@pytest.mark.parametrize("what", ["start", "goal"])
-def test_a_pose_inside_something_is_refused_with_the_names(what):
-    wall = '<worldbody><geom name="wall" type="box" size=".1 .1 .1" pos=".25 0 .1"/>'
-    text = f"""<mujoco>{wall}<body><joint name="j" axis="0 1 0"/>
-      <geom name="link" type="capsule" fromto="0 0 .1 .3 0 .1" size=".03"/></body></worldbody>
-      <actuator><motor joint="j"/></actuator></mujoco>"""
-    x0 = {"start": None, "goal": 2.0}[what]
-    with pytest.raises(smc.ScenarioError, match=f"the {what} of .*'wall'.*'link'|'link'.*'wall'"):
-        smc.plant_from(text, {"j": smc.Channel(x0=x0)})
-
-
 @pytest.mark.parametrize("mode", [pytest.param("held", marks=pytest.mark.slow), "locked"])
 @pytest.mark.parametrize("name", ["arm", pytest.param("hand", marks=pytest.mark.slow)])
 def test_a_joint_is_tuned_and_settles(name, mode):
@@ -343,3 +332,41 @@ def test_a_robot_that_falls_is_told_so_and_never_settles():
     assert np.isinf(smc.score(trace)["settling_time"])
     assert not arrived(trace)
     assert scales.falls(plant("walker", "locked")) == ""
+
+
+BLOCK = """<mujoco model="block"><worldbody><body name="post" pos="0 0 0">
+<geom type="box" size=".05 .05 .3"/></body><body name="rod" pos="-.4 0 0"><joint name="j" axis="0 0 1"/>
+<geom name="arm" type="capsule" fromto="0 0 0 .39 0 0" size=".02"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-9 9"/></actuator>{more}</mujoco>"""
+URDF = """<robot name="block"><link name="base"><collision><geometry><box size=".1 .1 .6"/></geometry>
+</collision></link><link name="arm"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1"
+ ixy="0" ixz="0" iyz="0"/></inertial>{shape}</link><joint name="j" type="continuous">
+<parent link="base"/><child link="arm"/><origin xyz="-.4 0 0"/><axis xyz="0 0 1"/></joint></robot>"""
+SHAPE = """<collision><origin xyz=".2 0 0"/><geometry><box size=".38 .04 .04"/></geometry>
+</collision>"""
+CLEAR = {
+    "another keyframe": '<keyframe><key name="home" qpos="1"/></keyframe>',
+    "<exclude> that pair": '<contact><exclude body1="post" body2="rod"/></contact>',
+}
+
+
+@pytest.mark.parametrize("cure", CLEAR)
+def test_a_goal_inside_something_is_refused_and_each_cure_works(cure):
+    with pytest.raises(smc.ScenarioError, match=f"goal of .*'arm'.* mm inside .*{cure}"):
+        smc.plant_from(BLOCK.format(more=""), ["j"])
+    key = "home" if "keyframe" in cure else None
+    text = BLOCK.format(more=CLEAR[cure])
+    assert smc.plant_from(text, ["j"], keyframe=key).n == 1
+    inside = {"j": smc.Channel(x0=0.0)}
+    if key:
+        with pytest.raises(smc.ScenarioError, match=r"start of .* mm inside .*give another x0"):
+            smc.plant_from(text, inside, keyframe=key)
+
+
+def test_a_link_of_a_urdf_that_starts_inside_another_may_lose_its_collision(tmp_path):
+    file = tmp_path / "block.urdf"
+    file.write_text(URDF.format(shape=SHAPE))
+    with pytest.raises(smc.ScenarioError, match=r"mm inside .*leave out the <collision> of one"):
+        smc.plant_from(file, {"j": smc.Channel(motor=True)})
+    file.write_text(URDF.format(shape=""))
+    assert smc.plant_from(file, {"j": smc.Channel(motor=True)}).n == 1
