@@ -12,6 +12,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import differ, ranking
 from smc_mujoco.analysis import region_of_attraction as region
+from smc_mujoco.analysis.engine import outcome
 from smc_mujoco.analysis.tuning import objective, search, search_space
 from smc_mujoco.analysis.worst_case import search as attack
 from smc_mujoco.analysis.worst_case import uncertainty
@@ -79,15 +80,15 @@ SAID = {
     region: [
         f"|e| <= {percent(conventions.SETTLING_BAND)} of X and |v| <= "
         f"{percent(conventions.SETTLING_BAND)} of V",
-        f"({percent(math.sqrt(region.NEAR_SQUARE))})^2, a "
-        f"{part(math.sqrt(region.NEAR_SQUARE) / 0.02)} of the band",
+        f"({percent(math.sqrt(outcome.NEAR_SQUARE))})^2, a "
+        f"{part(math.sqrt(outcome.NEAR_SQUARE) / 0.02)} of the band",
         f"for {percent(region.HORIZONS[0])} of the duration",
         f"for {percent(region.HORIZONS[1])}, and those still undecided for the whole duration",
         f"throughout the last {part(1 / region.EARLY_PARTS)} of the run",
-        f"is a {part(1.0 - region.MAX_EARLY_RATIO)} smaller than in the first",
-        f"less than {short(region.REST_TOLERANCE)} of X",
+        f"is a {part(1.0 - outcome.MAX_EARLY_RATIO)} smaller than in the first",
+        f"less than {short(outcome.REST_TOLERANCE)} of X",
         f"throughout the last {percent(conventions.LAST_PART)} of the run",
-        f"at most {percent(round(region.MAX_FINAL_RATIO - 1.0, 9))} larger than in the first",
+        f"at most {percent(round(outcome.MAX_FINAL_RATIO - 1.0, 9))} larger than in the first",
     ],
     region.basin: [f"V is {region.VELOCITY_RATIO:g} X per second"],
     search: [

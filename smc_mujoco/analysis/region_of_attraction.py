@@ -25,30 +25,33 @@ run again, from the beginning, for 40 %, and those still undecided for the whole
   runs of 10 s, counts as one that stays.
 
 Early verdicts are no proofs, because a run that approaches in the band might leave later. Tests
-compare them with whole runs. `basin` integrates with implicitfast, four times as fast as RK4, with
-a difference of 1e-3 rad or m, less than a fiftieth of a cell.
+compare them with whole runs. What the fast engine cannot run, `basin` integrates with implicitfast,
+four times as fast as RK4, with a difference of 1e-3 rad or m, less than a fiftieth of a cell.
 """
 
 import dataclasses
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.engine import Device
+from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
-from smc_mujoco.common.progress import Report, summed
+from smc_mujoco.common.progress import Report
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import NONE
 from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.conventions import SETTLING_BAND, error, last_part
+from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
 from smc_mujoco.simulation.grid import case
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant
@@ -57,17 +60,13 @@ from smc_mujoco.simulation.trace import Trace, warn_of_broken
 HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 EARLY_PARTS = 3  # an early verdict considers the last of so many equal parts of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
-REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
-# of the squared distance (e/X)^2 + (v/V)^2, second half over first
-MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9
-NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
+BATCH_STATES = 2**17  # of the fast engine's runs at once
+CHECKED = 20  # of its states, which MuJoCo decides again; chosen
 # X, chosen
 POSITION_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last third has one
-CONVERGES = 1
-UNDECIDED = 0
-DOES_NOT = -1
+CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,6 +83,7 @@ class Basin:
     unit: str  # of x, "rad" or "m"
     duration: float  # s, of the longest runs
     source: str = NONE  # where the law's gains come from, a kind of `control.source`
+    checked: str = ""  # how many states MuJoCo decided, and how many of them otherwise
 
     @property
     def share(self) -> float:
@@ -99,6 +99,7 @@ class Basin:
         return write_json(with_ending(path, ".json"), data, indent=None)
 
 
+@constrained
 def basin(
     plant: str | Plant,
     law: str | Law | Template,
@@ -110,8 +111,12 @@ def basin(
     threads: int | None = None,
     report: Report = lambda done, needed: None,
     condition: str | Condition = "nominal",
+    device: Device = "cpu",
 ) -> Basin:
     """Map the region of attraction of a law on a plant.
+
+    The fast engine makes the runs where it can, and MuJoCo repeats 20 of them: `checked` says how
+    many it decides alike.
 
     Args:
       plant, law: names, or your own plant and law.
@@ -124,13 +129,18 @@ def basin(
       report: called with the work done and the work that may be needed, in simulated steps; the
         latter shrinks as states are decided.
       condition: condition of the runs, such as "coulomb".
+      device: of the fast engine, "cpu" or "cuda".
 
     Raises:
-      ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or
-        an empty grid.
+      ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, an
+        empty grid, or no such device.
     """
+    from smc_mujoco.analysis.engine.group import why_not
+
     plant = jointed(plant, "a region of attraction")
-    base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
+    base = case(plant, law, condition, duration, gains)
+    if why_not(base, (), device):
+        base = dataclasses.replace(base, integrator="implicitfast", physics_step=None)
     if start := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
         raise ScenarioError(
             f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave "
@@ -148,7 +158,7 @@ def basin(
     positions = np.linspace(-reach, reach, nx) if x is None else x
     fastest = VELOCITY_RATIO * reach
     velocities = np.linspace(-fastest, fastest, nv) if v is None else v
-    return basin_of(base, positions, velocities, threads, report)
+    return basin_of(base, positions, velocities, threads, report, device)
 
 
 def basin_of(
@@ -157,8 +167,11 @@ def basin_of(
     v: Sequence[float] | np.ndarray,
     threads: int | None = None,
     report: Report = lambda done, needed: None,
+    device: str = "cpu",
 ) -> Basin:
     """Map the region of attraction of any scenario as `basin` does."""
+    from smc_mujoco.analysis.engine.group import why_not
+
     if base.plant.mixed:
         raise ScenarioError(
             f"{base.plant.name} has channels in m and rad, which cannot start from the same state: "
@@ -176,93 +189,133 @@ def basin_of(
             f"{shortest * base.control_period:g} s"
         )
     x, v = _axis("x", x), _axis("v", v)
-    outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
-    decided_at = np.full(outcome.shape, base.duration)
-    undecided = list(np.ndindex(*outcome.shape))
-    done = 0.0
-    broken = {}
-    for i, horizon in enumerate(HORIZONS):
-        shortened = dataclasses.replace(base, duration=horizon * base.duration)
-        needed = done + len(undecided) * base.work * sum(HORIZONS[i:])
-        size = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n)))
-        left = []
-        for begin in range(0, len(undecided), size):
-            batch = undecided[begin : begin + size]
-            cases = []
-            for j, k in batch:
-                cases.append(dataclasses.replace(shortened, x0=x[k], v0=v[j]))
-            for index, trace in stream(cases, threads, summed(report, done, needed)):
-                if trace.broken:
-                    broken.setdefault(base.law.name, trace.broken)
-                verdict = verdict_of(trace, x, v, final=horizon == HORIZONS[-1])
-                if verdict is None:
-                    left.append(batch[index])
-                else:
-                    outcome[batch[index]], decided_at[batch[index]] = verdict, shortened.duration
-            done += len(cases) * shortened.work
-        undecided = left
-    warn_of_broken(broken)
+    grid = _Grid(base, x, v, threads)
+    states = np.stack([np.tile(x, v.size), np.repeat(v, x.size)], axis=1)
+    checked = ""
+    if why_not(base, (), device) or prepare(base).why_not:
+        outcome, decided_at = grid.decide(grid.by_mujoco, states, report)
+    else:
+        outcome, decided_at = grid.decide(grid.by_engine(device), states, report)
+        drawn = np.random.default_rng(0).permutation(len(states))[:CHECKED]
+        again, _ = grid.decide(grid.by_mujoco, states[drawn], lambda done, needed: None)
+        differ = np.count_nonzero(again != outcome[drawn])
+        checked = f"MuJoCo repeated {drawn.size} states, {differ} with another outcome"
+    warn_of_broken(grid.broken)
+    shape = v.size, x.size
     return Basin(
         plant=base.plant.name,
         law=base.law.name,
         x=x,
         v=v,
-        outcome=outcome,
-        decided_at=decided_at,
+        outcome=outcome.reshape(shape),
+        decided_at=decided_at.reshape(shape),
         unit=base.plant.unit,
         duration=base.duration,
         source=base.law.source.words,
+        checked=checked,
     )
+
+
+class _Grid:
+    """The runs of a map, whose states are (S, 2), x and v of every channel."""
+
+    def __init__(self, base: Scenario, x: np.ndarray, v: np.ndarray, threads: int | None):
+        self.base = base
+        self.x = x
+        self.v = v
+        self.threads = threads
+        self.broken: dict[str, str] = {}
+
+    def decide(
+        self, run: Callable, states: np.ndarray, report: Report
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the outcome of every state, and the duration of the run that decided, s.
+
+        `run` gets a scenario, states and whether it is the last, and returns their outcomes.
+        """
+        base = self.base
+        outcome = np.full(len(states), UNDECIDED, np.int8)
+        decided_at = np.full(len(states), base.duration)
+        left = np.arange(len(states))
+        done = 0.0
+        for i, horizon in enumerate(HORIZONS):
+            final = horizon == HORIZONS[-1]
+            shortened = dataclasses.replace(base, duration=horizon * base.duration)
+            needed = done + left.size * base.work * sum(HORIZONS[i:])
+            size = BATCH_STATES
+            if run == self.by_mujoco:
+                size = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * base.plant.n)))
+            for begin in range(0, left.size, size):
+                some = left[begin : begin + size]
+                outcome[some] = run(shortened, states[some], final)
+                done += some.size * shortened.work
+                report(done, needed)
+            waits = outcome[left] == UNDECIDED
+            decided_at[left[~waits]] = shortened.duration
+            left = left[waits]
+        return outcome, decided_at
+
+    def by_mujoco(self, shortened: Scenario, states: np.ndarray, final: bool) -> list[int]:
+        """Return the outcomes of runs by MuJoCo."""
+        cases = []
+        for x, v in states.tolist():
+            cases.append(dataclasses.replace(shortened, x0=x, v0=v))
+        found = [UNDECIDED] * len(cases)
+        for i, trace in stream(cases, self.threads):
+            if trace.broken:
+                self.broken.setdefault(self.base.law.name, trace.broken)
+            found[i] = verdict_of(trace, self.x, self.v, final) or UNDECIDED
+        return found
+
+    def by_engine(self, device: str) -> Callable:
+        """Return the same by the fast engine, on a device."""
+        from smc_mujoco.analysis.engine.form import SCORES
+        from smc_mujoco.analysis.engine.group import Group
+        from smc_mujoco.analysis.engine.outcome import NAME
+
+        def run(shortened: Scenario, states: np.ndarray, final: bool) -> np.ndarray:
+            made = Group([shortened], (NAME,))
+            rows = np.repeat(made.rows, len(states), axis=0)
+            LATE, REACH, X0, V0 = made.places.of("late", "reach", "x0", "v0")
+            n = self.base.plant.n
+            rows[:, X0 : X0 + n] = states[:, :1]
+            rows[:, V0 : V0 + n] = states[:, 1:]
+            u_max = shortened.resolved.u_max
+            rows[:, REACH : REACH + 4] = _reach(self.x, self.v, u_max, final)
+            if not final:
+                rows[:, LATE] = _early(shortened.samples)
+            outcome = made.run(rows, self.threads, device)[:, SCORES]
+            return np.where(np.isnan(outcome), DOES_NOT, outcome)
+
+        return run
 
 
 def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
     """Return what the module's rule says of a run, for a grid x, v: 1, 0 or -1, or None if it needs
     a longer run.
     """
+    from smc_mujoco.analysis.engine.outcome import over_samples
+
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
-    x_reach = np.abs(x).max() or 1.0
-    v_reach = np.abs(v).max() or 1.0
-    e = error(trace)
-    distance = np.maximum(np.abs(e / x_reach), np.abs(trace.v / v_reach)).max(axis=1)
-    if final:
-        late = last_part(trace)
-    else:
-        late = slice(-(distance.size // EARLY_PARTS), None)
-    inside = distance[late] <= SETTLING_BAND
-    squares = ((e / x_reach) ** 2 + (trace.v / v_reach) ** 2).sum(axis=1)
-    start = squares[0]
-    square = squares[late]
-    middle = square.size // 2
-    first_half = square[:middle].max()
-    second_half = square[middle:].max()
-    near = NEAR_SQUARE if final or start > NEAR_SQUARE else 0.0
-    ratio = MAX_FINAL_RATIO if final else MAX_EARLY_RATIO
-    stays = inside.all() and second_half <= max(ratio * first_half, near)
-    if final or stays:
-        if stays:
-            return CONVERGES
-        if inside.any() or _approaches(squares):
-            return UNDECIDED
-        return DOES_NOT
-    changes = np.stack(
-        [np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)]
-    )
-    u_reach = float(np.max(trace.scenario.resolved.u_max))
-    if not math.isfinite(u_reach):
-        u_reach = np.abs(trace.u).max()
-    rests = (changes <= REST_TOLERANCE * np.array([x_reach, v_reach, u_reach])).all()
-    if rests and not inside.any():
-        return DOES_NOT
-    return None
+    samples = len(trace.t) - 1
+    late = last_part(trace).start if final else _early(samples)
+    reach = _reach(x, v, trace.scenario.resolved.u_max, final)
+    signals = trace.x, trace.v, trace.u, trace.r
+    row = np.array([samples, late, *reach])
+    outcome = over_samples(trace.x.shape[1])(row, *map(np.ascontiguousarray, signals))
+    return outcome if outcome or final else None
 
 
-def _approaches(squares: np.ndarray) -> bool:
-    """Return whether the largest squared distance, (K,), falls over the last four fifths of a
-    run.
-    """
-    largest = np.array([part.max() for part in np.array_split(squares, 5)[1:]])
-    return bool((largest[1:] <= MAX_EARLY_RATIO * largest[:-1]).all())
+def _early(samples: int) -> int:
+    """Return the first sample that counts in an early verdict."""
+    count = samples + 1
+    return count - count // EARLY_PARTS
+
+
+def _reach(x: np.ndarray, v: np.ndarray, u_max: Any, final: bool) -> tuple[float, ...]:
+    """Return X, V, the bound on u, and whether the verdict is final."""
+    return np.abs(x).max() or 1.0, np.abs(v).max() or 1.0, float(np.max(u_max)), float(final)
 
 
 def load(path: str | os.PathLike[str]) -> Basin:

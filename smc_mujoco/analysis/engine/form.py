@@ -84,6 +84,7 @@ def row_places(form: Form) -> Places:
     places.take("surface", len(form.surface.names) if form.surface else 0)
     for name, kind in signals(form).items():
         places.take(name, PARAMETERS + len(parameters(kind)) + 2 * kind.series)
+    places.take("reach", 4)
     return places
 
 
@@ -104,8 +105,13 @@ def work_places(form: Form) -> Places:
     for name, kind in signals(form).items():
         places.take(name, 1 + kind.memory * form.n)
     for name in form.metrics:
-        places.take(f"metric {name}", 4 * form.n)
+        places.take(f"metric {name}", metric_places(name, form.n))
     return places
+
+
+def metric_places(name: str, n: int) -> int:
+    """Return how many numbers a metric of n channels keeps."""
+    return 11 + 6 * n if name == "outcome" else 4 * n
 
 
 def measured_places(form: Form) -> int:
