@@ -132,10 +132,14 @@ class Loop:
         gaps.
         """
         s = self.scenario.resolved
-        motor = next((part for part in s.actuator if isinstance(part, DCMotor)), None)
+        motors = []
+        for part in s.actuator:
+            if isinstance(part, DCMotor):
+                motors.append(dataclasses.replace(part, inductance=0.0))
+        chain = s.chains[self.channel]
         ideal = dataclasses.replace(
             self.scenario,
-            actuator=None if motor is None else dataclasses.replace(motor, inductance=0.0),
+            actuator=motors,
             contact="none",
             x0=None,
             v0=None,
@@ -146,21 +150,20 @@ class Loop:
         with installed(None):
             model = models.with_values(models.compile_model(ideal), ideal)
             model.opt.disableflags |= NONLINEAR_FLAGS
-            gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
-            if gear is not None:  # the rotor is rigid on the joint here
-                driven = dof_ids(model)[: s.plant.driven]
+            gears = [part for part in s.actuator if isinstance(part, Backlash)]
+            for gear in gears:  # the rotor is rigid on the joint here
+                driven = dof_ids(model)[gear.channels(s.plant)]
                 model.dof_armature[driven] += gear.rotor_inertia
                 model.dof_damping[driven] += gear.rotor_damping
                 mujoco.mj_setConst(model, mujoco.MjData(model))
+            gear = next((part for part in gears if part in chain), None)
             self.step = float(model.opt.timestep)
             data = mujoco.MjData(model)
             data.qpos[:], data.qvel[:] = models.initial_state(
                 model, dataclasses.replace(ideal, x0=0.0, v0=0.0)
             )
-            self.a, b = transition(model, data, s.actuator)
-            self.b = b[:, drive_ids(model)[self.channel]] * math.prod(
-                part.scale for part in s.actuator
-            )
+            self.a, b = transition(model, data, chain)
+            self.b = b[:, drive_ids(model)[self.channel]] * s.scales[self.channel]
             self.rows = dof_ids(model)
             self.nv = model.nv
             self.gap = self._joint_gap(gear, model, data) if gear else 0.0
@@ -201,8 +204,9 @@ class Loop:
         answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[
             :, :, 0
         ]
-        sensor_delay = s.sensor.delay if s.sensor else 0.0
-        return passed @ answers * np.exp(-1j * omega * sensor_delay)
+        if (sensor := s.encoder(self.channel)) is not None:
+            answers = answers * np.exp(-1j * omega * sensor.delay)
+        return passed @ answers
 
     @functools.cached_property
     def s_of_one_count(self) -> float:
@@ -211,8 +215,8 @@ class Loop:
         """
         s = self.scenario.resolved
         count = 0.0
-        if s.sensor:
-            count = s.sensor.quantum(s.plant.units[self.channel] == "rad")
+        if (sensor := s.encoder(self.channel)) is not None:
+            count = sensor.quantum(s.plant.units[self.channel] == "rad")
         if not count:
             return 0.0
         x = np.where(np.arange(2 * REST_SAMPLES) < REST_SAMPLES, 0.0, count)
@@ -273,7 +277,7 @@ class Loop:
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, mobility[None], force[None])
         rotor = gear.rotor_inertia
-        for part in self.scenario.resolved.actuator:
+        for part in self.scenario.chains[self.channel]:
             if isinstance(part, DCMotor):
                 rotor += part.gear**2 * part.rotor_inertia
         return gear.gap * rotor * float(mobility[dof])

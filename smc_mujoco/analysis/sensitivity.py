@@ -148,12 +148,11 @@ class SobolResult:
 def _random(scenario: Scenario) -> bool:
     """Return whether a run depends on the scenario's seed."""
     noise = scenario.noise
-    sensor = scenario.sensor
     disturbed = any(signal.random for signal in scenario.disturbance)
     return bool(
         noise.position
         or noise.velocity
-        or (sensor and sensor.dropout)
+        or any(sensor.dropout for sensor in scenario.sensors)
         or disturbed
         or not scenario.clock.regular
     )

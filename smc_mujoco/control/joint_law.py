@@ -62,8 +62,8 @@ ARRAYS = JointMeasurement._fields[4:]
 # many commands the law gives.
 HEAD = floats(("t", "dt", "model", "dynamics", "n", "driven"))
 # The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of
-# their parameters, and the force per unit of u.
-HANDLE = floats(("coriolis", "jacobian", "parameters", "unit"))
+# their parameters, and of the force per unit of u on each joint.
+HANDLE = floats(("coriolis", "jacobian", "parameters", "units"))
 head_at = record_at(HEAD)
 handle_at = record_at(HANDLE)
 HEAD_BYTES = HEAD.itemsize
@@ -140,8 +140,9 @@ def _coriolis(y, w):
                 0,
                 forces.ctypes.data,
             )
+            units = pointer(int(handle.units))
             for i in range(n):
-                forces[i] /= handle.unit
+                forces[i] /= units[i]
         return forces
 
     return compiled

@@ -31,9 +31,8 @@ PAGE_HEIGHT = 4.6  # inches
 
 def lag(scenario: Scenario) -> float:
     """Return the sum of all delays and time constants between command and force, s."""
-    return scenario.resolved.input_delay + sum(
-        part.delay for part in scenario.actuator if part.drives
-    )
+    lags = [sum(part.delay for part in chain if part.drives) for chain in scenario.chains]
+    return scenario.resolved.input_delay + max(lags)
 
 
 def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float]) -> float:

@@ -15,7 +15,7 @@ environment: viewer.launch(environment).
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -36,18 +36,11 @@ with extra("dm", "smc_mujoco.envs.dm_control_env"):
 class PlantPhysics(Physics):
     """dm_control's physics, without its exception for a plant that diverges."""
 
-    step_counts: Iterable[int] = ()  # from `Episode.apply_action`
+    stepping: Callable[[], contextlib.AbstractContextManager] = contextlib.nullcontext
 
     def step(self, nstep: int = 1) -> None:
-        """Take physics steps.
-
-        Those of an action are taken one by one if `DriveStep` simulates a drive.
-        """
-        step_counts, self.step_counts = self.step_counts, ()
-        for steps in step_counts:
-            super().step(steps)
-            nstep -= steps
-        if nstep > 0:  # a user may step without a command
+        """Take physics steps, with the callback if it is called."""
+        with self.stepping():
             super().step(nstep)
 
     @contextlib.contextmanager
@@ -71,7 +64,7 @@ class PlantTask(Episode, control.Task):
 
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Apply the action."""
-        physics.step_counts = self.apply_action(physics.data.ptr, action)
+        self.tell(physics.data.ptr, self.setting.command(action))
 
     def after_step(self, physics: Physics) -> None:
         """Count the sample and read the state."""
@@ -131,7 +124,7 @@ def load(
         random = np.random.default_rng(random)
     scenario = setting.scenario
     return control.Environment(
-        _physics(setting.model),
+        _physics(setting),
         PlantTask(setting, random),
         # half a sample less: sums of floats miss it
         time_limit=(scenario.samples - 0.5) * scenario.control_period,
@@ -142,9 +135,11 @@ def load(
     )
 
 
-def _physics(model: mujoco.MjModel) -> PlantPhysics:
+def _physics(setting: Setting) -> PlantPhysics:
     try:
-        return PlantPhysics.from_model(MjModel(model))
+        physics = PlantPhysics.from_model(MjModel(setting.model))
+        physics.stepping = setting.stepping
+        return physics
     except AttributeError as error:  # dm_control looks for every field that it knows
         here = f"dm_control {version('dm-control')} does not know MuJoCo {mujoco.__version__}"
         raise MissingPackageError(

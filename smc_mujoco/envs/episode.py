@@ -1,17 +1,17 @@
 """A plant with a task, compiled, and an episode of it: the base of dm_env, gymnasium and batched
 environments.
 
-The physics are those of `smc.run`. An action is the command u of each driven channel, divided by
-the channel's limit and held for one control period; it saturates outside [-1, 1]. The limit is
-u_max, or that of the channel's own motor. An environment has no law, no noise, delay or encoder,
-and no disturbances or jumps. With contacts an episode begins from the first drawn start that is
-clear of them.
+The physics are those of `smc.run`: its callback simulates the same parts. An action is the command
+u of each driven channel, divided by the channel's limit and held for one control period; it
+saturates outside [-1, 1]. The limit is u_max, or that of the channel's own motor. An environment
+has no law, no noise, delay or encoder, and no disturbances or jumps. With contacts an episode
+begins from the first drawn start that is clear of them.
 """
 
 import contextlib
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
@@ -22,12 +22,13 @@ from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
-from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation import callback, coerce, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.model import channels
+from smc_mujoco.simulation.prepare import Prepared, pack
 from smc_mujoco.simulation.python_functions import Failure, evaluate
-from smc_mujoco.simulation.scenario import Resolved, Scenario, stepped_by_mujoco
+from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel
 
 MAX_DRAWS = 100  # of a start that is clear of contacts
@@ -54,6 +55,12 @@ def commanded(y, gains, memory):
     return memory[:, 0].copy(), np.zeros(len(memory))
 
 
+@law_function(memory=1)
+def commanded_by_channel(y, gains, memory):
+    """The same of one channel."""
+    return memory[0], 0.0
+
+
 class Setting:
     """A plant with a task, compiled. Every environment has one."""
 
@@ -68,7 +75,7 @@ class Setting:
         """Compile a plant for one of its tasks. `changes`: Scenario field -> value, of FIELDS.
 
         `edit` changes the mechanism before it is compiled, and must not change the motion. A plant
-        that `flies` is a free body; its runs are those of `flown`.
+        that `flies` is a free body.
         """
         plant = as_plant(plant)
         self.task = find("task", task, TASKS)
@@ -88,21 +95,13 @@ class Setting:
             )
         changes = _checked({} if changes is None else changes, task)
         # the run that equals an episode
-        scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
-        self.scenario = stepped_by_mujoco(scenario).resolved
-        self.flown = dataclasses.replace(scenario, law=commanded()) if flies else scenario
-        if self.scenario.drive_step and self.scenario.drive_step.ripple:
-            raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
-        if self.scenario.accelerates:
-            raise ScenarioError(
-                "environments have no Stepper, whose queue the callback keeps: take another drive"
-            )
-        for part in (*self.scenario.friction, *self.scenario.actuator):
-            if part.force is not None:
-                raise ScenarioError(
-                    f"{type(part).__name__} is a function that the callback evaluates, which "
-                    "environments lack: give Coulomb, LuGre or another drive"
-                )
+        fields = {"plant": plant, "law": "none"} | self.task.fields(plant) | changes
+        self.scenario = Scenario(**fields).resolved
+        # whether MuJoCo alone does not simulate it
+        self.called = flies or bool(self.scenario.acting)
+        self.commanded = dataclasses.replace(
+            self.scenario, law=commanded() if flies else commanded_by_channel()
+        ).resolved
         if math.inf in self.scenario.limits:
             raise ScenarioError(
                 "u_max is inf: give a finite one, because actions are fractions of it"
@@ -113,17 +112,18 @@ class Setting:
             self.low = self.high = np.array(self.scenario.x0)
         spec = models.spec(self.scenario)
         edit(spec)
-        self.model = models.with_values(models.compiled(spec, self.scenario), self.scenario)
+        base = models.compiled(spec, self.scenario, models.USERDATA)
+        self.model = models.with_values(base, self.scenario)
         table = channels(self.model)
+        self.mechanism = models.Mechanism(base, table)
         self.qpos = table["qpos"]  # addresses of the channels, (n,)
         self.qvel = table["qvel"]
         self.joints = models.moving_joints(self.model)
-        # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,)
+        # addresses of the driven channels' actuators, (driven,)
         self.ctrl = table["ctrl"][: plant.driven]
-        self.shafts = table["shaft"][: plant.driven]
         # the largest commands, (driven,), and the actuators' inputs per unit of them
         self.limits = np.array(self.scenario.limits)
-        self.scale = math.prod(part.scale for part in self.scenario.actuator)
+        self.scale = np.array(self.scenario.scales)
         # the channels that the task treats differently, (n,) of bool
         self.selected = self.task.selected(plant)
         self.rest_x = rest(plant)  # from where positions count in errors, (n,)
@@ -154,37 +154,9 @@ class Setting:
             raise ScenarioError(f"action is {shown(action)}: give finite numbers, of shape {shape}")
         return self.limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
-    def drive_start(self, qvel: np.ndarray) -> np.ndarray | float:
-        """Return both states of `DriveStep` at the start of episodes with velocities qvel (...,
-        nv).
-        """
-        effect = self.scenario.drive_step
-        if effect is None:
-            return 0.0
-        return effect.start(qvel[..., self.shafts])
-
-    def apply_command(
-        self, ctrl: np.ndarray, command: np.ndarray, drive_states: np.ndarray, qvel: np.ndarray
-    ) -> Iterator[int]:
-        """Write inputs into ctrl (..., nu) over a control period; yield after each how many physics
-        steps it lasts.
-
-        `command` is (..., driven); `drive_states`, (2, ..., driven), is updated in place; `qvel` is
-        (..., nv). The mean force of a drive acts throughout a step. In a run with RK4, a Lag's
-        first moment acts, too.
-        """
-        effect = self.scenario.drive_step
-        steps = self.scenario.steps
-        if effect is None:
-            ctrl[..., self.ctrl] = self.scale * command
-            yield steps
-            return
-        for _ in range(steps):
-            force, drive_states[0], drive_states[1] = effect(
-                command, drive_states[0], drive_states[1], qvel[..., self.shafts]
-            )
-            ctrl[..., self.ctrl] = self.scale * force
-            yield 1
+    def stepping(self) -> contextlib.AbstractContextManager:
+        """Return the context in which MuJoCo steps: with the callback, if it is called."""
+        return callback.installed() if self.called else contextlib.nullcontext()
 
     def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options
@@ -235,6 +207,44 @@ class Setting:
         return ~(np.maximum(np.abs(x), np.abs(v)).max(axis=-1) < MAX_STATE)
 
 
+class Runs:
+    """What the callback keeps of the episodes of a setting, one for each copy."""
+
+    def __init__(self, setting: Setting, copies: int):
+        self.setting = setting
+        self.records = np.zeros(copies, state.SIMULATION)
+        width = max(setting.commanded.law.memory, 1) * setting.scenario.plant.n
+        self.commands = np.zeros((copies, width))  # of the laws
+        self.kept: list[Any] = [None] * copies
+
+    def begin(self, i: int, x: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+        """Begin an episode of copy i at x and v, (n,) each, and return its userdata."""
+        started = object.__new__(Resolved)
+        start = {"x0": tuple(x.tolist()), "v0": tuple(v.tolist())}
+        vars(started).update(vars(self.setting.commanded) | start)
+        prepared = Prepared(started, "", self.setting.mechanism, None)
+        log = np.zeros((started.samples + 1, started.plant.n), state.LOG)
+        self.records[i], packed = pack(prepared, log)
+        self.kept[i] = prepared, log, packed
+        self.commands[i] = 0.0
+        self.records[i]["law"]["memory"] = state.address(self.commands[i : i + 1])
+        return callback.MAGIC, state.address(self.records[i : i + 1])
+
+    def check(self) -> None:
+        """Raise ScenarioError if a part failed, or a copy was stepped beyond its end."""
+        codes = self.records["failure"]
+        for i in np.flatnonzero(codes):
+            if codes[i] == state.INTERRUPTED:
+                raise ScenarioError("the episode has ended: call reset")
+            if codes[i] != state.DIVERGED:
+                parts = [type(part).__name__ for part, _ in self.setting.scenario.acting]
+                where = f"in channel {self.records['seen']['i'][i]}"
+                raise ScenarioError(
+                    f"{' or '.join(parts)} raised an exception, or returned no number, {where}: "
+                    "smc.run says which"
+                )
+
+
 class Episode:
     """An episode of one simulation: the base of a gymnasium environment and of a task for
     dm_control.
@@ -245,31 +255,43 @@ class Episode:
         self.episodes = 0
         self.diverged = False
         self.sample = 0  # control samples since the episode began
-        self.drive_states = np.zeros((2, *setting.action_shape))  # of `DriveStep`
+        self.told: list[np.ndarray] = []  # the commands of an episode with the callback
         self.x = self.v = np.zeros(setting.scenario.plant.n)
 
     def begin(
         self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None
     ) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
-        mujoco.mj_resetData(self.setting.model, data)
-        start = self.setting.draw_start(random, options)
-        data.qpos[:], data.qvel[:] = models.state_with(
-            self.setting.model, self.setting.joints, *start
-        )
+        self.start = self.setting.draw_start(random, options)
         self.episodes += 1
+        self.begin_at_start(data)
+
+    def begin_at_start(self, data: mujoco.MjData) -> None:
+        """Begin an episode from `start`."""
+        setting = self.setting
+        mujoco.mj_resetData(setting.model, data)
+        data.qpos[:], data.qvel[:] = models.state_with(setting.model, setting.joints, *self.start)
+        if setting.called:
+            self.runs = Runs(setting, 1)
+            data.userdata[:] = self.runs.begin(0, *self.start)
+            if setting.model.nkey and setting.model.na:  # thrust behind a lag
+                data.act[:] = setting.model.key_act[0]
+        self.told = []
         self.sample = 0
-        self.drive_states[:] = self.setting.drive_start(data.qvel)
         self.read_state(data)
 
-    def apply_action(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
-        """Apply an action over a control period, see `Setting.apply_command`."""
-        return self.setting.apply_command(
-            data.ctrl, self.setting.command(action), self.drive_states, data.qvel
-        )
+    def tell(self, data: mujoco.MjData, command: np.ndarray) -> None:
+        """Give the drives a command, (driven,)."""
+        if self.setting.called:
+            self.told.append(command)
+            self.runs.commands[0, : len(command)] = command
+        else:
+            data.ctrl[self.setting.ctrl] = self.setting.scale * command
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
+        if self.setting.called:
+            self.runs.check()
         self.x = data.qpos[self.setting.qpos]
         self.v = data.qvel[self.setting.qvel]
         self.diverged = bool(self.setting.diverged(self.x, self.v))

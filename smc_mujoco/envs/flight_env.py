@@ -10,7 +10,6 @@ task and its reward are those of `tasks`, with the errors that count: not the ti
 leans to move. The info has "time", s, and "error", of the pose, (6,).
 """
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,9 +22,6 @@ from smc_mujoco.envs.tasks import Pair
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation import callback, state
-from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.run import ScenarioBatch
 
 
 class FlightEnv(PlantEnv):
@@ -61,61 +57,21 @@ class FlightEnv(PlantEnv):
         self.action_space = action_space(self.setting)
         self.begin(self.data, self.np_random)
 
-    def begin(
-        self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None
-    ) -> None:
-        """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
-        x0, v0 = self.setting.draw_start(random, options)
-        self.start = dataclasses.replace(self.setting.flown, x0=x0, v0=v0)
-        self.episodes += 1
-        self.fly([])
-        self.read_state(data)
-
-    def fly(self, wrenches: list[np.ndarray]) -> None:
-        """Begin at the start, and take a control period under each force and torque, (6,)."""
-        self.flown: list[np.ndarray] = []
-        self.sample = 0
-        with callback.installed():
-            self.batch = ScenarioBatch([prepare(self.start)], threads=1)
-        place = int(self.batch.records["law"]["memory"][0])
-        self.memory = state.view(self.batch.packed[0].numbers, place, (6,))
-        for wrench in wrenches:
-            self.fly_on(wrench)
-
-    def fly_on(self, wrench: np.ndarray) -> None:
-        """Take a control period under a force and a torque in the axes of the world, (6,)."""
-        self.memory[:] = wrench
-        self.flown.append(wrench)
-        self.sample += 1
-        with callback.installed():
-            self.batch.advance_to(self.sample * self.setting.scenario.steps)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but MuJoCo's batch, which cannot be copied: a copy flies its episode again."""
-        return super().__getstate__() | {"batch": None, "memory": None}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self.fly(self.flown)
-
     def advance(self, action: Any) -> None:
         """Take one control period and read the pose."""
         share = 0.5 + 0.5 * self.setting.command(action)
         wrench = (self.least + share * (self.most - self.least)) @ self.wrenches
         attitude = rotation.quaternion(*self.x[3:])
-        self.fly_on(np.array([*rotation.turned(attitude, *wrench[:3]), *wrench[3:]]))
-        self.read_state(self.data)
+        self.take(np.array([*rotation.turned(attitude, *wrench[:3]), *wrench[3:]]))
 
     def read_state(self, data: mujoco.MjData) -> None:
-        """Read the pose and its velocity, (6,) each, and write the positions into the data that are
-        drawn.
-        """
-        data.qpos[:], qvel = (self.batch.batch.bind(name)[0] for name in ("qpos", "qvel"))
+        """Read the pose and its velocity, (6,) each."""
+        self.runs.check()
         first = self.setting.qpos[3]
         dof = self.setting.qvel[0]
         turn = rotation.rotation_vector(*data.qpos[first : first + 4])
         self.x = np.array([*data.qpos[first - 3 : first], *turn])
-        self.v = qvel[dof : dof + 6].copy()
+        self.v = data.qvel[dof : dof + 6].copy()
         self.diverged = bool(self.setting.diverged(self.x, self.v))
 
     def errors(self) -> Pair:

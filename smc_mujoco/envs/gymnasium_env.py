@@ -93,8 +93,13 @@ class PlantEnv(Episode, gymnasium.Env):
 
     def advance(self, action: Any) -> None:
         """Take one control period and read the state."""
-        for steps in self.apply_action(self.data, action):
-            mujoco.mj_step(self.setting.model, self.data, steps)
+        self.take(self.setting.command(action))
+
+    def take(self, command: np.ndarray) -> None:
+        """Take one control period under a command and read the state."""
+        self.tell(self.data, command)
+        with self.setting.stepping():
+            mujoco.mj_step(self.setting.model, self.data, self.setting.scenario.steps)
         self.sample += 1
         self.read_state(self.data)
 
@@ -117,5 +122,21 @@ class PlantEnv(Episode, gymnasium.Env):
             self.renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but the renderer, for copies and other processes."""
-        return self.__dict__ | {"renderer": None}
+        """Return all but the renderer and what the callback keeps, for copies and other processes.
+
+        A copy of an episode with the callback repeats it.
+        """
+        kept = self.__dict__ | {"renderer": None}
+        if self.setting.called:
+            kept |= {"runs": None, "data": None}
+        return kept
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        if self.setting.called:
+            self.data = mujoco.MjData(self.setting.model)
+            told = self.told
+            if self.episodes or told:
+                self.begin_at_start(self.data)
+            for command in told:
+                self.take(command)

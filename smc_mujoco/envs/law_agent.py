@@ -4,9 +4,7 @@
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
 The callback of `smc.run` measures what the environment observes and calls the law, and the episode
-equals the trace of that run. With Coulomb friction the run is that of integrator="implicitfast",
-because an environment's steps have no callback that would solve the friction exactly. It differs
-from the exact one by 1e-4 or less.
+equals the trace of that run.
 """
 
 import dataclasses

@@ -17,7 +17,7 @@ import numpy as np
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.envs.episode import Setting, bounded
+from smc_mujoco.envs.episode import Runs, Setting, bounded
 from smc_mujoco.envs.gymnasium_env import action_space, observation_space
 from smc_mujoco.envs.tasks import reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
@@ -74,12 +74,17 @@ class BatchEnv(VectorEnv):
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.batch = Batch(self.setting.model, self.num_envs, min(cores(threads), self.num_envs))
-        self.qpos, self.qvel, self.ctrl = (
-            self.batch.bind(name) for name in ("qpos", "qvel", "ctrl")
+        # persistent: the callback reads the forces of a copy's last step
+        self.batch = Batch(
+            self.setting.model,
+            self.num_envs,
+            min(cores(threads), self.num_envs),
+            persistent=self.setting.called,
         )
-        # of `DriveStep`
-        self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))
+        self.qpos, self.qvel, self.ctrl, self.userdata = (
+            self.batch.bind(name) for name in ("qpos", "qvel", "ctrl", "userdata")
+        )
+        self.runs = Runs(self.setting, self.num_envs)
         self.randoms: list[np.random.Generator] = []
         # control samples since each episode began, and the copies whose episode has ended
         self.samples = np.zeros(self.num_envs, int)
@@ -146,27 +151,31 @@ class BatchEnv(VectorEnv):
         ids = np.flatnonzero(mask)
         with mjcb.installed(None):
             self.batch.reset(ids.astype(np.int32), stage=0)
-        for i in ids:
+        for i in ids.tolist():
             start = self.setting.draw_start(self.randoms[i], options)
             self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)
+            if self.setting.called:
+                self.userdata[i] = self.runs.begin(i, *start)
         self.samples[mask] = 0
         self.ended[mask] = False
-        self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
 
     def advance(self, ids: np.ndarray, commands: np.ndarray) -> np.ndarray:
         """Take one control period in the copies `ids`.
 
         Return those that failed, (num_envs,) of bool.
         """
+        setting = self.setting
         failed = np.zeros(self.num_envs, bool)
-        for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states, self.qvel):
-            try:
-                # a Batch refuses Python callbacks, which runs of other threads may have set
-                with mjcb.installed(None):
-                    self.batch.step(ids, nstep=steps)
-            except SimulationError as error:
-                failed[list(error.ids)] = True
-                ids = np.setdiff1d(ids, error.ids).astype(np.int32)
+        self.runs.commands[:, : commands.shape[1]] = commands
+        if not setting.called:
+            self.ctrl[:, setting.ctrl] = setting.scale * commands
+        try:
+            # a Batch refuses Python callbacks, which runs of other threads may have set
+            with setting.stepping() if setting.called else mjcb.installed(None):
+                self.batch.step(ids, nstep=setting.scenario.steps)
+        except SimulationError as error:
+            failed[list(error.ids)] = True
+        self.runs.check()
         return failed
 
     def infos(self, e: np.ndarray) -> dict[str, Any]:

@@ -376,9 +376,11 @@ def resolution(scenario: Scenario, group: Group) -> float:
     """
     if scenario.tracks == "speed":
         return scenario.noise.velocity
-    if scenario.sensor is None:
-        return scenario.noise.position
-    return max(scenario.noise.position, scenario.sensor.quantum(group.unit == "rad") / 2)
+    apart = scenario.noise.position
+    for i in group.channels:
+        if (sensor := scenario.encoder(i)) is not None:
+            apart = max(apart, sensor.quantum(group.unit == "rad") / 2)
+    return apart
 
 
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:

@@ -14,7 +14,6 @@ spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -133,7 +132,7 @@ def contacts(trace: Trace) -> Contacts:
     rates = model.jnt_dofadr[joints]
     drives = model.actuator_ctrladr[drive_ids(model)]
     n = scenario.plant.driven
-    scale = math.prod(part.scale for part in scenario.actuator)
+    scale = np.array(scenario.scales)
     pushes = []
     for d in scenario.disturbance:
         if isinstance(d, Push) and scenario.plant.direct:

@@ -22,10 +22,10 @@ def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
             functions.append(part.function)
     known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
     signals = [type(signal) for signal in known if signal is not None]
-    parts = [type(part) for part in (*s.friction, *s.contact, *s.actuator, s.sensor)]
+    parts = [type(part) for part in (*s.friction, *s.contact, *s.actuator)]
     foreign = []
     for kind in parts:
-        if not kind.__module__.startswith(PACKAGE) and kind is not type(None):
+        if not kind.__module__.startswith(PACKAGE):
             foreign.append(kind)
     if s.plant not in plants:
         plants[s.plant] = _plant_codes(s.plant)

@@ -22,13 +22,22 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, all_joints, joint_names
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.part import (
+    Actuator,
+    Friction,
+    OnJoints,
+    all_joints,
+    chains,
+    joint_names,
+)
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.signals import Constant, PerChannel, Signal, parameter_factors
 
 T = TypeVar("T")
+P = TypeVar("P", bound=OnJoints)
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal", "true")
@@ -39,9 +48,12 @@ ByChannel = (
     Mapping[str, T] | Sequence[T]
 )  # joint -> value, or values in the order of the driven channels
 Laws = Law | Template | str | ByChannel[Law | Template | str]
-EVERY = "*"  # in a mapping from joints to frictions
-SomeFriction = Friction | Sequence[Friction]
-Frictions = SomeFriction | Mapping[str, SomeFriction] | Sequence[SomeFriction | Mapping]
+EVERY = "*"  # in a mapping from joints to parts
+Some = T | Sequence[T]
+SomeByJoint = Some[T] | Mapping[str, Some[T]] | Sequence[Some[T] | Mapping[str, Some[T]]]
+Frictions = SomeByJoint[Friction]
+Actuators = SomeByJoint[Actuator]
+Sensors = SomeByJoint[Encoder]
 
 
 def plant(name: str, value: object, s: Any) -> Plant:
@@ -325,16 +337,7 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
 
     Kinds must differ, and one at most has bristles on a joint.
     """
-    several_parts = several(Friction, "smc.Coulomb(0.05)")
-    items: list[Friction] = []
-    for item in as_tuple(value):
-        if isinstance(item, Mapping):
-            for joint, given in item.items():
-                for part in several_parts(name, given, s):
-                    items.append(dataclasses.replace(part, on=(joint,)))
-        else:
-            items += several_parts(name, item, s)
-    items = [_placed(name, part, s.plant) for part in items]
+    items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints(s.plant))
     for part, other in itertools.combinations(items, 2):
         same = type(part) is type(other) and part.on == other.on
         both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
@@ -344,35 +347,75 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
     return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))
 
 
-def _placed(name: str, part: Friction, plant: Plant) -> Friction:
-    """Return a friction with the joints that it acts on, if these are not the driven ones alone."""
-    joints = all_joints(plant)
+def _by_joint(
+    name: str, value: Any, s: Any, kind: type[P], example: str, joints: Sequence[str]
+) -> list[P]:
+    """Return parts from one, several or None, or by joint, with the joints that each acts on, of
+    these, if it does not act on what it does without a name.
+    """
+    several_parts = several(kind, example)
+    items: list[P] = []
+    for item in as_tuple(value):
+        if isinstance(item, Mapping):
+            for joint in sorted(item, key=str):
+                for part in several_parts(name, item[joint], s):
+                    items.append(dataclasses.replace(part, on=(joint,)))
+        else:
+            items += several_parts(name, item, s)
+    return [_placed(name, part, s.plant, joints) for part in items]
+
+
+def _placed(name: str, part: P, plant: Plant, joints: Sequence[str]) -> P:
+    """Return a part with the joints that it acts on."""
     on = joints if EVERY in part.on else part.on
-    for value in stated(part).values():  # a number for each channel is one by name
-        if not on and isinstance(value, tuple) and len(value) == plant.n > plant.driven:
-            on = joint_names(plant)
+    if isinstance(part, Friction) and not on:
+        for value in stated(part).values():  # a number for each channel is one by name
+            if isinstance(value, tuple) and len(value) == plant.n > plant.driven:
+                on = joint_names(plant)
     for joint in on:
         if joint not in joints:
             raise unknown(f"joint of {plant.name} in {name}", joint, joints)
+    if not isinstance(part, Friction) and set(on) == set(joints):
+        on = ()
     return dataclasses.replace(part, on=tuple(on))
 
 
-def actuator(
-    name: str, value: Actuator | Sequence[Actuator] | None, s: Any
-) -> tuple[Actuator, ...]:
-    """Return the actuators, from one, several or None: at most two drives in the given order, then
-    a Backlash.
+def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]:
+    """Return the actuators, from one, several or None, or by joint: at most two drives of a joint
+    in the given order, then a Backlash.
     """
-    items = several(Actuator, "smc.Lag(0.01)")(name, value, s)
-    drives = [part for part in items if part.drives]
-    others = [type(part).__name__ for part in items if not part.drives]
-    if len(others) > len(set(others)):
-        raise ScenarioError(f"{name} has {joined(others)}: give one of a kind")
-    if len(drives) > 2 or (len(drives) == 2 and not isinstance(drives[0], Lag)):
-        raise ScenarioError(
-            f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), another)"
-        )
+    if value is None:
+        return ()
+    driven = joint_names(s.plant)[: s.plant.driven]
+    items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven)
+    for chain in dict.fromkeys(chains(items, driven)):
+        drives = tuple(part for part in chain if part.drives)
+        others = [type(part).__name__ for part in chain if not part.drives]
+        if len(others) > len(set(others)):
+            raise ScenarioError(f"{name} has {joined(others)}: give one of a kind")
+        if len(drives) > 2 or (len(drives) == 2 and not isinstance(drives[0], Lag)):
+            raise ScenarioError(
+                f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), "
+                "another)"
+            )
     return tuple(sorted(items, key=lambda part: not part.drives))
+
+
+def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder, ...] | None:
+    """Return the encoder of all channels, or those of some joints."""
+    if value is None:
+        return None
+    example = "smc.Encoder(counts=...)"
+    items = _by_joint(name, value, s, Encoder, example, joint_names(s.plant))
+    taken: list[str] = []
+    for part in items:
+        joints = part.on or joint_names(s.plant)
+        if both := [joint for joint in joints if joint in taken]:
+            raise ScenarioError(f"{name} has two encoders on joint {both[0]!r}: give one")
+        taken += joints
+    if len(items) == 1 and not items[0].on:
+        return items[0]
+    return tuple(items) or None
 
 
 def as_tuple(value: object) -> tuple[Any, ...]:

@@ -33,9 +33,11 @@ from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import (
     PART,
     channel_at,
+    drive_at,
     function_at,
     generalised_disturbance,
     part_at,
+    reader_at,
     state_at,
     torque,
 )
@@ -150,11 +152,10 @@ def _sample(address, sim, data, k, within):
 def _repeat_command(sim, k):
     """Give sample k the command of the sample before, with its u, s and r in the log."""
     buffer = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots))
-    last_u = pointer(sim.seen.u)
     for i in range(sim.n):
         sample = log_at(sim.log, k * sim.n + i)
         before = log_at(sim.log, (k - 1) * sim.n + i)
-        sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last_u[i]
+        sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, before.u
 
 
 @njit(error_model="numpy", inline="always")
@@ -195,24 +196,30 @@ def _call(function, i, inputs, outputs):
 
 
 @njit(error_model="numpy", inline="always")
-def _read_sensor(address, sim, i, j, hinge):
-    """Give reading j of channel i its noise, and what the sensor makes of it. Return 1 if that
-    raised, or 0.
+def _read_sensor(address, sim, i, k, t, hinge):
+    """Give the reading of channel i at sample k, at t s, its noise, and what the sensor makes of
+    it. Return 1 if that raised, or 0.
     """
     reading = sim.reading
+    j = k
+    if sim.readers != 0:
+        reader = reader_at(sim.readers, i)
+        if reader.period != 0.0:
+            j = max(0, math.floor((t - reader.delay) / reader.period + 1e-6))
     if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
         z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
         reading.x += sim.sigma_x * z[0]
         reading.v += sim.sigma_v * z[1]
-    if sim.read.address == 0:
+    if sim.readers == 0 or reader_at(sim.readers, i).function.address == 0:
         return 0
+    function = reader_at(sim.readers, i).function
     sight = sim.sight
     sight.x = reading.x
     sight.v = reading.v
     sight.j = j
     sight.hinge = hinge
     sight.chance = philox.uniform(sim.seed, i, philox.DROPOUT, j)
-    if _call(sim.read, i, address + record.AT.sight, address + record.AT.raw) != 0:
+    if _call(function, 0, address + record.AT.sight, address + record.AT.raw) != 0:
         return 1
     reading.x = sim.raw.x
     reading.v = sim.raw.v
@@ -253,12 +260,9 @@ def _measure(address, sim, data, k, t):
     """Measure position, and estimate velocity and acceleration, of every channel at sample k, at
     time t, s.
     """
-    j = k
     x = pointer(sim.seen.x)
     v = pointer(sim.seen.v)
     a = pointer(sim.a)
-    if sim.read_period != 0.0:
-        j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
     reading = sim.reading
     estimate = sim.estimate
     reading.dt = sim.period
@@ -270,7 +274,7 @@ def _measure(address, sim, data, k, t):
         reading.x = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
         reading.v = data.sensordata[channel.v_sensor] + v_error
         sim.seen.i = i
-        if _read_sensor(address, sim, i, j, channel.hinge_body >= 0) != 0:
+        if _read_sensor(address, sim, i, k, t, channel.hinge_body >= 0) != 0:
             return record.RAISED
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
@@ -299,8 +303,8 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
     """
     n = sim.n
     width = sim.width
-    last_u = pointer(sim.seen.u)
-    limits = pointer(sim.limits)
+    last_u = pointer(sim.seen.u)  # the forces of the drives, as the model knows them
+    v = pointer(sim.seen.v)
     feedforward = 0.0
     joint = sim.joint.head != 0
     commands = pointer(sim.commands)
@@ -329,7 +333,8 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
             return record.LAW_RAISED
         for j in range(min(width, sim.driven)):
             i = first + j
-            limit = limits[first + j]
+            drive = drive_at(sim.drives, i)
+            limit = drive.limit
             command = commands[j] + feedforward
             s = commands[width + j]
             sample = log_at(sim.log, k * n + i)
@@ -337,11 +342,12 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
             if not (
                 math.isfinite(command)
                 and math.isfinite(s)
-                and abs(u) * max(1.0, sim.scale) < MAX_CONTROL
+                and abs(u) * max(1.0, drive.scale) < MAX_CONTROL
             ):
                 sim.seen.i = i
                 return record.NOT_FINITE
-            buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
+            buffer[i], sample.u, sample.s = u, u, s
+            last_u[i] = drive.gain * u - drive.drag * v[i]
             if sim.other_forces != 0:
                 last_u[i] += pointer(sim.other_forces)[i]
     if sim.mixer != 0:
@@ -354,7 +360,8 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
         elif not joint and _evaluate_reference(address, sim, k, i) != 0:
             return record.RAISED
     for i in range(n if sim.other_forces != 0 else 0):
-        last_u[i] = log_at(sim.log, k * n + i).u
+        drive = drive_at(sim.drives, i)
+        last_u[i] = drive.gain * log_at(sim.log, k * n + i).u - drive.drag * v[i]
     return record.FINE
 
 
@@ -412,6 +419,7 @@ def _measure_channel(address, sim, k, t, i):
     a = pointer(sim.a)
     motion = sim.motion
     model = sim.model
+    drive = drive_at(sim.drives, i)
     y.t = t
     y.dt = sim.period
     y.r = motion.value
@@ -427,15 +435,15 @@ def _measure_channel(address, sim, k, t, i):
             return record.RAISED
         y.q = x[partner]
         y.dq = v[partner]
-        y.fq = model.f - sim.drive_drag * v[i] * model.g
-        y.gq = sim.drive_gain * model.g
+        y.fq = model.f - drive.drag * v[i] * model.g
+        y.gq = drive.gain * model.g
     if _evaluate_model(address, sim, i) != 0:
         return record.RAISED
-    y.f = model.f - sim.drive_drag * v[i] * model.g
-    y.g = sim.drive_gain * model.g
+    y.f = model.f - drive.drag * v[i] * model.g
+    y.g = drive.gain * model.g
     if sim.other_forces != 0:
         y.f += pointer(sim.other_forces)[i] * model.g
-    if sim.accelerates != 0:  # u is the acceleration x''
+    if drive.accelerates != 0.0:  # u is the acceleration x''
         y.gq /= y.g
         y.fq -= y.gq * y.f
         y.f = 0.0
@@ -445,7 +453,7 @@ def _measure_channel(address, sim, k, t, i):
     y.e = y.x - y.r
     y.de = y.v - y.dr
     y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
-    y.limit = pointer(sim.limits)[i]
+    y.limit = drive.limit
     y.model = sim.uses_model
     y.has_surface = 0.0
     y.s = 0.0
@@ -491,7 +499,7 @@ def _measure_joints(address, sim, k, t):
         )
         pointer(y.a)[i], pointer(y.limit)[i] = (
             motion.acceleration if math.isnan(a) else a,
-            pointer(sim.limits)[i],
+            drive_at(sim.drives, i).limit,
         )
     if sim.mixer != 0:
         rotation.put_attitude_error(
@@ -524,10 +532,11 @@ def _measure_dynamics(address, sim):
         failure = _separate_equations(address, sim, M, h, g)
     elif _call(sim.dynamics, 0, address + record.AT.seen, sim.joint.M) != 0:
         failure = record.RAISED
-    for i in range(n * n):
-        M[i] /= sim.drive_gain
     for i in range(n):
-        h[i], g[i] = (h[i] + sim.drive_drag * v[i]) / sim.drive_gain, g[i] / sim.drive_gain
+        drive = drive_at(sim.drives, i)
+        for j in range(n):
+            M[n * i + j] /= drive.gain
+        h[i], g[i] = (h[i] + drive.drag * v[i]) / drive.gain, g[i] / drive.gain
     return failure
 
 
@@ -577,8 +586,9 @@ def _arrive(sim, data, step):
             if faulty and (sim.failing < 0 or sim.failing == i):
                 u = state.delayed if sim.stuck != 0 else sim.fault_gain * u + sim.fault_bias
             state.delayed = u
-            if sim.has_drives == 0 and i < (sim.driven if sim.mixer == 0 else sim.actuators):
-                data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * u
+            channel = channel_at(sim.channels, i)
+            if channel.ctrl >= 0:
+                data.ctrl[channel.ctrl] = drive_at(sim.drives, i).scale * u
 
 
 @njit(error_model="numpy", inline="always")
@@ -771,6 +781,7 @@ def _exert(address, sim, data, part):
     i = part.channel
     channel = channel_at(sim.channels, i)
     state = state_at(sim.states, i)
+    drive = drive_at(sim.drives, i)
     joint = channel.qvel
     y = sim.joint_state
     pushed = generalised_disturbance(data, channel)
@@ -786,8 +797,8 @@ def _exert(address, sim, data, part):
     if part.staged != 0:
         y.stage = sim.stage
         if channel.ctrl >= 0:
-            y.motor = torque(sim.torque, data.ctrl[channel.ctrl], y.v)
-        y.mean = state.middle if sim.sums_force != 0 else y.motor
+            y.motor = torque(drive.torque, data.ctrl[channel.ctrl], y.v)
+        y.mean = state.middle if drive.sums_force != 0.0 else y.motor
         y.others = data.qfrc_passive[joint] - data.qfrc_bias[joint] + pushed
         y.level = data.dof_frictionloss[joint]
         y.mobility = data.qLDiagInv[joint]
@@ -818,7 +829,7 @@ def _sum_forces(sim, data):
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
-        if channel.force >= 0 and sim.sums_force == 0:
+        if channel.force >= 0 and drive_at(sim.drives, i).sums_force == 0.0:
             state.force += data.actuator_force[channel.force]
         if channel.gathered >= 0:
             state.force += data.qfrc_actuator[channel.gathered]
@@ -836,21 +847,7 @@ def _log(sim, data, k):
         sample = log_at(sim.log, k * sim.n + i)
         sample.x = _position(data.qpos, channel.qpos, channel.turn)
         sample.v = data.qvel[channel.qvel]
-        if channel.ctrl < 0:
-            sample.applied = 0.0
-        elif sim.mixer != 0:
-            if sim.has_drives != 0:
-                sample.applied = state.delayed
-            else:
-                sample.applied = data.ctrl[channel.ctrl]
-        else:
-            applied = data.ctrl[channel.ctrl] / sim.scale
-            limit = pointer(sim.limits)[i]
-            # the quotient may round to just beyond the limit
-            if sim.has_drives == 0:
-                sample.applied = min(max(applied, -limit), limit)
-            else:
-                sample.applied = state.delayed
+        sample.applied = state.delayed if channel.ctrl >= 0 else 0.0
         sample.d = generalised_disturbance(data, channel)
         sample.force = state.force / sim.steps
         sample.reaction = state.reaction / sim.steps

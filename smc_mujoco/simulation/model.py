@@ -59,9 +59,7 @@ def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
     added: list[Part] = [*scenario.contact, *scenario.friction]
     added += [part for part in scenario.actuator if not part.in_callback]
-    if scenario.sensor is not None:
-        added.append(scenario.sensor)
-    return tuple(added)
+    return (*added, *scenario.sensors)
 
 
 def structure(scenario: Scenario) -> Hashable:

@@ -10,7 +10,6 @@ What does not compile is called in Python; `prepared.why_not` says what.
 import contextlib
 import dataclasses
 import functools
-import math
 import re
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any
@@ -26,8 +25,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
-from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, PART, Run
+from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import cfunctions, philox, state
@@ -42,7 +40,6 @@ from smc_mujoco.simulation.model import (
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, PerChannel, Push, Signal
 
-IDEAL_SENSOR = Encoder(counts=math.inf)
 DATA_BYTES = 176 * 2**10  # of an mjData without channels; measured
 CHANNEL_BYTES = 2 * 2**10  # of an mjData per channel; measured
 # of jit.attempting, and of numba
@@ -51,6 +48,8 @@ UNKNOWN_FIELD = re.compile(
     r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b"
 )
 FIELDS = {record.__name__: record._fields for record in (Measurement, JointMeasurement, Reading)}
+# the records of arrays, where they are no FUNCTIONs
+KINDS = {"disturbances": state.DISTURBANCE, "parts": PART, "drives": DRIVE, "readers": READER}
 # of a delayed sensor's history, per channel and reading, in mjData and in the Batch; measured
 READING_BYTES = 67
 
@@ -146,8 +145,8 @@ def _compile(s: Resolved) -> None:
         cfunctions.compile_signal(signal)
     for part, kind in s.acting:
         cfunctions.compile_part(part, kind)
-    if s.sensor is not None:
-        cfunctions.compile_part(s.sensor, "read")
+    for sensor in s.sensors:
+        cfunctions.compile_part(sensor, "read")
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -180,6 +179,8 @@ class Packed:
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     references: np.ndarray  # (referenced,) FUNCTION; (0,) if all channels have the same
     parts: np.ndarray  # that act, on each of their joints, (p,) PART
+    drives: np.ndarray  # (n,) DRIVE
+    readers: np.ndarray  # (n,) READER; (0,) without a sensor
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
     python: list[Any]  # the PythonFunctions that are called
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
@@ -210,11 +211,7 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     numbers = buffer.array()
     arrays = {}
     for name, rows in tables.items():
-        kind = state.FUNCTION
-        if name == "disturbances":
-            kind = state.DISTURBANCE
-        elif name == "parts":
-            kind = PART
+        kind = KINDS.get(name, state.FUNCTION)
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {
@@ -345,6 +342,8 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
         "laws": laws,
         "references": [_signal(signal, buffer) for signal in references(s)],
         "parts": _parts(prepared, buffer),
+        "drives": _drives(s),
+        "readers": _readers(prepared, buffer),
         "disturbances": disturbances,
     }
 
@@ -373,8 +372,7 @@ def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, i
 
 
 def _settings(s: Resolved) -> dict[str, Any]:
-    """Return the numbers of a record that set clock, sensor and drives."""
-    sensor = s.sensor or IDEAL_SENSOR
+    """Return the numbers of a record that set clock, delay and noise."""
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
         "steps": s.steps,
@@ -392,17 +390,10 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "fault_bias": s.fault.bias if s.fault else 0.0,
         "stuck": s.fault is not None and s.fault.stuck,
         "failing": s.failing(),
-        "scale": math.prod(part.scale for part in s.actuator),
-        "accelerates": s.accelerates,
-        "torque": s.torque._asdict(),
         "seed": s.seed,
         "sigma_x": s.noise.position,
         "sigma_v": s.noise.velocity,
-        "read_period": sensor.period or 0.0,
-        "read_delay": sensor.delay,
         "uses_model": s.model != "none",
-        "drive_gain": s.nominal_drive.gain,
-        "drive_drag": s.nominal_drive.drag,
     }
 
 
@@ -421,7 +412,6 @@ def _arrays(s: Resolved, buffer: Functions) -> dict[str, Any]:
         "width": width,
         "commands": buffer.reserve(2 * width),
         "states": buffer.reserve(n * len(CHANNEL_STATE.names or ())),
-        "limits": buffer.put([*s.limits, *[0.0] * s.plant.free]),
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
     }
@@ -459,7 +449,7 @@ def _joint_measurement(
         fields["handle"] = {
             **s.plant.nominal.handles(),
             "parameters": functions["dynamics"]["parameters"],
-            "unit": s.nominal_drive.gain,
+            "units": buffer.put(drive.gain for drive in s.nominal_drives),
         }
     return fields
 
@@ -525,21 +515,43 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     return rows
 
 
-def _moments(prepared: Prepared, rows: list[dict[str, Any]], buffer: Functions) -> dict[str, Any]:
-    """Return the fields of a record that say what the parts of these PARTs do, and the sensor."""
+def _drives(s: Resolved) -> list[dict[str, Any]]:
+    """Return the DRIVE of each channel; those without an actuator give no force."""
+    summed = set()
+    for part, _ in s.acting:
+        if part.sums_force:
+            summed |= {*part.channels(s.plant)}
+    limits = [*s.limits, *[0.0] * s.plant.free]
+    rows = []
+    for i, nominal in enumerate(s.nominal_drives):
+        row = {"limit": limits[i], "scale": 1.0, "sums_force": i in summed}
+        if i < s.plant.driven:
+            row |= {"scale": s.scales[i], "torque": s.torques[i]._asdict()}
+            row["accelerates"] = any(part.accelerates for part in s.chains[i])
+        rows.append(row | nominal._asdict())
+    return rows
+
+
+def _readers(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
+    """Return the READER of each channel; none without a sensor."""
     s = prepared.scenario.resolved
-    acting = [part for part, _ in s.acting]
+    rows: list[dict[str, Any]] = [{}] * s.plant.n
+    for sensor in s.sensors:
+        numbers = sensor.numbers(run_of(prepared, sensor))[0]
+        compiled = buffer.part(sensor, "read")
+        for i in sensor.channels(s.plant):
+            function = _function(compiled, numbers, buffer, sensor.memory)
+            rows[i] = {"function": function, "period": sensor.period or 0.0, "delay": sensor.delay}
+    return rows if s.sensors else []
+
+
+def _moments(prepared: Prepared, rows: list[dict[str, Any]], buffer: Functions) -> dict[str, Any]:
+    """Return the fields of a record that say what the parts of these PARTs do."""
     fields: dict[str, Any] = {
         "exerts": any(not row["acts"] and row["ctrl"] < 0 for row in rows),
         "reaches": any(row["acts"] for row in rows),
-        "has_drives": any(part.is_drive for part in acting),
-        "sums_force": any(part.sums_force for part in acting),
     }
-    for part in acting:
+    for part, _ in prepared.scenario.resolved.acting:
         if part.push is not None:
             fields["push"] = {"function": {"address": buffer.part(part, "push").address}}
-    if (sensor := s.sensor) is not None:
-        numbers = sensor.numbers(run_of(prepared, sensor))[0]
-        compiled = buffer.part(sensor, "read")
-        fields["read"] = _function(compiled, numbers, buffer, sensor.memory, s.plant.n)
     return fields

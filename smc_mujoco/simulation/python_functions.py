@@ -166,7 +166,8 @@ class NominalDynamics:
         if nominal is None:
             return np.zeros(len(self.x))
         values = Values(**self.scenario.plant.parameters)
-        return nominal.coriolis(self.x, self.v, w, values) / self.scenario.nominal_drive.gain
+        units = np.array([drive.gain for drive in self.scenario.nominal_drives])
+        return nominal.coriolis(self.x, self.v, w, values) / units
 
     def jacobian(self) -> np.ndarray:
         """Return the tip's Jacobian, (3, n)."""

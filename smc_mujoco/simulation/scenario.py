@@ -42,6 +42,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     Friction,
     NominalDrive,
     Part,
+    chains,
     drive_ids,
     joint_names,
     moves_alone,
@@ -169,8 +170,9 @@ class Scenario:
       mechanism: "equation", or the name of another mechanism that the plant offers.
       actuator: what is between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag and
         another drive; a Backlash may follow. None: the command is the force. u is limited to u_max
-        before the drives.
-      sensor: an Encoder, or None: position and velocity as they are, with `noise`.
+        before the drives. By name, {"shoulder": DCMotor(), "elbow": Lag(0.01)}, a driven joint has
+        its own.
+      sensor: an Encoder, or None: position and velocity as they are, with `noise`. By name, too.
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops
         it.
 
@@ -229,7 +231,7 @@ class Scenario:
     contact: tuple[Obstacle, ...] = field(coerce.contact, None)
     mechanism: str = field(coerce.mechanism, "equation")
     actuator: tuple[Actuator, ...] = field(coerce.actuator, None)
-    sensor: Encoder | None = field(coerce.instance(Encoder, "smc.Encoder(counts=...)"), None)
+    sensor: Encoder | tuple[Encoder, ...] | None = field(coerce.sensor, None)
     condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
     if TYPE_CHECKING:  # what the converters take, which a type checker cannot see
@@ -263,8 +265,8 @@ class Scenario:
             friction: coerce.Frictions | None = None,
             contact: Obstacle | str | Sequence[Obstacle | str] | None = None,
             mechanism: str = "equation",
-            actuator: Actuator | Sequence[Actuator] | None = None,
-            sensor: Encoder | None = None,
+            actuator: coerce.Actuators | None = None,
+            sensor: coerce.Sensors | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -408,8 +410,11 @@ class Scenario:
         "act", "force" or "stage_force", see hardware/moments.py.
         """
         drives: list[Part] = [Rotors()] if flies(self.plant) else []
-        if (effect := self.drive_step) is not None:
-            drives.append(Series(effect))
+        series: dict[DriveStep, list[int]] = {}
+        for i, effect in enumerate(self.drive_steps):
+            if effect is not None:
+                series.setdefault(effect, []).append(i)
+        drives += [Series(effect, tuple(channels)) for effect, channels in series.items()]
         acting = []
         for part in (*drives, *self.actuator):
             if part.act is not None:
@@ -421,14 +426,30 @@ class Scenario:
                 acting.append((part, "force"))
         return (*acting, *((part, "stage_force") for part in self.exact_parts))
 
+    @functools.cached_property
+    def chains(self) -> list[tuple[Actuator, ...]]:
+        """The actuators of each driven channel, in series."""
+        if not self.actuator:
+            return [()] * self.plant.driven
+        return chains(self.actuator, joint_names(self.plant)[: self.plant.driven])
+
+    @property
+    def sensors(self) -> tuple[Encoder, ...]:
+        """The encoders."""
+        return coerce.as_tuple(self.sensor)
+
+    def encoder(self, i: int) -> Encoder | None:
+        """Return the encoder of channel i."""
+        return next((part for part in self.sensors if i in part.channels(self.plant)), None)
+
     @property
     def voltage_motor(self) -> Actuator | None:
-        """The motor that has its voltage as u; None if u is no voltage."""
+        """A motor that has its voltage as u; None if no u is a voltage."""
         return next((part for part in self.actuator if part.unit), None)
 
     @property
     def accelerates(self) -> bool:
-        """Whether u is an acceleration."""
+        """Whether u is an acceleration, of any joint."""
         return any(part.accelerates for part in self.actuator)
 
     @property
@@ -441,11 +462,13 @@ class Scenario:
         """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
         acceleration.
         """
-        if self.accelerates:
-            return tuple(f"{unit}/s^2" for unit in self.plant.units)
-        if self.voltage_motor is None:
-            return self.plant.efforts
-        return (self.voltage_motor.unit,) * self.plant.n
+        efforts = list(self.plant.efforts)
+        for i, chain in enumerate(self.chains):
+            for part in chain:
+                if part.accelerates:
+                    efforts[i] = f"{self.plant.units[i]}/s^2"
+                efforts[i] = part.unit or efforts[i]
+        return tuple(efforts)
 
     @functools.cached_property
     def limits(self) -> tuple[float, ...]:
@@ -455,13 +478,17 @@ class Scenario:
         bounds = self.resolved.u_max
         if not isinstance(bounds, tuple):
             bounds = (bounds,) * self.plant.driven
-        if self.voltage_motor is not None:
-            most = self.voltage_motor.bound or math.inf
-            return tuple(min(bound, most) for bound in bounds)
-        if self.accelerates:  # the plant's limits are of a force
-            return bounds
         limits = self.plant.limits or bounds
-        return tuple(min(bound, limit) for bound, limit in zip(bounds, limits, strict=True))
+        found = []
+        for chain, bound, limit in zip(self.chains, bounds, limits, strict=True):
+            most = limit
+            for part in chain:
+                if part.accelerates:  # the plant's limits are of a force
+                    most = bound
+                elif part.unit:
+                    most = part.bound or math.inf
+            found.append(min(bound, most))
+        return tuple(found)
 
     @property
     def references(self) -> tuple[Signal, ...]:
@@ -496,9 +523,8 @@ class Scenario:
     @property
     def readings(self) -> int:
         """How many delayed readings of the sensor MuJoCo keeps."""
-        if self.sensor is None:
-            return 0
-        return self.sensor.readings(self.resolved.physics_step, self.plant.n)
+        step = self.resolved.physics_step
+        return max((sensor.readings(step, self.plant.n) for sensor in self.sensors), default=0)
 
     @functools.cached_property
     def delay_steps(self) -> int:
@@ -530,19 +556,32 @@ class Scenario:
         return math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
-    def torque(self) -> Torque:
-        """What MuJoCo's actuator makes of its control in a step with `exact_friction`."""
-        for part in self.actuator:
-            if part.even:
-                return part.mujoco_torque(self.resolved.physics_step, True)
-        return Torque()
+    def torques(self) -> list[Torque]:
+        """What MuJoCo's actuator of each driven channel makes of its control in a step with
+        `exact_friction`.
+        """
+        found = []
+        for chain in self.chains:
+            even = [
+                part.mujoco_torque(self.resolved.physics_step, True) for part in chain if part.even
+            ]
+            found.append(even[0] if even else Torque())
+        return found
 
     @property
-    def drive_step(self) -> DriveStep | None:
-        """What the drives do in a physics step; None if the actuators get the command itself."""
-        return drive_step(
-            self.actuator, self.resolved.physics_step, self.resolved.integrator == "RK4"
-        )
+    def scales(self) -> list[float]:
+        """The control of the actuator of each driven channel, per unit of u."""
+        return [math.prod(part.scale for part in chain) for chain in self.chains]
+
+    @functools.cached_property
+    def drive_steps(self) -> list[DriveStep | None]:
+        """What the drives of each driven channel do in a physics step; None where the actuator gets
+        the command itself.
+        """
+        rk4 = self.resolved.integrator == "RK4"
+        step = self.resolved.physics_step
+        effects = {chain: drive_step(chain, step, rk4) for chain in dict.fromkeys(self.chains)}
+        return [effects[chain] for chain in self.chains]
 
     @property
     def work(self) -> int:
@@ -557,11 +596,15 @@ class Scenario:
         return PROCESS + sum(random[:i]) if random[i] else 0
 
     @functools.cached_property
-    def nominal_drive(self) -> NominalDrive:
-        """The actuator in the nominal model: its force is gain u - drag v."""
-        if self.voltage_motor is None:
-            return NominalDrive()
-        return self.voltage_motor.nominal
+    def nominal_drives(self) -> list[NominalDrive]:
+        """The actuator of each channel, (n,), in the nominal model: its force is gain u - drag
+        v.
+        """
+        drives = [NominalDrive()] * self.plant.n
+        for i, chain in enumerate(self.chains):
+            for part in chain:
+                drives[i] = part.nominal if part.unit else drives[i]
+        return drives
 
     def factors(self, step: int) -> dict[str, float]:
         """Return parameter -> its factor at a physics step; for parameters in `plant.added`, the
@@ -621,9 +664,15 @@ def _defaults(s: Scenario) -> dict[str, Any]:
 
 
 def _default_bound(s: Scenario) -> float | tuple[float, ...]:
-    """Return the default of u_max: a motor's own, or what the plant suggests."""
-    own = [part.bound for part in s.actuator if part.bound is not None]
-    return own[0] if own else suggested_u_max(s.plant)
+    """Return the default of u_max: of each joint that of its motor, or what the plant suggests."""
+    suggested = suggested_u_max(s.plant)
+    if not any(part.bound is not None for part in s.actuator):
+        return suggested
+    bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
+    for i, chain in enumerate(s.chains):
+        for part in chain:
+            bounds[i] = bounds[i] if part.bound is None else part.bound
+    return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
 
 def longest_step(s: Scenario) -> float:
@@ -641,7 +690,8 @@ def longest_step(s: Scenario) -> float:
     if not (s.plain_equation or s.exact_friction):
         return min(REALISTIC_STEP, *bounds)
     longest = min(MAX_STEP, *bounds)
-    if len(s.actuator) == 1 and s.actuator[0].has_moment:
+    alone = all(len(chain) < 2 for chain in s.chains)
+    if alone and all(part.has_moment for part in s.actuator):
         return longest
     for part in s.actuator:
         if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited:
@@ -755,8 +805,8 @@ def check_clock(s: Resolved) -> None:
             "an earlier time"
         )
     s.failing()  # refuses an unknown one
-    if s.sensor is not None:
-        s.sensor.check(s.physics_step)
+    for sensor in s.sensors:
+        sensor.check(s.physics_step)
     s.clock.check(s.control_period, s.physics_step)
 
 
@@ -998,8 +1048,9 @@ def check_mechanism(s: Resolved) -> None:
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the "
             "integrator out"
         )
-    for part in s.actuator:
-        part.suits(s)
+    for chain in dict.fromkeys(s.chains):
+        for part in chain:
+            part.suits(s, chain)
     for part in s.friction:
         part.check(s.plant)
     for step in (0, s.samples * s.steps):
@@ -1077,12 +1128,12 @@ def _doubts(s: Resolved) -> Iterator[str]:
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
                 fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
                 yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
-    for motor in [part for part in s.actuator if part.stall is not None]:
-        for i, limit in enumerate(s.limits):
+    for i, chain in enumerate(s.chains):
+        for motor in [part for part in chain if part.stall is not None]:
             with np.errstate(all="ignore"):
                 f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
             need = abs(f) / abs(g) if g else 0.0
-            if (motor.stall or 0.0) < need and (need <= limit or not s.force_command):
+            if (motor.stall or 0.0) < need and (need <= s.limits[i] or not s.force_command):
                 yield (
                     f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} "
                     f"at rest, and channel {i} of {s.plant.name} needs {need:.3g} to hold its "

@@ -69,6 +69,8 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
             return {"sum": [_data(signal) for signal in signals]}
         case Signal() | Part():
             values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
+            if not isinstance(value, Friction) and not values.get("on", True):
+                del values["on"]
             return {
                 "kind": type(value).__name__,
                 "module": type(value).__module__,

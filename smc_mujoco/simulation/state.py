@@ -23,7 +23,6 @@ from smc_mujoco.mechanisms.hardware.moments import (
     REACH,
     JointState,
     Sight,
-    Torque,
 )
 from smc_mujoco.mechanisms.plant import SEEN
 
@@ -43,7 +42,6 @@ SIGHT = floats(Sight._fields)
 RAW = floats(("x", "v"))
 JOINT_STATE = floats(JointState._fields)
 EXERTED = floats(("force", "held"))
-TORQUE = floats(Torque._fields)
 
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
 # and of its arrays.
@@ -103,13 +101,11 @@ SIMULATION = np.dtype(
         ("states", "i8"),
         ("log", "i8"),
         ("disturbances", "i8"),
-        # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds
-        # (n,), ctrl per u
+        # the command: delay in physics steps, a ring of (delay_slots, n) commands; DRIVE (n,)
         ("delay", "i8"),
         ("delay_slots", "i8"),
         ("delay_buffer", "i8"),
-        ("limits", "i8"),
-        ("scale", "f8"),
+        ("drives", "i8"),
         # a fault of the actuators: its first physics step, gain, bias, whether they are stuck, and
         # the index of the one that fails, -1 for all
         ("fault_step", "i8"),
@@ -145,19 +141,11 @@ SIMULATION = np.dtype(
         ("arrived", "i8"),
         ("reaches", "i8"),
         ("reach", REACH),
-        # the drive: whether a part is it, whether that sums its force itself, whether u is an
-        # acceleration, and what MuJoCo makes of a control
-        ("has_drives", "i8"),
-        ("sums_force", "i8"),
-        ("accelerates", "i8"),
-        ("torque", TORQUE),
-        # the sensor: noise, what it reads, and its times
+        # the sensors: noise, and the address of READER (n,), 0 for none
         ("seed", "f8"),
         ("sigma_x", "f8"),
         ("sigma_v", "f8"),
-        ("read", FUNCTION),
-        ("read_period", "f8"),
-        ("read_delay", "f8"),
+        ("readers", "i8"),
         ("position_error", FUNCTION),
         ("velocity_error", FUNCTION),
         # functions, and whether the law may use the nominal model
@@ -174,9 +162,6 @@ SIMULATION = np.dtype(
         # they differ; 0: all have `law`, or `reference`
         ("laws", "i8"),
         ("references", "i8"),
-        # the drive as the nominal model knows it: force = gain u - drag v
-        ("drive_gain", "f8"),
-        ("drive_drag", "f8"),
         # what has been measured, and the address of estimated accelerations, (n,)
         ("seen", SEEN),
         ("a", "i8"),

@@ -19,6 +19,7 @@ from helpers.episodes import (
     run_of,
     start,
 )
+from helpers.own_parts import dahl, worn
 
 import smc_mujoco as smc
 from smc_mujoco.envs import tasks
@@ -57,6 +58,8 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
         {"friction": smc.Coulomb(0.1), "actuator": smc.Lag(0.02)},
         {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "x0": 0.3},
         {"mismatch": {"mass": 1.3}, "u_max": 2.0},
+        {"friction": dahl(level=0.1), "actuator": worn()},
+        {"actuator": smc.DCMotor(inductance=0.0, ripple=0.1), "friction": smc.Coulomb(0.1)},
         {"control_period": 0.01, "actuator": (smc.Lag(0.02), smc.DCMotor(), smc.Backlash(0.01))},
     ],
     ids=lambda changes: next(iter(changes)),
@@ -271,15 +274,11 @@ class Lost(smc.Signal):
         return (math.nan if t > p.after else 0.0), 0.0, 0.0
 
 
-UNEVEN = smc.DCMotor(inductance=0.0, ripple=0.1)
-
-
 def test_bad_input_is_one_sentence(refused):
     for make in (
         lambda: suite.load("duffing", "swing_up"),
         lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}),
         lambda: suite.load("duffing", changes={"u_max": np.inf}),
-        lambda: suite.load("duffing", changes={"actuator": UNEVEN}),
         lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}),
         lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}),
         lambda: suite.load("duffing", changes=3),

@@ -120,6 +120,7 @@ class Controller:
         t, s.
         """
         scenario = self.scenario
+        self.speeds = v
         n = len(x)
         driven = len(self.limits)
         feedforward = 0.0
@@ -213,16 +214,18 @@ class Controller:
         )
 
     def bounded_command(self, i: int, u: float, s: float) -> float:
-        """Return the command u of channel i within its bound, and keep it in `last_u`."""
+        """Return the command u of channel i within its bound, and keep its force in `last_u`."""
         limit = self.limits[i]
-        self.last_u[i] = min(max(u, -limit), limit)
+        bounded = min(max(u, -limit), limit)
         if not (
             math.isfinite(u)
             and math.isfinite(s)
             and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL
         ):
             raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
-        return self.last_u[i]
+        gain, drag = self.scenario.nominal_drives[i]
+        self.last_u[i] = gain * bounded - drag * self.speeds[i]
+        return bounded
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
         """Return nominal f and g of channel i, for the u of a driven channel."""
@@ -234,7 +237,7 @@ class Controller:
             self.values,
             self.last_u + self.reported,
         )
-        gain, drag = self.scenario.nominal_drive
+        gain, drag = self.scenario.nominal_drives[0]
         return f - drag * v[driven] * g + self.reported[i] * g, gain * g
 
 
@@ -281,7 +284,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
         M = np.diag(1.0 / per_u)
         h = -f / per_u
         g = -f_at_rest / per_u_at_rest
-    gain, drag = scenario.nominal_drive
+    gain, drag = scenario.nominal_drives[0]
     return Dynamics(M / gain, (h + drag * v) / gain, g / gain)
 
 

@@ -122,7 +122,7 @@ class Loop:
         self.d = np.zeros(n)  # disturbances at the last stage
         # sums over a control period: of the drives, of friction and contacts
         self.forces = np.zeros((2, n))
-        self.drive_step = scenario.drive_step
+        self.drive_step = scenario.drive_steps[0]
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         # the mean force in a step of RK4, and its rise to the last stage
@@ -191,13 +191,7 @@ class Loop:
             if stage == 0 and within == 0:
                 x = data.qpos[self.channels["qpos"]]
                 v = data.qvel[self.channels["qvel"]]
-                delayed = data.ctrl[self.channels["ctrl"]] / self.controller.scale
-                if self.drive_step or self.motors:
-                    delayed = self.delayed
-                applied = np.zeros(len(x))
-                limits = self.controller.limits
-                # the quotient may round to just beyond the limit
-                applied[self.driven] = np.clip(delayed[self.driven], -limits, limits)
+                applied = np.where(self.driven, self.delayed, 0.0)
                 sample = (
                     x,
                     v,
@@ -462,7 +456,7 @@ class Loop:
         for i, dof in enumerate(at["qvel"]):
             v = float(data.qvel[dof])
             if self.driven[i]:
-                drive = torque(self.scenario.torque, float(data.ctrl[at["ctrl"][i]]), v)
+                drive = torque(self.scenario.torques[i], float(data.ctrl[at["ctrl"][i]]), v)
             else:
                 drive = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof]) + d[i]

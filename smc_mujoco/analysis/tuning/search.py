@@ -508,7 +508,7 @@ def task_of(
     if first.accelerates:
         per_u = None
     else:
-        per_u = first.nominal_drive.gain
+        per_u = first.nominal_drives[0].gain
     scales = search_space.scales(first.plant, bound, reach, per_u)
     box = search_space.box(first.law, scales)
     low, high = np.log10(list(box.values())).T

@@ -162,7 +162,8 @@ def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
     if scenario.accelerates:
         return min(part.stall for part in scenario.actuator if part.stall is not None)
-    return min(scenario.limits) * scenario.nominal_drive.gain
+    drives = zip(scenario.limits, scenario.nominal_drives, strict=False)
+    return min(limit * drive.gain for limit, drive in drives)
 
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:
@@ -531,10 +532,11 @@ def _with_factor(scenario: Scenario, value: float, name: str) -> Scenario:
 
 
 def _with_counts(scenario: Scenario, counts: float) -> Scenario:
-    """Return the scenario with an encoder of so many counts; all else of its sensor stays."""
-    return dataclasses.replace(
-        scenario, sensor=dataclasses.replace(scenario.sensor or Encoder(), counts=round(counts))
-    )
+    """Return the scenario with encoders of so many counts; all else of its sensors stays."""
+    sensors = []
+    for sensor in scenario.sensors or (Encoder(),):
+        sensors.append(dataclasses.replace(sensor, counts=round(counts)))
+    return dataclasses.replace(scenario, sensor=sensors)
 
 
 def _with_bound(scenario: Scenario, factor: float) -> Scenario:

@@ -259,7 +259,7 @@ class Caption:
         left, top, right, bottom = self.badges[k].tolist()
         s = self.scale
         trace = self.traces[k]
-        sensor = trace.scenario.sensor
+        sensor = trace.scenario.encoder(0)
         assert sensor is not None
         count = sensor.quantum(trace.scenario.plant.unit == "rad")
         now, then = np.interp([time, time - sensor.delay], trace.t, trace.x[:, 0]) / count
@@ -335,7 +335,7 @@ def largest(scales: Mapping[Group, Scale], kind: str) -> str:
 
 def gauges(scenario: Scenario) -> bool:
     """Return whether a strip shows the counts of a scenario's encoder: for one channel."""
-    sensor = scenario.sensor
+    sensor = scenario.encoder(0)
     return sensor is not None and sensor.counts < math.inf and scenario.plant.n == 1
 
 

@@ -121,14 +121,15 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
     by_column = {}
     for i, name in enumerate(columns.x):
         x = trace.x[:, i]
-        if s.sensor:
-            x = x + s.sensor.bias
+        sensor = s.encoder(i)
+        if sensor is not None:
+            x = x + sensor.bias
         if noisy and s.noise.position:
             normals = []
             for k in range(len(x)):
                 normals.append(philox.normals(s.seed, i, philox.MEASUREMENT, k)[0])
             x = x + s.noise.position * np.array(normals)
-        if s.sensor and (quantum := s.sensor.quantum(s.plant.units[i] == "rad")):
+        if sensor is not None and (quantum := sensor.quantum(s.plant.units[i] == "rad")):
             x = quantum * np.floor(x / quantum + 0.5)
         by_column[name] = x
     return by_column

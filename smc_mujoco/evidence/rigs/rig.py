@@ -308,8 +308,8 @@ class Rig:
         for i, name in enumerate(names.x):
             x[:, i] = data[name][part]
             v[:, i] = records.rate(data[name], period)[part]
-        if scenario.sensor:
-            x -= scenario.sensor.bias
+        if scenario.sensors:
+            x -= scenario.sensors[0].bias  # of all joints
         u[:, 0] = data[names.u][part]
         if names.reference in data:
             r[:, 0] = data[names.reference][part]

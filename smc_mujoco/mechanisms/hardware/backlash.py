@@ -19,8 +19,8 @@ from smc_mujoco.mechanisms.hardware.part import (
     ROTOR,
     Actuator,
     Natural,
+    drive_ids,
     driven_ids,
-    drives,
 )
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
@@ -66,7 +66,7 @@ class Backlash(Actuator):
         rigid = compiled(spec.copy())
         pose = mujoco.MjData(rigid)
         mujoco.mj_kinematics(rigid, pose)
-        for actuator in drives(spec):
+        for actuator in self.drives_of(spec):
             joint = spec.joint(actuator.target)
             _add_rotor(spec, joint, rigid, pose)
             play = spec.add_tendon(name=PLAY + joint.name, limited=True, range=(-1.0, 1.0))
@@ -83,7 +83,8 @@ class Backlash(Actuator):
                 key.qpos = [start[joint.name.removeprefix(ROTOR)] for joint in spec.joints]
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        names = [model.joint(i).name for i in driven_ids(model)]
+        driven = dict(zip(drive_ids(model).tolist(), driven_ids(model), strict=True))
+        names = [model.joint(driven[i]).name for i in self.drive_ids(model).tolist()]
         rotors = [model.joint(ROTOR + name).dofadr[0] for name in names]
         yield Field(
             "tendon_range",

@@ -29,7 +29,7 @@ from numba.extending import register_jitable
 from smc_mujoco.common.constraints import Bound, Number, OneOf
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import floats, record_at
-from smc_mujoco.mechanisms.hardware.moments import Run, Torque, channel_at, state_at
+from smc_mujoco.mechanisms.hardware.moments import Run, Torque, channel_at, drive_at, state_at
 from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
     Natural,
@@ -37,8 +37,6 @@ from smc_mujoco.mechanisms.hardware.part import (
     Offset,
     Part,
     Positive,
-    drive_ids,
-    drives,
 )
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
@@ -242,8 +240,8 @@ class DCMotor(Actuator):
         # `rippled` bounds it before the ripple
         return 1.0, math.inf if self.ripple else self.voltage
 
-    def suits(self, s: Any) -> None:
-        if self.ripple and len(s.actuator) > 1:
+    def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
+        if self.ripple and len(chain) > 1:
             raise ScenarioError(
                 "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
             )
@@ -251,7 +249,7 @@ class DCMotor(Actuator):
     def edit(self, spec: mujoco.MjSpec) -> None:
         kind = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE)
         constants = (self.constant, self.constant)
-        for actuator in drives(spec):
+        for actuator in self.drives_of(spec):
             actuator.set_to_dcmotor(motorconst=constants, resistance=self.resistance, ctrlspec=kind)
             actuator.ctrllimited = True
             actuator.ctrlrange = (-1.0, 1.0)
@@ -259,7 +257,7 @@ class DCMotor(Actuator):
             actuator.forcerange = (-1.0, 1.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        ids = drive_ids(model)
+        ids = self.drive_ids(model)
         torque = self.constant * self.current
         rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
         share, voltage = self._share(model.opt.timestep, rk4)
@@ -404,9 +402,10 @@ kept_at = record_at(floats(("first", "second", "rise")))
 
 @dataclasses.dataclass(frozen=True)
 class Series(Part):
-    """The drives of a joint that the callback simulates."""
+    """The drives, in series, of joints that the callback simulates."""
 
     effect: DriveStep
+    of: tuple[int, ...]  # the channels
 
     is_drive = True
     memory = 3
@@ -424,7 +423,7 @@ class Series(Part):
         return [[*states, 0.0] for states in self.effect.start(np.array(run.v0)).T.tolist()]
 
     def channels(self, plant: Plant) -> Sequence[int]:
-        return range(plant.driven)
+        return self.of
 
     @staticmethod
     def act(sim, data, part):
@@ -436,12 +435,13 @@ class Series(Part):
         kept = kept_at(part.function.memory, 0)
         if sim.stage == 0:
             v = data.qvel[channel.shaft]
-            force = sim.scale * advanced(factors, kept, state.delayed, v)
+            scale = drive_at(sim.drives, i).scale
+            force = scale * advanced(factors, kept, state.delayed, v)
             if factors.ripple != 0.0:
                 force = rippled(factors, force, data.qpos[channel.qpos], v)
             if factors.rise_first != 0.0:
                 state.middle = force
-                kept.rise *= sim.scale
+                kept.rise *= scale
                 force -= kept.rise
             data.ctrl[channel.ctrl] = force
         elif factors.rise_first != 0.0:

@@ -22,8 +22,8 @@ import numpy as np
 from smc_mujoco.common.constraints import Finite, Natural, Positive, Probability, Whole
 from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
-from smc_mujoco.mechanisms.plant import Field
+from smc_mujoco.mechanisms.hardware.part import OnJoints, joint_ids
+from smc_mujoco.mechanisms.plant import Field, Plant
 
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which
 # have rounding errors.
@@ -34,8 +34,8 @@ READINGS_STEP = 64
 
 
 @dataclasses.dataclass(frozen=True)
-class Encoder(Part):
-    """A position encoder on every channel.
+class Encoder(OnJoints):
+    """A position encoder, on every channel that is measured or on some joints by name.
 
     Attributes:
       counts: per revolution of a hinge, or per metre of a slide; math.inf for no quantisation.
@@ -91,6 +91,9 @@ class Encoder(Part):
         memory[0], memory[1] = x, y.v
         return x, y.v
 
+    def channels(self, plant: Plant) -> Sequence[int]:
+        return super().channels(plant) if self.on else range(plant.n)
+
     def quantum(self, hinge: bool) -> float:
         """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""
         if self.counts == math.inf:
@@ -129,10 +132,13 @@ class Encoder(Part):
                 raise ScenarioError(f"Encoder's {name} {time:g} s is not {steps}")
 
     def fields(self, model):
-        """Yield the fields of delay and period of every channel's two sensors."""
+        """Yield the fields of delay and period of its channels' two sensors."""
         if model.nhistory:
             at = sensor_ids(model)
             channels = joint_ids(model).tolist()
+            if self.on:
+                named = [model.joint(name).id for name in self.on]
+                at = at[np.isin(model.sensor_objid[at], named)]
             delays = self.delay + self.skew * np.array(
                 [channels.index(joint) for joint in model.sensor_objid[at]]
             )

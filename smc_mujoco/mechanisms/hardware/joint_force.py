@@ -102,14 +102,14 @@ class Drive(JointPart, Actuator):
     in_callback = True
     is_drive = True
 
-    def suits(self, s: Any) -> None:
-        drives = [part for part in s.actuator if part.drives]
+    def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
+        drives = [part for part in chain if part.drives]
         if len(drives) > 1:
             raise ScenarioError(
                 f"actuator has the drives {shown(tuple(drives))}, and {type(self).__name__} takes "
                 "the command itself: give it alone, or with what follows a drive"
             )
-        self.check_lengths(s.plant, s.plant.driven)
+        self.check_lengths(s.plant, len(self.channels(s.plant)))
 
 
 def friction_function(

@@ -84,11 +84,40 @@ CHANNEL = np.dtype(
 #   held: s of a control period for which friction held the joint
 CHANNEL_STATE = floats(("delayed", "force", "reaction", "middle", "exerted", "held"))
 
+
+class Torque(NamedTuple):
+    """How MuJoCo's actuator turns its control into a force on a joint. By default the control is
+    the force.
+    """
+
+    gain: float = 1.0
+    drag: float = 0.0  # N m s/rad (N s/m)
+    most: float = math.inf  # bound on the control
+    limit: float = math.inf  # N m (N)
+
+
+# What is between a channel's command and its force: the bound on u; the control of its actuator per
+# unit of u; the force as a law's model knows it, gain u - drag v; whether u is an acceleration;
+# whether a part sums the force itself; and what MuJoCo makes of a control.
+DRIVE = np.dtype(
+    [
+        ("limit", "f8"),
+        ("scale", "f8"),
+        ("gain", "f8"),
+        ("drag", "f8"),
+        ("accelerates", "f8"),
+        ("sums_force", "f8"),
+        ("torque", floats(Torque._fields)),
+    ]
+)
+
 # A compiled function: its address, those of its parameters and of its memory, and the bytes of
 # memory a channel has.
 FUNCTION = np.dtype(
     [(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True
 )
+# The sensor of a channel: its function, 0 without one; s between readings, and until one arrives.
+READER = np.dtype([("function", FUNCTION), ("period", "f8"), ("delay", "f8")], align=True)
 # What a part does on one joint, or as a whole (channel -1): its function, whether this is `act`,
 # whether a force is of every stage, and where in ctrl a force goes (-1: to qfrc_applied).
 PART = np.dtype(
@@ -110,8 +139,8 @@ Reach = namedtuple(
 )
 REACH = np.dtype([(name, "i8") for name in Reach._fields])  # their addresses
 
-channel_at, state_at, function_at, part_at = map(
-    record_at, (CHANNEL, CHANNEL_STATE, FUNCTION, PART)
+channel_at, state_at, drive_at, reader_at, function_at, part_at = map(
+    record_at, (CHANNEL, CHANNEL_STATE, DRIVE, READER, FUNCTION, PART)
 )
 
 
@@ -204,17 +233,6 @@ class Run:
     def phases(self) -> list[float]:
         """Random numbers 0 .. 1 of the joints."""
         return self.draw()
-
-
-class Torque(NamedTuple):
-    """How MuJoCo's actuator turns its control into a force on a joint. By default the control is
-    the force.
-    """
-
-    gain: float = 1.0
-    drag: float = 0.0  # N m s/rad (N s/m)
-    most: float = math.inf  # bound on the control
-    limit: float = math.inf  # N m (N)
 
 
 @register_jitable

@@ -100,24 +100,18 @@ class Part:
 
 
 @dataclasses.dataclass(frozen=True)
-class Friction(Part):
-    """Base of frictions, which resist a joint's motion beside the plant's own damping.
+class OnJoints(Part):
+    """Base of parts that a scenario gives to some joints, or to all that take one.
 
     Attributes:
-      on: names of the joints that it acts on, as a scenario's mapping from joints to frictions sets
+      on: names of the joints that it acts on, as a scenario's mapping from joints to parts sets
         them; without any, the joints that an actuator drives.
     """
-
-    # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most
-    # one friction may.
-    bristles: ClassVar[bool] = False
-    smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
-    forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
     on: tuple[str, ...] = dataclasses.field(default=(), kw_only=True)
 
     def __init_subclass__(cls) -> None:
-        cls.__repr__ = Friction.__repr__  # dataclasses keep it
+        cls.__repr__ = OnJoints.__repr__  # dataclasses keep it
 
     def __repr__(self) -> str:
         words = [f"{name}={value!r}" for name, value in stated(self).items()]
@@ -125,6 +119,26 @@ class Friction(Part):
 
     def structure(self) -> Hashable:
         return type(self), self.on
+
+    def channels(self, plant: Plant) -> Sequence[int]:
+        if not self.on:
+            return range(plant.driven)
+        return [joint_names(plant).index(name) for name in self.on]
+
+    def joint_names(self, plant: Plant) -> tuple[str, ...]:
+        """Return the names of the plant's joints that it acts on."""
+        return self.on or joint_names(plant)[: plant.driven]
+
+
+@dataclasses.dataclass(frozen=True)
+class Friction(OnJoints):
+    """Base of frictions, which resist a joint's motion beside the plant's own damping."""
+
+    # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most
+    # one friction may.
+    bristles: ClassVar[bool] = False
+    smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
+    forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""
@@ -135,14 +149,6 @@ class Friction(Part):
         """Return the degrees of freedom that it acts on."""
         named = [model.joint(name).dofadr[0] for name in self.on]
         return np.array(named or dof_ids(model)[: len(drive_ids(model))], int)
-
-    def channels(self, plant: Plant) -> Sequence[int]:
-        names = joint_names(plant)
-        return [names.index(name) for name in self.joint_names(plant)]
-
-    def joint_names(self, plant: Plant) -> tuple[str, ...]:
-        """Return the names of the plant's joints that it acts on."""
-        return self.on or joint_names(plant)[: plant.driven]
 
     def scaled(self, factor: float) -> "Friction":
         """Return this friction with a factor on its force."""
@@ -176,7 +182,7 @@ class NominalDrive(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Actuator(Part):
+class Actuator(OnJoints):
     """Base of actuators, which stand between the command u, the wanted force or a voltage, and the
     joint.
     """
@@ -198,16 +204,32 @@ class Actuator(Part):
     longest_step: ClassVar[float] = math.inf  # s, of the default physics step
     nominal: ClassVar[NominalDrive] = NominalDrive()  # what the law's model knows of it
 
-    def channels(self, plant: Plant) -> Sequence[int]:
-        return range(plant.driven)
+    def drives_of(self, spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
+        """Return the actuators that it changes."""
+        if not self.on:
+            return drives(spec)
+        return [drive for drive in drives(spec) if drive.target.removeprefix(ROTOR) in self.on]
+
+    def drive_ids(self, model: mujoco.MjModel) -> np.ndarray:
+        """Return their indices in the compiled model."""
+        ids = drive_ids(model)
+        named = [model.joint(name).id for name in self.on]
+        return ids[np.isin(driven_ids(model), named)] if named else ids
 
     def mujoco_torque(self, step: float, rk4: bool) -> Torque:
         """Return how MuJoCo computes its force in a physics step, s."""
         del step, rk4
         return Torque()
 
-    def suits(self, s: Any) -> None:
-        """Raise ScenarioError if it does not suit the other fields of a resolved scenario."""
+    def suits(self, s: Any, chain: Sequence["Actuator"]) -> None:
+        """Raise ScenarioError if it does not suit the other fields of a resolved scenario, or the
+        actuators of a joint, of which it is one.
+        """
+
+
+def chains(parts: Sequence[Actuator], joints: Sequence[str]) -> list[tuple[Actuator, ...]]:
+    """Return the actuators of each joint."""
+    return [tuple(part for part in parts if not part.on or joint in part.on) for joint in joints]
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:

@@ -23,7 +23,7 @@ from smc_mujoco.common.constraints import Number, Whole
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import floats, pointer, record_at
 from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
-from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive, drive_ids, drives
+from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive
 from smc_mujoco.mechanisms.plant import Field
 
 LONGEST_STEP = 2.5e-4  # s, of physics; chosen
@@ -147,14 +147,14 @@ class Stepper(Actuator):
         """The default of u_max, rad/s^2 (m/s^2)."""
         return self.ramp
 
-    def suits(self, s: Any) -> None:
+    def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
         if s.fault is not None:
             raise ScenarioError(
                 "a Stepper takes an acceleration, and a Fault is of a force: leave one of them out"
             )
-        if len([part for part in s.actuator if part.drives]) > 1:
+        if len([part for part in chain if part.drives]) > 1:
             raise ScenarioError(
-                f"a Stepper is behind {shown(s.actuator[0])}, and its firmware takes numbers, no "
+                f"a Stepper is behind {shown(chain[0])}, and its firmware takes numbers, no "
                 "force: leave that out, or give input_delay"
             )
         if s.law.joint and s.model != "none":
@@ -165,12 +165,12 @@ class Stepper(Actuator):
             )
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        for actuator in drives(spec):
+        for actuator in self.drives_of(spec):
             actuator.set_to_motor()
             actuator.ctrllimited = actuator.forcelimited = False
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        driven = model.jnt_dofadr[model.actuator_trnid[drive_ids(model), 0]]
+        driven = model.jnt_dofadr[model.actuator_trnid[self.drive_ids(model), 0]]
         yield Field("dof_armature", driven, self.gear**2 * self.rotor_inertia, adds=True)
         yield Field("dof_damping", driven, self.gear**2 * self.damping, adds=True)
 

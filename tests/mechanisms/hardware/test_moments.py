@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from helpers.own_parts import dahl
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
@@ -15,14 +16,6 @@ from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import ScenarioBatch
 
 H = 2.5e-4
-
-
-@friction_function(numbers={"stiffness": 500.0, "level": 0.3}, memory=1)
-def dahl(y, p, memory):
-    """Elastic friction: z' = v (1 - stiffness z / level sgn v)."""
-    z = memory[0]
-    memory[0] = z + y.h * y.v * (1.0 - p.stiffness * z / p.level * math.copysign(1.0, y.v))
-    return -p.stiffness * z
 
 
 @friction_function(numbers={"cold": 0.1, "heat": 5.0}, memory=1)
