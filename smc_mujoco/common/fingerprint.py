@@ -38,6 +38,7 @@ from smc_mujoco.common.rebuild import names_in
 PACKAGE = Path(__file__).parents[1]
 # folders that are in the package in a wheel, and beside it in a checkout
 BESIDE_PACKAGE = ("models", "scenes", "benchmarks")
+PAPERS = "benchmarks/papers"
 PRESENTATION = (
     "evidence/report",
     "evidence/commands",
@@ -90,7 +91,9 @@ def package(*without: str) -> str:
         name = path.relative_to(PACKAGE)
         if not any(map(name.is_relative_to, left_out)):
             files[name] = path
-    files |= {Path("models") / path.name: path for path in shipped("models").rglob("*")}
+    for folder in {"models", PAPERS} - {*without}:
+        home = shipped(folder)
+        files |= {Path(folder, path.relative_to(home)): path for path in home.rglob("*")}
     digest = hashlib.sha256()
     for name, path in sorted(files.items()):
         if path.suffix in (".py", ".xml", ".json", ".toml"):

@@ -30,7 +30,14 @@ NOT_OF_CONDITION = (
     "condition",
 )
 # of this package, which do not affect runs
-UNRELATED = ("evidence/audit", "evidence/papers", "draw", "testing", "control/tuned_gains")
+UNRELATED = (
+    "evidence/audit",
+    "evidence/papers",
+    fingerprint.PAPERS,
+    "draw",
+    "testing",
+    "control/tuned_gains",
+)
 MAX_NAME = 60  # characters of a condition's name
 
 

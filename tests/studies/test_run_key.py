@@ -301,7 +301,7 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
 
     same = now()
     (package / "evidence" / "report" / "words.py").write_text("# other words")
-    (package / "evidence" / "papers" / "gaber" / "claims.py").write_text("# other claims")
+    (package / "evidence" / "papers" / "measures.py").write_text("# other measures")
     assert now() == same
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same

@@ -62,7 +62,7 @@ def document(audit: Any) -> dict[str, Any]:
             "smc_mujoco": __version__,
             **{name: version(name) for name in ("mujoco", "numba", "numpy")},
             "python": f"{sys.version_info.major}.{sys.version_info.minor}",
-            "code": fingerprint.package("testing", "draw", "evidence/papers/gaber"),
+            "code": fingerprint.package("testing", "draw", fingerprint.PAPERS),
         },
         "quick": audit.quick,
         "left_out": [id for id in audit.paper.claims if id not in audit.used],

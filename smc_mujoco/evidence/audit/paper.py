@@ -41,7 +41,6 @@ from smc_mujoco.evidence.audit.verdict import (
     Statement,
     Threshold,
 )
-from smc_mujoco.evidence.papers import gaber
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -212,10 +211,8 @@ class Paper:
 
 def shipped() -> dict[str, Path]:
     """Return name -> folder of every paper that ships, in alphabetical order."""
-    found = {"gaber": Path(gaber.__file__).parent}
-    for path in files.shipped("benchmarks/papers").glob(f"*/{PAPER_FILE}"):
-        found[path.parent.name] = path.parent
-    return dict(sorted(found.items()))
+    home = files.shipped("benchmarks/papers")
+    return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{PAPER_FILE}"))}
 
 
 Home = tuple[Path, str]  # a paper's folder, and the name under which it is imported
@@ -227,7 +224,6 @@ def catalogue() -> Catalogue[Home]:
     of_suite = {}
     for name, folder in shipped().items():
         of_suite[name] = (folder, _package(folder))
-    of_suite["gaber"] = (of_suite["gaber"][0], gaber.__name__)
     return Catalogue(of_suite, added("smc_mujoco.papers", _of_package))
 
 

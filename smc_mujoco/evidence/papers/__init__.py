@@ -1,3 +1,1 @@
-"""Papers as data, a folder for each: its claims in paper.toml, and how they are measured in
-claims.py.
-"""
+"""What the audits in benchmarks/papers share, and the study of Gaber's paper."""

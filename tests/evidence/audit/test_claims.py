@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from papers.gaber.claims import OURS
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import critical_delay
@@ -32,9 +33,7 @@ from smc_mujoco.evidence.audit.verdict import (
     ratio,
     verdict,
 )
-from smc_mujoco.evidence.papers.gaber import claims as measured
 from smc_mujoco.evidence.papers.gaber import lyapunov
-from smc_mujoco.evidence.papers.gaber.claims import OURS
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
@@ -42,6 +41,8 @@ from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.run_key import key
 
 GABER = paper("gaber")
+CODE = GABER.claims["14"].evidence.__globals__  # of its claims.py
+measured = SimpleNamespace(**CODE)
 LIST = """1 3 4 5 7 10 11 12 13 14 15 18 19 20 21 24 25 27 28 29 31 32 33 34 35 36 37 38 39 40
           45 46 48 49 50 51 52 55 56 57 59 61 T"""
 UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}

@@ -7,6 +7,7 @@ import math
 import re
 import zlib
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,6 @@ from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
-from smc_mujoco.evidence.papers.gaber import claims as measured
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
 from smc_mujoco.metrics.catalogue import metrics
@@ -28,6 +28,8 @@ from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.studies.run_key import description
 
 GABER = paper("gaber")
+CODE = GABER.claims["14"].evidence.__globals__  # of its claims.py
+measured = SimpleNamespace(**CODE)
 OURS = "observer_free"
 CLASSICAL = "classical"
 ADAPTIVE = "adaptive"
@@ -132,7 +134,7 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
 
     What is measured at several places is told by its mean, its ends and their number.
     """
-    monkeypatch.setattr(measured, "nanoseconds", lambda laws: {law: 1.0 + len(law) for law in laws})
+    monkeypatch.setitem(CODE, "nanoseconds", lambda laws: {law: 1.0 + len(law) for law in laws})
 
     def reported(s: Scenario) -> dict[str, float]:
         found = lots(s, *(m.name for m in metrics()))
@@ -433,7 +435,7 @@ def test_the_plane_shows_a_rise_of_v_if_there_is_one(rate, expected, monkeypatch
 def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
     """Claim 14; another may be slower."""
     reported = {OURS: time, CLASSICAL: 1.0}
-    monkeypatch.setattr(measured, "nanoseconds", lambda laws: dict.fromkeys(laws, 9.0) | reported)
+    monkeypatch.setitem(CODE, "nanoseconds", lambda laws: dict.fromkeys(laws, 9.0) | reported)
     assert judged(Stub(), "14") == expected
 
 

@@ -1,0 +1,1 @@
+"""Paper gaber: claims in paper.toml, measured in claims.py."""
