@@ -70,13 +70,13 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
         moved[i] |= moved[model.body_parentid[i]]
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos  # the start, of a free body also the goal
-    apart = "<exclude> that pair"
+    apart = "another keyframe, or <exclude> that pair in the file"
     if source.label.lower().endswith(".urdf"):
-        apart = "leave out the <collision> of one"
+        apart = "one of these links no <collision> in the file"
     if model.joint(joints[0]).type[0] != own.FREE:
         for joint, x in zip(joints, own.goals(model, joints, keyframe)[0], strict=True):
             at.qpos[model.joint(joint).qposadr[0]] = x
-    for what, cure in (("goal", "another keyframe"), ("start", "another x0")):
+    for what, cure in (("goal", apart), ("start", "another x0")):
         mujoco.mj_fwdPosition(model, at)
         for contact in at.contact:
             bodies = model.geom_bodyid[contact.geom]
@@ -87,7 +87,7 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
                 )
                 raise ScenarioError(
                     f"the {what} of {source.label} has {first!r} {-1e3 * contact.dist:.0f} mm "
-                    f"inside {second!r}: give {cure}, or {apart} in the file"
+                    f"inside {second!r}: give {cure}"
                 )
         at.qpos[:] = data.qpos
 

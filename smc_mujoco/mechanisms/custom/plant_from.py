@@ -260,8 +260,8 @@ def plant_from(
 
 
 def soft(label: str, made: Plant) -> list[str]:
-    """Return a sentence each on joint limits, contacts and equality constraints that give way to a
-    blow of 1 rad/s (m/s) by more than GIVE, and on dry friction that creeps.
+    """Return a sentence on joint limits, contacts and equality constraints that give way to a blow
+    of 1 rad/s (m/s) by more than GIVE, and one on dry friction that creeps.
 
     A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
     by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
@@ -274,7 +274,7 @@ def soft(label: str, made: Plant) -> list[str]:
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    sentences = []
+    parts = []
 
     def tell(what: str, option: str, solref: np.ndarray, solimp: np.ndarray, load: float) -> None:
         first, second = solref.T
@@ -284,11 +284,7 @@ def soft(label: str, made: Plant) -> list[str]:
         blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
         rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
         if blow > GIVE:
-            sentences.append(
-                f"the {what} of {label} give way by {1e3 * blow:.2g} mrad (mm) to a blow of 1 "
-                f"rad/s (m/s), and by about {1e3 * rest:.1g} to its weight, in the same unit: a "
-                f"smaller first number of {option} in the file makes them harder"
-            )
+            parts.append(f"{what} by {1e3 * blow:.2g} mrad (mm) and {1e3 * rest:.1g} ({option})")
 
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags
@@ -309,6 +305,12 @@ def soft(label: str, made: Plant) -> list[str]:
         held = model.eq_active0 > 0
         tell(
             "equality constraints", "solref", model.eq_solref[held], model.eq_solimp[held], gravity
+        )
+    sentences = []
+    if parts:
+        sentences.append(
+            f"{label} gives way to a blow of 1 rad/s (m/s), and about so far to its weight: "
+            f"{', '.join(parts)}; a smaller first number of that option in the file makes it harder"
         )
     kinds = mujoco.mjtConstraint
     dry = np.isin(data.efc_type, (kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON))

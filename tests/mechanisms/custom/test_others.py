@@ -366,7 +366,9 @@ def test_a_goal_inside_something_is_refused_and_each_cure_works(cure):
 def test_a_link_of_a_urdf_that_starts_inside_another_may_lose_its_collision(tmp_path):
     file = tmp_path / "block.urdf"
     file.write_text(URDF.format(shape=SHAPE))
-    with pytest.raises(smc.ScenarioError, match=r"mm inside .*leave out the <collision> of one"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"mm inside .*give one of these links no <collision>"
+    ):
         smc.plant_from(file, {"j": smc.Channel(motor=True)})
     file.write_text(URDF.format(shape=""))
     assert smc.plant_from(file, {"j": smc.Channel(motor=True)}).n == 1

@@ -744,7 +744,7 @@ def test_dry_friction_that_creeps_is_told_with_its_speed_and_each_cure_holds(kin
     assert np.abs(held.v[-1]).max() < (2e-5 if solref else 1e-9)
 
 
-@pytest.mark.filterwarnings("always:the equality constraints of")
+@pytest.mark.filterwarnings("always:.* gives way")
 @pytest.mark.parametrize("solref", [".02 1", ".04 .5", "-900 -60"])
 def test_a_warning_says_how_far_an_equality_gives_way(solref):
     text = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="j" type="slide"
@@ -757,7 +757,7 @@ def test_a_warning_says_how_far_an_equality_gives_way(solref):
     assert 1e-3 * told == pytest.approx(trace.x.max(), rel=0.15)
 
 
-@pytest.mark.filterwarnings("default:the joint limits of")
+@pytest.mark.filterwarnings("default:.* gives way")
 @pytest.mark.parametrize("solref", [".02 1", ".03 .5", ".01 2", "-2500 -100"])
 @pytest.mark.parametrize("speed", [1.0, 4.0])
 def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
