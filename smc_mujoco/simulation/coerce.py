@@ -405,14 +405,11 @@ def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder,
     """Return the encoder of all channels, or those of some joints."""
     if value is None:
         return None
-    example = "smc.Encoder(counts=...)"
-    items = _by_joint(name, value, s, Encoder, example, joint_names(s.plant))
-    taken: list[str] = []
-    for part in items:
-        joints = part.on or joint_names(s.plant)
-        if both := [joint for joint in joints if joint in taken]:
-            raise ScenarioError(f"{name} has two encoders on joint {both[0]!r}: give one")
-        taken += joints
+    joints = joint_names(s.plant)
+    items = _by_joint(name, value, s, Encoder, "smc.Encoder(counts=...)", joints)
+    for joint, taken in zip(joints, chains(items, joints), strict=True):
+        if len(taken) > 1:
+            raise ScenarioError(f"{name} has two encoders on joint {joint!r}: give one")
     if len(items) == 1 and not items[0].on:
         return items[0]
     return tuple(items) or None

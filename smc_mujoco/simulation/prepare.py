@@ -527,7 +527,7 @@ def _drives(s: Resolved) -> list[dict[str, Any]]:
         row = {"limit": limits[i], "scale": 1.0, "sums_force": i in summed}
         if i < s.plant.driven:
             row |= {"scale": s.scales[i], "torque": s.torques[i]._asdict()}
-            row["accelerates"] = any(part.accelerates for part in s.chains[i])
+            row["accelerates"] = s.motors[i].accelerates
         rows.append(row | nominal._asdict())
     return rows
 

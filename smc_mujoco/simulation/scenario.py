@@ -433,6 +433,17 @@ class Scenario:
             return [()] * self.plant.driven
         return chains(self.actuator, joint_names(self.plant)[: self.plant.driven])
 
+    @functools.cached_property
+    def motors(self) -> list[Actuator]:
+        """The motor of each driven channel whose u is no force; else an Actuator that does
+        nothing.
+        """
+        found = []
+        for chain in self.chains:
+            special = (part for part in chain if part.unit or part.accelerates)
+            found.append(next(special, Actuator()))
+        return found
+
     @property
     def sensors(self) -> tuple[Encoder, ...]:
         """The encoders."""
@@ -463,11 +474,10 @@ class Scenario:
         acceleration.
         """
         efforts = list(self.plant.efforts)
-        for i, chain in enumerate(self.chains):
-            for part in chain:
-                if part.accelerates:
-                    efforts[i] = f"{self.plant.units[i]}/s^2"
-                efforts[i] = part.unit or efforts[i]
+        for i, motor in enumerate(self.motors):
+            efforts[i] = motor.unit or efforts[i]
+            if motor.accelerates:
+                efforts[i] = f"{self.plant.units[i]}/s^2"
         return tuple(efforts)
 
     @functools.cached_property
@@ -480,14 +490,13 @@ class Scenario:
             bounds = (bounds,) * self.plant.driven
         limits = self.plant.limits or bounds
         found = []
-        for chain, bound, limit in zip(self.chains, bounds, limits, strict=True):
-            most = limit
-            for part in chain:
-                if part.accelerates:  # the plant's limits are of a force
-                    most = bound
-                elif part.unit:
-                    most = part.bound or math.inf
-            found.append(min(bound, most))
+        for motor, bound, limit in zip(self.motors, bounds, limits, strict=True):
+            if motor.accelerates:  # the plant's limits are of a force
+                found.append(bound)
+            elif motor.unit:
+                found.append(min(bound, motor.bound or math.inf))
+            else:
+                found.append(min(bound, limit))
         return tuple(found)
 
     @property
@@ -600,11 +609,7 @@ class Scenario:
         """The actuator of each channel, (n,), in the nominal model: its force is gain u - drag
         v.
         """
-        drives = [NominalDrive()] * self.plant.n
-        for i, chain in enumerate(self.chains):
-            for part in chain:
-                drives[i] = part.nominal if part.unit else drives[i]
-        return drives
+        return [motor.nominal for motor in self.motors] + [NominalDrive()] * self.plant.free
 
     def factors(self, step: int) -> dict[str, float]:
         """Return parameter -> its factor at a physics step; for parameters in `plant.added`, the
@@ -669,9 +674,8 @@ def _default_bound(s: Scenario) -> float | tuple[float, ...]:
     if not any(part.bound is not None for part in s.actuator):
         return suggested
     bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
-    for i, chain in enumerate(s.chains):
-        for part in chain:
-            bounds[i] = bounds[i] if part.bound is None else part.bound
+    for i, motor in enumerate(s.motors):
+        bounds[i] = bounds[i] if motor.bound is None else motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
 

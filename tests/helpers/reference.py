@@ -15,7 +15,7 @@ import numpy as np
 from helpers.python_controller import Controller
 from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
-from smc_mujoco.mechanisms.hardware.drives import rippled
+from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, rippled
 from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.moments import torque
 from smc_mujoco.mechanisms.hardware.part import joint_names
@@ -64,6 +64,17 @@ def evaluate_friction(
         return type(formula).value(v, motor, load, numbers)
     except Exception as error:
         raise failure_of(f"friction {type(formula).__name__}", error, channel=i) from error
+
+
+def advance(
+    effect: DriveStep, u: np.ndarray, first: np.ndarray, second: np.ndarray, v: np.ndarray
+) -> np.ndarray:
+    """Return the mean force over a step and both states at its end, (3, ...), without compiling."""
+    found = []
+    for command, one, other, speed in zip(u, first, second, v, strict=True):
+        kept = SimpleNamespace(first=one, second=other)
+        found.append((advanced.py_func(effect, kept, command, speed), kept.first, kept.second))
+    return np.array(found).T
 
 
 class Motor:
@@ -248,7 +259,8 @@ class Loop:
             self.rise = self.controller.scale * (
                 self.drive_step.rise_first * (self.first - command)
             )
-            command, self.first, self.second = self.drive_step(command, self.first, self.second, v)
+            states = advance(self.drive_step, command, self.first, self.second, v)
+            command, self.first, self.second = states
         control = self.middle = self.controller.scale * command
         control = control - self.rise
         if self.drive_step and self.drive_step.ripple:

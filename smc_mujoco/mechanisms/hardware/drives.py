@@ -320,38 +320,6 @@ class DriveStep(NamedTuple):
         """
         return np.array([np.zeros_like(v), self.drag * v])
 
-    def __call__(
-        self, u: np.ndarray, first: np.ndarray, second: np.ndarray, v: np.ndarray
-    ) -> tuple[np.ndarray, ...]:
-        """Return the mean force over a step, and both states at its end; all have the shape of u
-        and the speeds v.
-        """
-        a = first - u
-        b = second - u
-        force = u + self.force_first * a
-        first_after = u + self.first_left * a
-        if self.voltage:
-            torque = second - self.drag * v
-            mean = np.clip(force, -self.voltage, self.voltage)
-            end = np.clip(u + self.second_first * a, -self.voltage, self.voltage)
-            force = mean + self.force_second * (torque - mean) - self.force_drag * v
-            return (
-                force,
-                first_after,
-                end + self.second_left * (torque - end) - self.second_drag * v,
-            )
-        if not self.reach:
-            return (
-                force + self.force_second * b,
-                first_after,
-                u + self.second_first * a + self.second_left * b,
-            )
-        end = np.clip(first_after, second - self.reach, second + self.reach)
-        # closed at the limit's rate
-        gap = np.clip(u + self.lagged * a - second, -self.reach, self.reach)
-        passing = force - 0.5 * gap * np.abs(gap) / self.reach
-        return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
-
 
 @register_jitable
 def rippled(motor, V, x, v):

@@ -13,7 +13,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 import mujoco
 import numpy as np
@@ -25,6 +25,8 @@ from smc_mujoco.common.text import stated
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import Run, Torque
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
+
+P = TypeVar("P", bound="OnJoints")
 
 PASSIVE = "passive:"
 ROTOR = "rotor:"
@@ -227,8 +229,8 @@ class Actuator(OnJoints):
         """
 
 
-def chains(parts: Sequence[Actuator], joints: Sequence[str]) -> list[tuple[Actuator, ...]]:
-    """Return the actuators of each joint."""
+def chains(parts: Sequence[P], joints: Sequence[str]) -> list[tuple[P, ...]]:
+    """Return those of the parts that each joint has."""
     return [tuple(part for part in parts if not part.on or joint in part.on) for joint in joints]
 
 

@@ -106,12 +106,11 @@ def spun(rotor, W, c, t):
         b = rotor.fall2
     z = W - c
     first = a + 2.0 * b * c
-    left = math.exp(-first * t)
-    if first == 0.0:
+    if t != 0.0:
         passed = t
-    else:
-        passed = -math.expm1(-first * t) / first
-    z *= left / (1.0 + b * z * passed)
+        if first != 0.0:
+            passed = -math.expm1(-first * t) / first
+        z *= math.exp(-first * t) / (1.0 + b * z * passed)
     return c + z, -(first + b * z) * z
 
 
@@ -124,17 +123,39 @@ def speeds_at_start(model: mujoco.MjModel, numbers: np.ndarray) -> list[float]:
 
 @njit(error_model="numpy")
 def _command(sim, data, part, lifted):
-    """Tell the rotors their speeds while all of them give the thrust `lifted`, N, and return what
-    they then give in the middle of the step.
-    """
-    after = 0.0
+    """Tell the rotors their speeds while all of them give the thrust `lifted`, N."""
+    for j in range(sim.actuators):
+        rotor = rotor_at(data.actuator_user, j)
+        delayed = state_at(sim.states, j).delayed
+        speed = speed_for(rotor, delayed) * max(0.0, 1.0 - rotor.sag * lifted)
+        kept_at(part.function.memory, j).second = speed
+
+
+@njit(error_model="numpy")
+def _begin_step(sim, data, part):
+    """Turn the rotors to the step, and tell them their speeds in it."""
+    lifted = 0.0
+    sags = False
     for j in range(sim.actuators):
         rotor = rotor_at(data.actuator_user, j)
         kept = kept_at(part.function.memory, j)
-        delayed = state_at(sim.states, j).delayed
-        kept.second = speed_for(rotor, delayed) * max(0.0, 1.0 - rotor.sag * lifted)
-        after += thrust_at(rotor, spun(rotor, kept.first, kept.second, 0.5 * sim.step)[0])
-    return after
+        if sim.now > 0:
+            kept.first = spun(rotor, kept.first, kept.second, sim.step)[0]
+        lifted += thrust_at(rotor, kept.first)
+        sags |= rotor.sag != 0.0
+    _command(sim, data, part, lifted)
+    if sags:  # by the thrust in the middle of the step
+        lifted = 0.0
+        for j in range(sim.actuators):
+            rotor = rotor_at(data.actuator_user, j)
+            kept = kept_at(part.function.memory, j)
+            lifted += thrust_at(rotor, spun(rotor, kept.first, kept.second, 0.5 * sim.step)[0])
+        _command(sim, data, part, lifted)
+    for j in range(sim.actuators):
+        rotor = rotor_at(data.actuator_user, j)
+        kept = kept_at(part.function.memory, j)
+        if min(rotor.rise, rotor.fall) * sim.step > FAST_ROTOR:
+            kept.first = kept.second
 
 
 @njit(error_model="numpy")
@@ -157,7 +178,8 @@ class Rotors(Part):
 
     def start(self, run: Run) -> list[Sequence[float]]:
         speeds = speeds_at_start(run.model, run.model.actuator_user)
-        return [(speed, speed) for speed in speeds]
+        # the last row: angular momentum and its rate
+        return [*((speed, speed) for speed in speeds), (0.0, 0.0)]
 
     def channels(self, plant: Plant) -> Sequence[int]:
         return (-1,)
@@ -166,30 +188,22 @@ class Rotors(Part):
     def act(sim, data, part):
         """Give the body its rotors' thrust, their gyroscopic torque and its drag at a stage."""
         if sim.stage == 0:
-            lifted = 0.0
-            for j in range(sim.actuators):
-                rotor = rotor_at(data.actuator_user, j)
-                kept = kept_at(part.function.memory, j)
-                if sim.now > 0:
-                    kept.first = spun(rotor, kept.first, kept.second, sim.step)[0]
-                lifted += thrust_at(rotor, kept.first)
-            lifted = _command(sim, data, part, lifted)
-            _command(sim, data, part, lifted)
-            for j in range(sim.actuators):
-                rotor = rotor_at(data.actuator_user, j)
-                kept = kept_at(part.function.memory, j)
-                if min(rotor.rise, rotor.fall) * sim.step > FAST_ROTOR:
-                    kept.first = kept.second
+            _begin_step(sim, data, part)
         passed = sim.step * (0.5 if sim.stages == 1 else 0.5 * ((sim.stage + 1) // 2))
-        momentum = 0.0
-        change = 0.0
-        for j in range(sim.actuators):
+        turning = kept_at(part.function.memory, sim.actuators)
+        momentum = turning.first
+        change = turning.second
+        if sim.stage != 2:  # which is in the middle of the step, too
+            momentum = change = 0.0
+        for j in range(sim.actuators if sim.stage != 2 else 0):
             rotor = rotor_at(data.actuator_user, j)
             kept = kept_at(part.function.memory, j)
             W, rate = spun(rotor, kept.first, kept.second, passed)
             data.ctrl[channel_at(sim.channels, j).ctrl] = thrust_at(rotor, W)
             momentum += rotor.inertia * rotor.spin * W
             change += rotor.inertia * rotor.spin * rate
+        turning.first = momentum
+        turning.second = change
         dof = channel_at(sim.channels, 0).qvel
         v = data.qvel
         drag = drag_of(sim, data, data.qvel[dof], data.qvel[dof + 1], data.qvel[dof + 2])

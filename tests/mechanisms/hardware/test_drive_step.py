@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from helpers import reference
+from helpers.reference import advance
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
@@ -213,9 +214,9 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
     parts = 2000
     u, first, gap = np.random.default_rng(0).normal(size=(3, 500))
     second = first + gap * np.repeat([0.0, 0.01, 0.1, 1.0, 3.0], 100)
-    advance = drive_step((smc.Lag(tau), smc.hardware.RateLimit(rate)), step, True)
-    assert advance is not None
-    mean, last, _ = advance(u, first, second, np.zeros(500))
+    effect = drive_step((smc.Lag(tau), smc.hardware.RateLimit(rate)), step, True)
+    assert effect is not None
+    mean, last, _ = advance(effect, u, first, second, np.zeros(500))
     lagged = first
     force = second
     total = 0.0
