@@ -22,6 +22,7 @@ LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search ha
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
+SAME_RUNS = "the same runs settle"  # as far as these runs go: a share's interval is wider than 10 %
 MEDIANS = (
     f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share; "
     f"of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less."
@@ -255,7 +256,7 @@ class Board(Tables):
             return "none is unbeaten in every condition"
         apart = self.cannot_tell
         if all(block.level for block in self.blocks):
-            apart = LEVEL_WORDS
+            apart = SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS
         unbeaten = "none beaten"
         if any(self.losses(entry.law) for entry in self.entries):
             unbeaten = f"undefeated: {joined(self.best)}"
