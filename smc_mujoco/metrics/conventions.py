@@ -223,9 +223,11 @@ class Metric:
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
     def text(self, value: float) -> str:
-        """Return a value as text; inf is "never" for a time and "fails" for anything else."""
+        """Return a value as text; inf is "never" for a time, and else that the run fails or has not
+        arrived.
+        """
         if value == math.inf and self.unit != "s":
-            return "fails"
+            return "fails" if self.error else "not arrived"
         return number(value)
 
     def unit_for(self, x: str, u: str = "") -> str:

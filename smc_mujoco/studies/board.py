@@ -356,8 +356,6 @@ def size(value: float, metric: str) -> str:
         return number(value)
     if metric == SETTLES:
         return f"{100 * value:.0f}"
-    if math.isinf(value) and CATALOGUE[metric].unit != "s" and not CATALOGUE[metric].error:
-        return "not arrived"
     return CATALOGUE[metric].text(value)
 
 

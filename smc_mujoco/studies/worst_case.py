@@ -92,7 +92,7 @@ class WorstCase(Tables):
         return ", ".join([*sets, self.within.words()])
 
     def shown(self, value: float) -> str:
-        """Return a value of the metric as text: "fails" where a run failed."""
+        """Return a value of the metric as text: "fails" or "not arrived" where there is none."""
         return CATALOGUE[self.metric].text(value)
 
     def with_unit(self, value: float) -> str:
@@ -199,8 +199,8 @@ def worst_case(
       scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
         parameters. Or several, such as a rig's parameter sets: the first is the nominal one, and
         the adversary chooses.
-      metric: name of any metric; more is worse. Default: the rms error from a quarter of the run
-        on.
+      metric: name of any metric; more is worse. In metrics of u a run that has not arrived is the
+        worst. Default: the rms error from a quarter of the run on.
       within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what
         the plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a
         sixth of the force of the weakest drive; and friction within 50 %.

@@ -4,6 +4,7 @@ known to be worst.
 
 import dataclasses
 import itertools
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -283,6 +284,16 @@ def test_constants_and_relays_reach_what_another_adversary_found():
     for law, value in found.items():
         worst = smc.worst_case(scenario(law=law, duration=8.0), within=CLASSES["force"], budget=8)
         assert round(worst.value, 4) >= value
+
+
+@pytest.mark.parametrize("law", ["none", "twisting"])
+@pytest.mark.parametrize("metric", ["tv_rate", "max_u", "energy"])
+def test_who_never_arrives_is_worst_in_metrics_of_u_and_measured_by_its_errors(law, metric):
+    base = scenario(plant="van_der_pol", law=law)
+    for name in (metric, "rms_error"):
+        worst = smc.worst_case(base, name, smc.Uncertainty(disturbance=1.0), budget=4)
+        assert (worst.words == "not arrived") is (name == metric)
+        assert math.isinf(worst.median) is (name == metric)
 
 
 def test_a_failed_run_is_the_worst():

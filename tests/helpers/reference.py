@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, rippled
 from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.moments import torque
 from smc_mujoco.mechanisms.hardware.part import joint_names
-from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
+from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding, bristle
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
@@ -138,10 +138,9 @@ class Loop:
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         # the mean force in a step of RK4, and its rise to the last stage
         self.middle, self.rise = np.zeros((2, n))
-        inertia = self.model.dof_M0[self.channels["qvel"]]
         names = joint_names(scenario.plant)
         self.formulas: list[Sliding | None] = [None] * n
-        self.bristles = [(0.0, 0.0)] * n
+        self.bristles = [(0.0, 0.0, 0.0)] * n
         self.numbers: list[tuple] = [()] * n
         for formula in self.scenario.friction:
             if not isinstance(formula, Sliding):
@@ -150,10 +149,11 @@ class Loop:
             for place, joint in enumerate(formula.joint_names(scenario.plant)):
                 i = names.index(joint)
                 self.formulas[i] = formula
-                self.bristles[i] = formula.bristle(i, inertia[i])
+                self.bristles[i] = bristle(self.model, int(self.channels["qvel"][i]))
                 self.numbers[i] = record(*(formula.parameters(place) or [0.0]))
         self.stuck_at = [math.nan] * n  # positions of joints that stick, or NaN
         self.speed = [0.0] * n  # at the step before
+        self.slid = [0.0] * n  # and the force of the friction
         # of dry friction, see `apply_exact_friction`: None while a formula gives it at every stage
         self.rubbing: list[tuple | None] = [None] * n
         self.stuck = [False] * n
@@ -446,19 +446,23 @@ class Loop:
             stuck = not math.isnan(self.stuck_at[i])
             before = self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
-            stiffness, damping = self.bristles[i]
+            stiffness, damping, inertia = self.bristles[i]
             if not stuck and (slows or v * before < 0.0):
                 stuck = True
                 self.stuck_at[i] = x
                 if before != 0.0:
-                    self.stuck_at[i] -= min(max(motor + load, low), high) / stiffness
+                    needed = (
+                        self.slid[i] + inertia * (v - before) / self.scenario.resolved.physics_step
+                    )
+                    self.stuck_at[i] -= min(max(needed, low), high) / stiffness
             if stuck:
                 spring = stiffness * (x - self.stuck_at[i])
                 if low < high and low <= spring <= high:
                     friction = min(max(spring + damping * v, low), high)
                 else:
                     self.stuck_at[i] = math.nan
-            self.speed[i], data.ctrl[at["friction_ctrl"][i]] = v, -friction
+            self.speed[i], self.slid[i] = v, friction
+            data.ctrl[at["friction_ctrl"][i]] = -friction
 
     def apply_exact_friction(self, data: mujoco.MjData, d: np.ndarray, stage: int) -> None:
         """Give the joints their dry friction at a stage of RK4, by its formula or by its moments in

@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
-from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.catalogue import CATALOGUE, arrived
 from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.signals import Relay
@@ -162,7 +162,9 @@ class Search:
         groups = by_group(trace)
         value = self.metric.worst(groups)
         error = CATALOGUE["rms_error"].worst(groups)
-        if math.isnan(value):
+        if self.metric.command and not arrived(trace):
+            value = math.inf
+        elif math.isnan(value):
             value = self.metric.absent
         return value, error
 

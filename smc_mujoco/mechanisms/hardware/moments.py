@@ -225,11 +225,6 @@ class Run:
         return self.load()
 
     @property
-    def inertia(self) -> list[float]:
-        """Inertia of each joint at the start, alone, kg m^2 (kg)."""
-        return self.model.dof_M0[self.dofs].tolist()
-
-    @property
     def phases(self) -> list[float]:
         """Random numbers 0 .. 1 of the joints."""
         return self.draw()

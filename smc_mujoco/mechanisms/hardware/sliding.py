@@ -17,12 +17,12 @@ On all others:
     sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high),
              like a LuGre bristle that does not slip
 
-A joint sticks when its speed changes sign or is small. x_s is then such that the spring carries the
-joint's load, within the bounds: the joint rests where it stops. For a joint at rest from the start
-of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves the bounds. So a
-stuck joint does not creep, because its friction depends on its position. Under a new load it turns
-by load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower if other joints
-move with it.
+A joint sticks when its speed changes sign or is small. x_s is then such that the spring ends the
+acceleration of the step before, within the bounds: the joint rests where it stops. For a joint at
+rest from the start of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves
+the bounds. So a stuck joint does not creep, because its friction depends on its position. Under a
+new load it turns by load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower
+if other joints move with it.
 
 A joint that slides keeps sliding at the speed at which F equals the load.
 
@@ -48,7 +48,6 @@ import mujoco
 from numba import njit
 
 from smc_mujoco.common.constraints import Each, Number
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import HIGH, RISE, at_stage, begin_step, with_rise
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce, PerJoint
 from smc_mujoco.mechanisms.hardware.moments import Run
@@ -63,9 +62,9 @@ MAX_EXPONENT = 700.0  # exp of more overflows
 NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETER))]
 PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
 
-# What a joint keeps: of bristles whether it sticks, where they are unbent, and the speed at the
+# What a joint keeps: of bristles whether it sticks, where they are unbent, speed and force at the
 # step before; at stages of RK4 the same speed, whether it was held, and whether it slides.
-STUCK, STUCK_AT, SPEED = range(3)
+STUCK, STUCK_AT, SPEED, FORCE = range(4)
 STAGE_SPEED, WAS_HELD, SLIDES = range(HIGH + 1, HIGH + 4)
 
 
@@ -80,7 +79,7 @@ class Sliding(JointForce):
     @property
     def names(self) -> tuple[str, ...]:
         """The fields, which the formula reads as p, and the numbers of the bristles."""
-        return (*self.per_joint, "bristle_stiffness", "bristle_damping")
+        return (*self.per_joint, "bristle_stiffness", "bristle_damping", "bristle_inertia")
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
@@ -104,22 +103,11 @@ class Sliding(JointForce):
         return _at_stages(type(self).value)
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
-        inertia = run.inertia
-        return [(*self.parameters(i), *self.bristle(i, inertia[i])) for i in range(run.n)]
-
-    def bristle(self, i: int, inertia: float) -> tuple[float, float]:
-        """Return stiffness and critical damping of channel i when it sticks.
-
-        The inertia of its joint, kg m^2 (kg), is that in MuJoCo's reference position qpos0, at the
-        start of the run.
-        """
-        if not inertia > 0.0:
-            raise ScenarioError(
-                f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: "
-                "give others"
-            )
-        stiffness = inertia * BRISTLE_FREQUENCY**2
-        return stiffness, 2.0 * math.sqrt(stiffness * inertia)
+        model = run.model
+        rows = []
+        for i, dof in enumerate(run.dofs):
+            rows.append((*self.parameters(i), *bristle(model, dof)))
+        return rows
 
     @property
     def exact(self) -> "Sliding":
@@ -137,6 +125,16 @@ class Sliding(JointForce):
             brake.set_to_motor()
 
 
+def bristle(model: mujoco.MjModel, dof: int) -> tuple[float, float, float]:
+    """Return stiffness and critical damping of a degree of freedom that sticks, and the inertia
+    that a force on it moves, kg m^2 (kg), all in qpos0.
+    """
+    inertia = float(model.dof_M0[dof])
+    stiffness = inertia * BRISTLE_FREQUENCY**2
+    damping = 2.0 * math.sqrt(stiffness * inertia)
+    return stiffness, damping, 1.0 / float(model.dof_invweight0[dof])
+
+
 @functools.cache
 def _by_bristles(formula: Callable) -> Callable:
     """Return the force on a joint that slides by a formula, or sticks by a bristle."""
@@ -151,15 +149,15 @@ def _by_bristles(formula: Callable) -> Callable:
                 stuck = 1.0
                 memory[STUCK_AT] = y.x
                 if memory[SPEED] != 0.0:  # it stops, else it is at rest from the start
-                    load = min(max(y.motor + y.load, low), high)
-                    memory[STUCK_AT] -= load / p.bristle_stiffness
+                    load = memory[FORCE] + p.bristle_inertia * (y.v - memory[SPEED]) / y.h
+                    memory[STUCK_AT] -= min(max(load, low), high) / p.bristle_stiffness
         if stuck != 0.0:
             spring = p.bristle_stiffness * (y.x - memory[STUCK_AT])
             if low <= spring <= high and low < high:
                 f = min(max(spring + p.bristle_damping * y.v, low), high)
             else:
                 stuck = 0.0
-        memory[STUCK], memory[SPEED] = stuck, y.v
+        memory[STUCK], memory[SPEED], memory[FORCE] = stuck, y.v, f
         return -f
 
     return force

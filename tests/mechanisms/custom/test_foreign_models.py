@@ -13,6 +13,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import gl
 from smc_mujoco.draw import panels
+from smc_mujoco.draw.figure import MAX_WORST
 from smc_mujoco.mechanisms.named import as_plant
 
 ARM = """
@@ -120,8 +121,8 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     labels = []
     for ax in smc.figure(traces, tmp_path / "a.png").axes:
         labels.append(ax.get_ylabel())
-    for joint in joints:
-        assert any(label.startswith(f"{joint} e") for label in labels), labels
+    shown = [joint for joint in joints if any(label.startswith(f"{joint} e") for label in labels)]
+    assert len(shown) == min(len(joints), MAX_WORST), labels  # of many those with large errors
     for label in labels:
         assert "mean" not in label
     if gl.missing() is None:
