@@ -12,7 +12,6 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import gl
-from smc_mujoco.draw import panels
 from smc_mujoco.draw.figure import MAX_WORST
 from smc_mujoco.mechanisms.named import as_plant
 
@@ -152,23 +151,6 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
         # a menagerie's servos are not motors
         with pytest.raises(smc.ScenarioError, match="motor=True"):
             as_plant(text)
-    (tmp_path / "arm.xml").write_text(
-        ARM.replace("<position", "<motor").replace(' kp="100" kv="10" inheritrange="1"', "")
-    )
-    for text in ("arm.xml:lift,elbow", "arm.xml:lift+elbow", "arm.xml: lift, elbow"):
-        scenario = smc.Scenario(
-            plant=text,
-            law="pid",
-            x0=0.1,
-            duration=0.1,
-        )
-        assert scenario.plant.label == "spatial arm"
-        assert [panel.label for panel in panels.strip([smc.run(scenario)])] == [
-            "lift x (rad)",
-            "lift u (N·m)",
-            "elbow x (rad)",
-            "elbow u (N·m)",
-        ]
     for text, words in (
         ("arm.xml", "choose from "),
         ("no.xml:a", "no model at"),

@@ -3,7 +3,6 @@ get a sentence.
 """
 
 import dataclasses
-import gc
 import importlib.util
 import math
 import pickle
@@ -19,11 +18,9 @@ import pytest
 from helpers import reference as plain
 
 import smc_mujoco as smc
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.envs import episode, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.mechanisms.custom.scales import needs
 from smc_mujoco.mechanisms.plant import Plant
@@ -179,9 +176,12 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
     assert np.ptp(trace.x) > 0.01
 
 
-@pytest.mark.parametrize("name", [*FOREIGN, "pusher"])
+CHAINS = FOREIGN | {"pusher": pusher, "both links": both_links}
+
+
+@pytest.mark.parametrize("name", CHAINS)
 def test_f_and_g_are_the_accelerations_of_the_file(name):
-    plant = (FOREIGN | {"pusher": pusher})[name]()
+    plant = CHAINS[name]()
     raw = read(plant)
     raw.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
     data = mujoco.MjData(raw)
@@ -205,35 +205,6 @@ def test_f_and_g_are_the_accelerations_of_the_file(name):
 
 
 # laws get f and g
-
-TRACKING = {
-    "cartpole": (cartpole, 10.0, (0.0, 0.1)),
-    "acrobot": (acrobot, 2.0, (0.0, math.pi)),
-    "both links": (both_links, 1e4, (0.0, 0.0)),
-    "reacher": (reacher, 200.0, (0.0, 0.0)),
-}
-
-
-@pytest.mark.parametrize("name", TRACKING)
-def test_computed_torque_tracks_within_a_thousandth(name):
-    make, u_max, x0 = TRACKING[name]
-    plant = make()
-    rate = 0.2
-    scenario = smc.Scenario(
-        plant=plant,
-        law=TORQUE,
-        model="nominal",
-        reference=smc.Sine(amplitude=0.1, omega=2.0),
-        u_max=u_max,
-        duration=2.0,
-        x0=x0,
-        v0=[rate] * plant.driven + [0.0] * plant.free,
-    )
-    trace = smc.run(scenario)
-    error = np.abs(trace.x - trace.r)[:, : plant.driven].max()
-    assert error < 1e-3
-    blind = smc.run(dataclasses.replace(scenario, model="none"))
-    assert np.abs(blind.x - blind.r)[:, : plant.driven].max() > 10 * error
 
 
 def test_seven_coupled_joints_settle_as_the_error_equation_says():
@@ -315,36 +286,6 @@ def test_threads_change_nothing(arm):
     ):
         np.testing.assert_array_equal(one.x, two.x)
         np.testing.assert_array_equal(one.x, alone.x)
-
-
-@pytest.mark.usefixtures("present_objects_frozen")
-def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
-    plant = arm()
-    base = smc.Scenario(
-        plant=plant,
-        law=TORQUE,
-        model="nominal",
-        duration=0.05,
-        u_max=20.0,
-        x0=(0.3, 0.1),
-    )
-    many = []
-    for i in range(7):
-        many.append(
-            dataclasses.replace(
-                base,
-                x0=(0.1 * i, 0.2),
-                v0=0.5,
-            )
-        )
-    first = smc.run(base)
-    _ = smc.run(many)
-    _ = smc.run(many)
-    again = smc.run(base)
-    np.testing.assert_array_equal(again.x, first.x)
-    gc.collect()
-    assert isinstance(plant.nominal, NominalModel)
-    assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
 
 
 def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
