@@ -58,6 +58,7 @@ def on_files(files, config):
         BOOST[f"{page.path}.md"] = 0.05 if "/" in page.path else 1.0
     for path, content in (notebooks.pages() | known.reference()).items():
         files.append(File.generated(config, path, content=content))
+        BOOST.setdefault(path, 0.3)
     for name in ("site.css", "iframe-worker.js"):
         files.append(
             File.generated(

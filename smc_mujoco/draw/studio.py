@@ -72,7 +72,7 @@ def view(
       ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit
         the machine.
     """
-    session = Session(runs_of(scenario, laws))
+    runs = runs_of(scenario, laws)
     if importlib.util.find_spec("mujoco.studio") is None:
         raise ScenarioError(
             f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'"
@@ -87,10 +87,13 @@ def view(
             "no view: this process had one already, and Studio crashes in a second: restart Python"
         )
     door = Door(web_server)
+    door.bind("", port)
+    print(f"{door.address} answers once the laws are compiled", flush=True)
+    session = Session(runs)
     web_server.bind_public_socket = door.bind
     web_server.bind_loopback_socket = door.bind_inner
     web_server.serve = door.serve
-    web_viewer._print_url_banner = lambda host, port: print(door.address, flush=True)
+    web_viewer._print_url_banner = lambda host, port: print("compiled", flush=True)
     web_viewer.webbrowser = types.SimpleNamespace(
         open=lambda url, new: webbrowser.open(door.address, new)
     )

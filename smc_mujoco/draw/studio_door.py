@@ -62,6 +62,7 @@ class Door:
         self.server_bind_inner = server.bind_loopback_socket
         self.server_serve = server.serve
         self.secret = "/" + secrets.token_urlsafe(SECRET_BYTES)
+        self.bound: Any = None  # the socket
         self.hosts: tuple[str, ...] = ()  # once it is bound
 
     @property
@@ -70,11 +71,14 @@ class Door:
         return f"http://{self.hosts[0]}{self.secret}/"
 
     def bind(self, host: str, port: int) -> Any:
-        """Return the socket, of this machine alone: Studio would serve the whole network."""
-        bound = self.server_bind("127.0.0.1", port)
-        port = bound.getsockname()[1]
-        self.hosts = f"127.0.0.1:{port}", f"localhost:{port}"
-        return bound
+        """Return the socket, the same for each call, of this machine alone: Studio would serve
+        the whole network.
+        """
+        if self.bound is None:
+            self.bound = self.server_bind("127.0.0.1", port)
+            port = self.bound.getsockname()[1]
+            self.hosts = f"127.0.0.1:{port}", f"localhost:{port}"
+        return self.bound
 
     def bind_inner(self, port: int = 0) -> socket.socket:
         """Return the socket to which Studio's own panels connect."""

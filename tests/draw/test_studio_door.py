@@ -50,7 +50,7 @@ def server():
 def asked(server, path, **headers):
     """Return the path that Studio is asked for, or the status of the refusal."""
     door = Door(server)
-    door.bind("::", 8080)
+    assert door.bind("::", 8080) is door.bind("::", 0)  # ours, then Studio's
     door.secret = WORD
     seen = []
     admit = door.serve(None, process_request=lambda connection, request: seen.append(request.path))

@@ -34,6 +34,9 @@ def claims(
         typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
     ] = None,
     threads: options.Threads = None,
+    listed: Annotated[
+        bool, typer.Option("--list", help="List the claims with their sentences instead.")
+    ] = False,
     papers: Annotated[bool, typer.Option("--papers", help="List the papers instead.")] = False,
     new: Annotated[
         Path | None,
@@ -57,6 +60,8 @@ def claims(
 
     A second audit with the same versions writes the same file of --evidence, to the last bit.
 
+    Example: smc-mujoco claims --list
+
     Example: smc-mujoco claims 3 18 --gains tuned
 
     Example: smc-mujoco claims --new my_paper
@@ -69,6 +74,7 @@ def claims(
         _papers(papers, new, check, Terminal(json))
         return
     with delay_ctrl_c():
+        from smc_mujoco.cli.tables import catalogue
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document
@@ -77,6 +83,11 @@ def claims(
 
     terminal = Terminal(json)
     about = find_paper(paper or DEFAULT_PAPER)
+    if listed:
+        rows = [(id, claim.text) for id, claim in about.claims.items()]
+        terminal.print(catalogue(f"{about.authors}: {about.title}", rows))
+        terminal.finish()
+        return
     sets = None if gains is None else options.names(gains)
     writable(evidence and with_ending(evidence, ".json"))
     with bar("claims", counted=True) as drawn:

@@ -223,6 +223,8 @@ def test_the_command_writes_evidence_and_checks_the_seal(folder, tmp_path):
     begun = CliRunner().invoke(main.app, ["claims", "--new", str(tmp_path / "mine")])
     assert begun.exit_code == 0
     assert (tmp_path / "mine" / "claims.py").is_file()
+    sentences = CliRunner().invoke(main.app, ["claims", "--list", *words[1:3]])
+    assert sentences.stdout.splitlines()[1].split() == ["1", "the", "law", "is", "calm"]
     broken = CliRunner().invoke(main.app, ["claims", "--paper", str(tmp_path)])
     assert broken.exit_code == 2
     assert "no paper at" in broken.stderr
