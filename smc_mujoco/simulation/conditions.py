@@ -116,7 +116,11 @@ class Condition:
         """
         length = number("duration", duration, above=0.0)
         fields = dict(self.fields(plant, length) if callable(self.fields) else self.fields)
-        if plant.pose and (refused := [name for name in NOT_OF_FREE_BODIES if fields.get(name)]):
+        refused = []
+        for name in NOT_OF_FREE_BODIES:
+            if plant.pose and fields.get(name) and not isinstance(fields[name], Mapping):
+                refused.append(name)
+        if refused:
             raise ScenarioError(
                 f"condition {self.name!r} sets {refused[0]}, and {plant.name} is a free body, "
                 "which takes none: choose another condition"

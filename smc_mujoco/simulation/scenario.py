@@ -71,7 +71,7 @@ MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 # Fields that no scenario of a free body sets, with their words
 NOT_OF_FREE_BODIES = {
-    "friction": "friction, as it has no joint that rubs",
+    "friction": "friction but on a joint by name, as its pose has none that rubs",
     "actuator": "actuator, as its thrusters are its drives",
     "sensor": "sensor, as an Encoder is of a joint",
     "feedforward": "feedforward",
@@ -1002,7 +1002,11 @@ def check_free_body(s: Resolved) -> None:
             "channels turn together: give a law of many joints, such as 'geometric'"
         )
     given = {name: (words, getattr(s, name)) for name, words in NOT_OF_FREE_BODIES.items()}
-    taken = {"clock": not s.clock.regular, "velocity": s.velocity.name != "measured"}
+    taken = {
+        "clock": not s.clock.regular,
+        "velocity": s.velocity.name != "measured",
+        "friction": not all(part.on for part in s.friction),
+    }
     refused = [words for name, (words, value) in given.items() if taken.get(name, bool(value))]
     if any(d.sees for d in s.disturbance):
         refused.append("disturbance that sees the loop")
@@ -1049,8 +1053,8 @@ def check_mechanism(s: Resolved) -> None:
     states = [part for part in s.friction if part.bristles or part.force is not None]
     if s.integrator == "RK4" and states and not s.exact_friction:
         raise ScenarioError(
-            f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the "
-            "integrator out"
+            f"integrator RK4 has four stages in a step, and the state of {shown(states[0])} moves "
+            "once a step: leave the integrator out"
         )
     for chain in dict.fromkeys(s.chains):
         for part in chain:

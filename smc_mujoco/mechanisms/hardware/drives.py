@@ -240,12 +240,6 @@ class DCMotor(Actuator):
         # `rippled` bounds it before the ripple
         return 1.0, math.inf if self.ripple else self.voltage
 
-    def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
-        if self.ripple and len(chain) > 1:
-            raise ScenarioError(
-                "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
-            )
-
     def edit(self, spec: mujoco.MjSpec) -> None:
         kind = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE)
         constants = (self.constant, self.constant)
@@ -406,7 +400,7 @@ class Series(Part):
             scale = drive_at(sim.drives, i).scale
             force = scale * advanced(factors, kept, state.delayed, v)
             if factors.ripple != 0.0:
-                force = rippled(factors, force, data.qpos[channel.qpos], v)
+                force = rippled(factors, force, data.qpos[channel.shaft_qpos], v)
             if factors.rise_first != 0.0:
                 state.middle = force
                 kept.rise *= scale
@@ -435,9 +429,11 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
     )
     if not lags and motor is None and rate is None:
         return None
+    a = lags[0] if lags else math.inf
+    made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
     if motor is not None and motor.ripple:
         n = motor.bars
-        return DriveStep(
+        return made._replace(
             ripple=motor.ripple,
             turns=n * motor.gear,
             angle=n * motor.brush,
@@ -447,8 +443,6 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
             supply=motor.voltage,
             constant=motor.constant,
         )
-    a = lags[0] if lags else math.inf
-    made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
     if rk4 and len(lags) == 1 and rate is None and motor is None:
         made = made._replace(rise_first=_rise(a))
     if rate is not None:

@@ -2,16 +2,18 @@
 
     @smc.hardware.friction_function(numbers={"stiffness": 500.0, "level": 0.3}, memory=1)
     def dahl(y, p, memory):
-        z = memory[0]
-        memory[0] = z + y.h * y.v * (1.0 - p.stiffness * z / p.level * math.copysign(1.0, y.v))
-        return -p.stiffness * z
+        bend = math.copysign(p.level / p.stiffness, y.v)
+        force = -p.stiffness * memory[0]
+        memory[0] = bend + (memory[0] - bend) * math.exp(-abs(y.v) * y.h / abs(bend))
+        return force
 
     smc.Scenario(plant="cart_pole", law="hierarchical", friction=dahl(level=(0.5, 0.01)))
 
 The function is compiled as a law is. It is called once a physics step for each joint, and its
 force, N m (N), is held over the step. y is a JointState, p has the numbers of the joint by name,
 and memory is the joint's own, 0 at the start. A force on y.v must be weak: a step times its slope
-stays below the joint's inertia.
+stays below the joint's inertia. Keep states by their solution over y.h, as here: Euler's step of
+this friction diverges where stiffness |y.v| y.h exceeds 2 level.
 """
 
 # pyright: reportIncompatibleVariableOverride=false

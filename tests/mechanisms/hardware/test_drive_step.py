@@ -250,8 +250,20 @@ def moved(s, u):
         f, _ = s.plant.nominal(np.array([x]), np.array([v]), 0, p)  # of 1 kg
         volts = min(max(motor.scale * (a if lags else u), -motor.voltage), motor.voltage)
         lagged = (u - a) / lags[0].tau if lags else 0.0
-        current = (volts - motor.resistance * i - motor.constant * v) / motor.inductance
-        return v, (f + motor.constant * i) / inertia, lagged, current
+        across = volts - motor.constant * v
+        if motor.inductance:
+            current = (across - motor.resistance * i) / motor.inductance
+            return v, (f + motor.constant * i) / inertia, lagged, current
+        i = across / motor.resistance
+        for brush, bridge in ((motor.brush, motor.bridge), (motor.brush_2, motor.bridge_2)):
+            turned = math.cos(motor.bars * (motor.gear * x - brush)) - 1.0
+            i += (
+                motor.ripple
+                * math.exp(turned / (motor.bars * bridge) ** 2)
+                * across
+                / motor.resistance
+            )
+        return v, (f + motor.constant * i) / inertia, lagged, 0.0
 
     z = [s.resolved.x0[0], s.resolved.v0[0], 0.0, 0.0]
     x = [z[0]]
@@ -304,6 +316,20 @@ def test_a_motor_moves_the_block_as_scipy_says(actuator, integrator):
     else:
         assert errors[1] < 2.5e-4 * np.abs(traces[1].v).max()
         assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("before", [(smc.Lag(0.02),), ()])
+@pytest.mark.parametrize("after", [(smc.Backlash(0.0, rotor_inertia=1e-9),), ()])
+def test_a_commutator_ripples_behind_a_lag_and_before_a_play(before, after):
+    motor = smc.DCMotor(0.5, 0.0, 0.4, 2.0, 1e-4, voltage=9.0, ripple=0.5, bridge=0.1, bridge_2=0.1)
+    common = {"law": asking(u=4.0, omega=5.0), "x0": 0.3, "v0": 1.0, "duration": 0.3, "u_max": 4.0}
+    even = dataclasses.replace(motor, ripple=0.0)
+    ours, plain = smc.run(
+        [scenario(*before, part, *after, physics_step=1.25e-4, **common) for part in (motor, even)]
+    )
+    exact = moved(scenario(*before, motor, **common), ours.u)
+    assert np.abs(ours.x[:, 0] - exact).max() < 1e-4
+    assert np.abs(plain.x[:, 0] - exact).max() > 1e-3
 
 
 def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step():

@@ -9,7 +9,7 @@ import pytest
 from numba import njit
 
 import smc_mujoco as smc
-from smc_mujoco.common.files import to_json
+from smc_mujoco.common.files import shipped, to_json
 from smc_mujoco.simulation import conditions, serialise
 
 LUGRE = smc.hardware.LuGre(0.05, 0.1, 0.05)
@@ -273,3 +273,27 @@ ARM = """<mujoco><compiler angle="radian"/><worldbody><body>
   </body></body></worldbody><actuator>
   <motor joint="lift" ctrlrange="-%g %g" ctrllimited="true"/>
   <motor joint="turn" ctrlrange="-%g %g" ctrllimited="true"/></actuator></mujoco>"""
+
+
+@smc.law_function(joint=True, plants=("a free body",))
+def hovering(y, gains, memory):
+    u = np.zeros(6)
+    u[2] = 0.35
+    u[4] = 1e-4 * math.sin(5.0 * y.t)
+    return u, np.zeros(6)
+
+
+def test_a_joint_that_a_free_body_carries_rubs_by_name():
+    text = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
+    swing = """<body pos="0 0 -.01"><joint name="swing" axis="0 1 0" frictionloss="%g"/>
+      <inertial pos=".02 0 -.02" mass=".003" diaginertia="1e-7 1e-7 1e-7"/></body></body>"""
+    runs = []
+    for in_file, part in ((0.0, None), (0.0, smc.Coulomb(2e-4)), (2e-4, None)):
+        carrier = text.replace("</body>", swing % in_file, 1)
+        plant = smc.plant_from(carrier, channels=["body"], name="carrier")
+        fields = {"friction": {"swing": part} if part else None, "duration": 0.5}
+        runs.append(smc.run(smc.Scenario(plant=plant, law=hovering(), **fields)))
+    free, named, of_file = (trace.x for trace in runs)
+    assert np.abs(named - of_file).max() < 1e-3 * np.abs(named - free).max()
+    with pytest.raises(smc.ScenarioError, match="takes no friction but on a joint by name"):
+        dataclasses.replace(runs[0].scenario, friction=smc.Coulomb(1e-4))
