@@ -22,7 +22,7 @@ from smc_mujoco.cli import main
 
 SCENE = """import smc_mujoco as smc
 scene = smc.Scene(
-    title="t", figure="states", film="nominal",
+    title="t", figure="overview", film="nominal",
     conditions={"nominal": {"a": smc.Scenario(plant="duffing", law="none", duration=0.01)}},
     answer=lambda traces: "It ran.",
 )
