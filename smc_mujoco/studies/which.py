@@ -222,14 +222,9 @@ def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
     seconds, size = trial.expected(plant, laws, trial.starts, QUICK_BUDGET)
     last = min(FINALISTS, len(laws))
     searches = size * (1.0 + (QUICK_SEARCHES - 1) * last / len(laws))
-    runs = 3 * last * seeds  # with twice the steps once more
-    if len(laws) > last:
-        runs += len(laws) * FEW
-    runs *= len(trial.conditions) * trial.duration
-    told(
-        f"a law for {plant.name}",
-        seconds * (searches + runs / (len(BRIEF.conditions) * BRIEF.duration)),
-    )
+    runs = len(laws) * FEW + 3 * last * seeds  # the latter with twice the steps once more
+    length = len(trial.conditions) * trial.duration / (len(BRIEF.conditions) * BRIEF.duration)
+    told(f"a law for {plant.name}", seconds * (searches + length * runs))
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
