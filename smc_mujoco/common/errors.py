@@ -83,7 +83,7 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """
     # claims have numbers
     names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))
-    hint = "there are none"
+    hint = "there are none with a name"
     if names:
         hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}"
     if isinstance(name, str) and (near := _nearest(name, names)):

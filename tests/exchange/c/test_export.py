@@ -408,7 +408,7 @@ REFUSED = {
     "u = (lambda a: a)(y.e)": "a call",
     "y = 3.0; u = y": "an assignment to this",
     "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
-    "u = gains.k * y.e": "it reads an unknown gain 'k': there are none",
+    "u = gains.k * y.e": "it reads an unknown gain 'k': there are none with a name",
     "u = halts(y.e)": "halts, which does not end in a return,",
 }
 
