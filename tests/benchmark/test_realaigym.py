@@ -18,9 +18,6 @@ from helpers.pages import ROOT
 from realaigym import entries, global_policy, simulator, swing_ups
 from realaigym.scoring import VERSIONS
 from realaigym.simulator import Case, Machine, stepped
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicHermiteSpline
-from scipy.linalg import solve_continuous_are
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
@@ -138,89 +135,6 @@ def test_the_published_simulator_is_mujocos(robot, traces):
     np.testing.assert_allclose(torque, traces[robot].u[:-1, 0], atol=1e-7)
 
 
-def test_dry_friction_is_the_published_arctangent():
-    state = (0.4, -0.2, 0.03, -0.05)
-    known = tuple((MODEL_1_1 | {"cf1": 0.2, "cf2": -0.1}).values())
-    torques = -0.2 * math.atan(3.0), 0.1 * math.atan(-5.0)
-    without = simulator._slope(state, *torques, tuple(MODEL_1_1.values()))
-    np.testing.assert_allclose(simulator._slope(state, 0.0, 0.0, known), without, rtol=1e-12)
-
-
-@smc.law_function(plants=boards.ROBOTS)
-def mine(y, gains, memory):
-    u = 0.4 * y.x - 0.25 * y.v + 0.07 * y.q - 0.03 * y.dq + 0.5 * y.t + 10.0 * y.dt
-    return u + 2e-3 * (y.f + y.fq) + 1e-4 * (y.g + 2.0 * y.gq) + 0.1 * y.limit + 0.01 * y.model, y.x
-
-
-@pytest.mark.slow
-@ROBOTS
-def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
-    """Each torque from what the law may see of the states, each state from the one before by the
-    equation of motion.
-    """
-    changed = {"m2": 0.55, "b1": 0.03}
-    case = Case(
-        response=1.3,
-        delay=2,
-        pulses=((0.02, 0.05, 1.5),),
-        seed=4,
-        parameters=changed,
-        velocity_noise=0.1,
-        torque_noise=0.2,
-    )
-    scenario = dataclasses.replace(boards.on_board(robot, mine), u_max=2.5, model="nominal")
-    states, torque = Machine(scenario).simulate(case)
-    noise = np.random.default_rng([simulator.SEED, 4, 0]).normal(size=(5000, 3)) * [0.1, 0.1, 0.2]
-    plant = smc.plant(robot)
-    driven = ["pendubot", "acrobot"].index(robot)
-    p = type("P", (), dict(plant.parameters))
-    order = [driven, 1 - driven]
-    last = 0.0
-    t = 2e-3 * np.arange(60)
-    for k in range(60):
-        seen = states[max(0, k - 2)]
-        place = seen[:2][order]
-        speed = (seen[2:] + noise[k, :2])[order]
-        (f, g), (fq, gq) = (plant.nominal(place, speed, i, p) for i in range(2))
-        u = 0.4 * place[0] - 0.25 * speed[0] + 0.07 * place[1] - 0.03 * speed[1] + 0.5 * t[k]
-        u += 0.02 + 2e-3 * (f + fq) + 1e-4 * (g + 2.0 * gq) + 0.26
-        last += 1.3 * (np.clip(u, -2.5, 2.5) - last)
-        last = np.clip(last + noise[k, 2], -2.5, 2.5)
-        assert torque[k] == pytest.approx(last, abs=1e-12), k
-    assert np.abs(torque).max() == 2.5
-    known = tuple((MODEL_1_1 | changed).values())
-    pulse = 1.5 * np.exp(-0.5 * ((t - 0.02) / 0.05) ** 2)
-    force = np.eye(2)[driven] * (torque[:60] + pulse)[:, None]
-    for k in range(0, 60, 7):
-        slope = lambda _, state, k=k: simulator._slope.py_func(tuple(state), *force[k], known)  # noqa: E731
-        end = solve_ivp(
-            slope,
-            (0.0, 2e-3),
-            states[k],
-            rtol=1e-10,
-            atol=1e-12,
-        ).y[:, -1]
-        np.testing.assert_allclose(states[k + 1], end, atol=1e-6)
-
-
-def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
-    """One run of a level of the first test, and three, two and two of others."""
-    ends = [3.4, 3.4, 0.0, 3.4, 0.0, 0.0, 3.4, 0.0]  # up, or hanging
-    kinds = [("model", "a")] + [("model", "b")] * 3
-    kinds += [("delay", "c")] * 2 + [("perturbations", "d")] * 2
-    grid = []
-    for k, (test, name) in enumerate(kinds):
-        grid.append(Case(test=test, name=name, delay=k))
-    end = lambda case: (np.array([[ends[case.delay], 0.0, 0.0, 0.0]]), None)  # noqa: E731
-    monkeypatch.setattr(simulator, "Machine", lambda scenario: SimpleNamespace(simulate=end))
-    monkeypatch.setattr(simulator, "cases", lambda: grid)
-    monkeypatch.setattr(simulator, "TESTS", ("model", "delay", "perturbations"))
-    found = simulator.robustness(boards.entry("acrobot"))
-    assert found.survived["model"] == (("a", 0.0, True), ("b", 0.0, True))
-    assert found.percent == {"model": 100.0, "delay": 0.0, "perturbations": 0.0}
-    assert found.score == pytest.approx(1.0 / 3.0)
-
-
 @pytest.mark.parametrize("k", range(4))
 def test_upright_is_within_the_published_bounds_after_any_turns(k):
     bound = np.array([0.35, 0.35, 1.0, 1.0])[k] * np.eye(4)[k]
@@ -294,46 +208,7 @@ def test_the_linear_law_is_the_published_one(robot):
     np.testing.assert_allclose(law, np.negative(UPRIGHT_GAINS[robot]), rtol=1e-6)
 
 
-def test_uptime_and_swing_ups_of_a_motion_by_hand():
-    """Up at 1 to 1.2 s, 1.5 to 1.6 s, less than a second after that rise, and from 3 s to the end
-    at 60 s.
-    """
-    t = 2e-3 * np.arange(30_001)
-    up = ((t > 0.999) & (t < 1.199)) | ((t > 1.499) & (t < 1.599)) | (t > 2.999)
-    states = np.zeros((30_001, 4))
-    states[:, 0] = np.where(up, math.pi, 0.0)
-    run = global_policy.Run(states, np.zeros((30_000, 2)))
-    assert run.swing_ups == 2
-    assert run.uptime == pytest.approx(0.2 + 0.1 + 57.002, abs=1e-9)
-
-
 # this package's rows
-
-
-@ROBOTS
-def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, traces):
-    """The entry swings up and leads, and its score is the trajectory's: no row may be read as a
-    success of sliding mode.
-    """
-    entry = traces[robot]
-    top = entry.x[-1, ORDER[robot]]
-    assert np.abs(top - [math.pi, 0.0]).max() < 1e-3
-    gains = boards.FEEDBACKS["Riccati"]
-    feedback = gains["k"] * np.tanh(entry.s[:, 0] / gains["phi"])
-    assert np.abs(feedback).max() < 0.015  # N m, of 6
-    rows = boards.experiments(robot)
-    runs = dict(zip(rows, smc.run(list(rows.values())), strict=True))
-    assert boards.board(runs)[0].name in rows
-    score = {name: boards.score(trace) for name, trace in runs.items()}
-    published = []
-    for row in boards.SIMULATION[robot]["v2"]:
-        published.append(row.score)
-    for name, value in score.items():
-        if "sliding" in name:
-            assert value < min(published)
-        else:
-            assert value == pytest.approx(score[boards.NAME], abs=2e-4)
-    assert score[boards.NAME] > max(published)
 
 
 @pytest.mark.slow
@@ -396,66 +271,6 @@ def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
     assert [x[0], v[0], q[0], dq[0], u[0], u[-1], v[-1], dq[-1]] == pytest.approx(
         [0.0] * 8, abs=1e-8
     )
-
-
-@ROBOTS
-def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_its_end(robot):
-    template = getattr(entries, f"{robot}_swing_up")
-    rng = np.random.default_rng(2)
-    table = trajectory(robot)
-    nodes = float(table["step"]) * np.arange(len(table["u"]))
-    paths = []
-    for value, rate in (
-        ("x", "v"),
-        ("v", "a"),
-        ("q", "dq"),
-        ("dq", "ddq"),
-    ):
-        paths.append(CubicHermiteSpline(nodes, table[value], table[rate]))
-    for t in (0.0, 0.0013, 1.2345, nodes[-2], nodes[-1] - 1e-4, nodes[-1] + 3.0):
-        now = min(t, nodes[-1])
-        apart = rng.uniform(-0.3, 0.3, 4)
-        turns = 2.0 * math.pi * np.array([1, 0, -2, 0])
-        x, v, q, dq = np.array([path(now) for path in paths]) + apart + turns
-        rows = []
-        for key in ("s_x", "s_v", "s_q", "s_dq"):
-            rows.append(np.interp(t, nodes, table[key]))
-        y = SimpleNamespace(
-            t=t,
-            dt=0.004,
-            x=x,
-            v=v,
-            q=q,
-            dq=dq,
-        )
-        u, s = template.function(y, SimpleNamespace(k=0.7, phi=1.3), None)
-        assert s == pytest.approx(np.dot(rows, apart), abs=1e-9)
-        along = np.interp(t + 0.002, nodes, table["u"])
-        assert u == pytest.approx(along - 0.7 * math.tanh(s / 1.3), abs=1e-9)
-
-
-@ROBOTS
-def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
-    """At the end the law's linear part is the LQR of Q = diag(1, 1, 0.1, 0.1), R = 1."""
-    table = trajectory(robot)
-    plant = smc.plant(robot)
-    p = type("P", (), dict(plant.parameters))
-    top = np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0])
-    rest = np.zeros(2)
-    A = np.zeros((4, 4))
-    b = np.zeros((4, 1))
-    A[:2, 2:] = np.eye(2)
-    for i in range(2):
-        b[2 + i] = plant.nominal(top, rest, i, p)[1]
-        for j in range(2):
-            d = 1e-6 * np.eye(2)[j]
-            ahead = plant.nominal(top + d, rest, i, p)[0]
-            A[2 + i, j] = (ahead - plant.nominal(top - d, rest, i, p)[0]) / 2e-6
-    row = (b.T @ solve_continuous_are(A, b, np.diag([1.0, 1.0, 0.1, 0.1]), [[1.0]])).ravel()
-    last = []
-    for key in ("s_x", "s_q", "s_v", "s_dq"):
-        last.append(table[key][-1])
-    np.testing.assert_allclose(last, row, rtol=1e-5)
 
 
 def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(capsys):
