@@ -623,6 +623,11 @@ class Jump:
         constrain(self)
         object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
 
+    @property
+    def text(self) -> str:
+        """When it is, in words."""
+        return f"jump at {self.time:g} s"
+
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
@@ -659,6 +664,11 @@ class Fault:
         if self.bias:
             said.append(f"{who} {'−' if self.bias < 0.0 else '+'} {abs(self.bias):g}")
         return ", ".join(said) or "no fault"
+
+    @property
+    def text(self) -> str:
+        """What it does and when, in words."""
+        return f"{self.words} at {self.at:g} s"
 
 
 def parameter_factors(name: str, value: object) -> Frozen[float]:
