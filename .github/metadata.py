@@ -1,8 +1,7 @@
 """The README and the links of a release, from one address: `repository` in pyproject.toml.
 
 The package index shows the README outside of the repository, where relative links lead nowhere.
-With an address they become absolute. Without one the README stays as it is, and the release has no
-links.
+With an address they become absolute. Without one they are left out, and so are the release's own.
 """
 
 import re
@@ -12,6 +11,7 @@ from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 TARGET = re.compile(r"\]\((?!https?:|#)(?P<target>[^)]+)\)")  # of a relative link, or of a picture
 PICTURES = (".webp", ".png", ".svg")
+LINK = re.compile(r"\[([^\]]*)\]" + TARGET.pattern.removeprefix(r"\]"))
 FROM_A_FILE = "../../"  # how a badge's link leaves the folder of the branch
 
 
@@ -29,6 +29,11 @@ def absolute(text: str, repository: str) -> str:
     return TARGET.sub(replaced, text)
 
 
+def without_links(text: str) -> str:
+    """Return Markdown without relative pictures, and with the words alone of relative links."""
+    return LINK.sub(lambda found: found[1], re.sub("!" + LINK.pattern, "", text))
+
+
 class Metadata(MetadataHookInterface):
     """Fills in what depends on the repository's address."""
 
@@ -44,4 +49,6 @@ class Metadata(MetadataHookInterface):
                 "Changes": f"{repository}/blob/main/CHANGELOG.md",
                 "Issues": f"{repository}/issues",
             }
+        else:
+            text = without_links(text)
         metadata["readme"] = {"content-type": "text/markdown", "text": text}

@@ -89,6 +89,12 @@ def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel):
 
 
 @pytest.mark.slow
+def test_no_link_of_the_wheel_s_page_leads_nowhere(wheel):
+    archive = zipfile.ZipFile(wheel)
+    (page,) = [name for name in archive.namelist() if name.endswith("/METADATA")]
+    assert re.findall(r"\]\((?!https?:)[^)]*\)", archive.read(page).decode()) == []
+
+
 def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     done = run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
     assert done.returncode == 0, done.stderr

@@ -2,7 +2,6 @@
 one process.
 """
 
-import ctypes
 import itertools
 import subprocess
 import sys
@@ -18,7 +17,6 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', 
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
-from helpers.pages import ROOT  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
@@ -400,36 +398,6 @@ def test_an_input_that_is_not_finite_ends_it_with_the_time(folder):
     fmu.fmu.reset()
     fmu.begin()
     fmu.step(0.0, x=0.1)
-
-
-# the example
-
-
-def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
-    law = smc.law("super_twisting", k1=5.0, k2=8.0)
-    (folder / "super_twisting.c").write_text(smc.exchange.law_to_c(law))
-    (folder / "controller.c").write_text((ROOT / "examples" / "controller.c").read_text())
-    library = folder / "controller.so"
-    flags = [*build.LIBRARY_FLAGS, "-Wall", "-Wextra", "-Werror"]
-    subprocess.run(
-        [*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"],
-        check=True,
-    )
-    block = ctypes.CDLL(str(library))
-    block.controller.argtypes = [ctypes.c_double] * 5 + [ctypes.POINTER(ctypes.c_double)] * 2
-    trace = smc.run(scenario(law, u_max=6.0))
-    u = ctypes.c_double()
-    s = ctypes.c_double()
-    found = []
-    for _ in range(2):
-        block.controller_start()
-        for k, t in enumerate(trace.t):
-            r, dr, _ = type(REFERENCE).value(t, REFERENCE)
-            block.controller(
-                t, trace.x[k, 0], trace.v[k, 0], r, dr, ctypes.byref(u), ctypes.byref(s)
-            )
-            found.append((u.value, s.value))
-    np.testing.assert_array_equal(found, np.tile(np.c_[trace.u, trace.s], (2, 1)))
 
 
 # description
