@@ -14,7 +14,8 @@ amplitude that grows from 0, so it tolerates a little more. Theory also gives th
 dry friction, that holds the plant at 5 % of its scale; with friction it may stop closer to the
 reference.
 
-All searches advance together, a batch of runs per round.
+All searches advance together, a batch of runs per round. The fast engine runs what it can. MuJoCo
+then runs both ends of what it found, and searches again where it does not agree.
 """
 
 import dataclasses
@@ -26,6 +27,8 @@ from typing import TypeVar
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
+from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.constraints import Boolean, constrained
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
@@ -39,7 +42,6 @@ from smc_mujoco.metrics.conventions import by_group, scale
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
-from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.signals import Constant, Fault, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
@@ -186,10 +188,13 @@ def tolerates(trace: Trace) -> bool:
     """Return whether a run did not fail and ended within 5 % of its scale, in every group of its
     channels.
     """
-    if trace.failure is not None:
-        return False
+    return trace.failure is None and rest_share(trace) <= TOLERATED_ERROR
+
+
+def rest_share(trace: Trace) -> float:
+    """Return the ultimate bound over the scale, of the worst group of channels."""
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
-    return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in by_group(trace).values())
+    return max(bound(part) / scale(part) for part in by_group(trace).values())
 
 
 def _critical_delay(base: Scenario) -> float | None:
@@ -327,6 +332,7 @@ def margins(
     report: Report = lambda done, whole: None,
     condition: str | Condition = "nominal",
     starts: Starts | None = None,
+    device: Device = "cpu",
 ) -> list[Margin]:
     """Return the margins of laws on plants: plant by plant, law by law, kind by kind.
 
@@ -343,6 +349,7 @@ def margins(
         estimate until the end.
       condition: condition of the runs, such as "coulomb".
       starts: initial states, see `smc.starts`. Default: the plant's own x0.
+      device: on which the fast engine searches, "cpu" or "cuda".
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
@@ -359,7 +366,8 @@ def margins(
             raise ScenarioError(
                 f"{base.plant.name} starts at 0, and a margin is a share of the start: {START_CURE}"
             )
-    return margins_of(bases, listed("kinds", kinds), COARSE if quick else FINE, threads, report)
+    resolution = COARSE if quick else FINE
+    return margins_of(bases, listed("kinds", kinds), resolution, threads, report, device)
 
 
 def margins_of(
@@ -368,6 +376,7 @@ def margins_of(
     resolution: float = FINE,
     threads: int | None = None,
     report: Report = lambda done, whole: None,
+    device: str = "cpu",
 ) -> list[Margin]:
     """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
     cells = []
@@ -375,40 +384,46 @@ def margins_of(
         for kind in kinds:
             cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
     searches = [kind.search(base, resolution) for base, kind in cells]
-    going = dict(enumerate(searches))
+    runs = Runs({"rest_share": rest_share}, device, threads)
     done = 0
-    broken = {}
 
-    def tolerated(groups: Sequence[Sequence[Scenario]]) -> list[bool]:
-        """Run groups of scenarios, and return whether all of a group are tolerated.
-
-        Traces are not kept.
-        """
+    def tolerated(tried: Sequence[tuple[int, float | None]], runner: Callable) -> list[bool]:
+        """Return whether the levels of these searches are tolerated; None is the unchanged run."""
         nonlocal done
-        scenarios = [one for group in groups for one in group]
+        scenarios = []
         owners = []
-        for k, group in enumerate(groups):
-            for _ in group:
-                owners.append(k)
+        for k, (i, level) in enumerate(tried):
+            base, kind = cells[i]
+            some = [base] if level is None else kind.scenarios(base, level)
+            scenarios += some
+            owners += [k] * len(some)
         now = sum(scenario.work for scenario in scenarios)
-        expected = sum(
-            search.left * cells[i][0].work * (1 + cells[i][1].signed) for i, search in going.items()
-        )
-        results = [True] * len(groups)
-        for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, expected))):
-            results[owners[i]] &= tolerates(trace)
-            if trace.broken:
-                broken.setdefault(trace.scenario.law.name, trace.broken)
+        expected = 0
+        for (base, kind), search in zip(cells, searches, strict=True):
+            expected += search.left * base.work * (1 + kind.signed)
+        results = [True] * len(tried)
+        scores = runner(scenarios, summed(report, done, done + max(now, expected)))
+        for k, ((share,), _) in zip(owners, scores, strict=True):
+            results[k] &= share <= TOLERATED_ERROR
         done += now
         return results
 
-    without = tolerated([[base] for base in bases])
-    going = {i: search for i, search in going.items() if without[i // len(kinds)]}
-    find_boundaries(
-        going,
-        lambda tried: tolerated([cells[i][1].scenarios(cells[i][0], level) for i, level in tried]),
-    )
-    warn_of_broken(broken)
+    firsts = [(i, None) for i in range(0, len(cells), len(kinds))]
+    held = tolerated(firsts, runs.by_mujoco)
+    going = {i: search for i, search in enumerate(searches) if held[i // len(kinds)]}
+    find_boundaries(going, lambda tried: tolerated(tried, runs.scored))
+    ends = []  # MuJoCo has the last word on them
+    for i, search in going.items():
+        base, kind = cells[i]
+        for level in (search.low, search.high):
+            if kind.none < level < math.inf and runs.covers(kind.scenarios(base, level)[0]):
+                ends.append((i, level))
+    again = {}
+    for (i, level), good in zip(ends, tolerated(ends, runs.by_mujoco), strict=True):
+        if good != (level == going[i].low):
+            again[i] = searches[i] = cells[i][1].search(cells[i][0], resolution)
+    find_boundaries(again, lambda tried: tolerated(tried, runs.by_mujoco))
+    warn_of_broken(runs.broken)
     return [
         Margin(
             plant=base.plant.name,

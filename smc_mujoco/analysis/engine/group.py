@@ -1,6 +1,7 @@
 """Scenarios as groups of runs that one loop can make: their form, and their numbers in rows."""
 
 import math
+from collections import Counter
 from collections.abc import Hashable, Sequence
 from typing import Any
 
@@ -104,16 +105,25 @@ class Group:
     Args:
       scenarios: of one `key`.
       metrics: what is scored, names of `scores.METRICS`.
+      known: a form of this key whose code is there; the group's then has all of it.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], metrics: Sequence[str] = ()):
+    def __init__(
+        self, scenarios: Sequence[Scenario], metrics: Sequence[str] = (), known: Form | None = None
+    ):
         resolved = [scenario.resolved for scenario in scenarios]
         first = resolved[0]
         laws, nominal, estimator, surface = _parts(first)
         n, driven, joint, kinds, feedforward, errors, true_model = _fixed(first)
         clock = not all(s.clock.regular for s in resolved)
         delay = max(s.delay_steps // s.steps for s in resolved)
-        self.form = Form(
+        slots = 1
+        while slots < delay + 1 + clock:  # few sizes, each of which is compiled
+            slots *= 16
+        kinds_of_all: Counter[type] = Counter()
+        for s in resolved:
+            kinds_of_all |= Counter(map(type, s.disturbance))
+        form = Form(
             n=n,
             driven=driven,
             joint=joint,
@@ -122,7 +132,7 @@ class Group:
             estimator=estimator,
             surface=surface,
             references=kinds,
-            disturbances=_kinds(resolved),
+            disturbances=tuple(kinds_of_all.elements()),
             feedforward=feedforward,
             errors=errors,
             noise=any(s.noise.position or s.noise.velocity for s in resolved),
@@ -130,9 +140,10 @@ class Group:
             jump=any(s.jump for s in resolved),
             delay=any(s.delay_steps for s in resolved),
             clock=clock,
-            slots=delay + 1 + clock,
+            slots=slots,
             metrics=tuple(metrics),
         )
+        self.form = _wider(form, known)
         self.scenarios = resolved
         self.places = row_places(self.form)
         self.rows = np.zeros((len(resolved), self.places.size))
@@ -271,14 +282,14 @@ def _bands(s: Resolved) -> np.ndarray:
     return bands
 
 
-def _kinds(scenarios: Sequence[Resolved]) -> tuple[type, ...]:
-    """Return kinds of disturbances that hold those of every scenario."""
-    counts: dict[type, int] = {}
-    for s in scenarios:
-        of_one = [type(d) for d in s.disturbance]
-        for kind in of_one:
-            counts[kind] = max(counts.get(kind, 0), of_one.count(kind))
-    kinds: list[type] = []
-    for kind, count in counts.items():
-        kinds += [kind] * count
-    return tuple(kinds)
+def _wider(form: Form, other: Form | None) -> Form:
+    """Return a form that also has what another one of the same `key` has, for a loop for both."""
+    if other is None:
+        return form
+    flags = {}
+    for name in ("noise", "jump", "delay", "clock"):
+        flags[name] = getattr(form, name) or getattr(other, name)
+    kinds = Counter(form.disturbances) | Counter(other.disturbances)
+    return form._replace(
+        **flags, disturbances=tuple(kinds.elements()), slots=max(form.slots, other.slots)
+    )

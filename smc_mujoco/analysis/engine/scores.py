@@ -12,11 +12,12 @@ from typing import Any
 from numba import njit
 
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
+from smc_mujoco.metrics.conventions import SETTLING_BAND
 
 # without wrappers for Python, which would take half the time to compile
 OPTIONS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 own = njit(error_model="numpy", **OPTIONS)
-RESTING = ("settling_time",)  # of a reference that does not move
+RESTING = ("settling_time", "rest_share")  # of a reference that does not move
 
 
 def tallying(form: Form) -> Any:
@@ -185,7 +186,23 @@ def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
     return take, score
 
 
+def _rest_share(form: Form, at: int) -> tuple[Any, Any]:
+    """Return the largest |e| of the last part over its channel's scale."""
+    n = form.n
+    X, R = work_places(form).of("sample_x", "r")
+    BANDS, LATE = row_places(form).of("bands", "late")
+
+    @own
+    def take(row, work, k):
+        if k >= row[LATE]:
+            for i in range(n):
+                work[at] = max(work[at], abs(work[X + i] - work[R + i]) / row[BANDS + i])
+
+    return take, own(lambda row, work: SETTLING_BAND * work[at])
+
+
 METRICS: dict[str, Callable] = {
+    "rest_share": _rest_share,
     "itae": _integral("itae"),
     "iae": _integral("iae"),
     "ise": _integral("ise"),

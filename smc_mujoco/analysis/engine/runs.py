@@ -1,0 +1,125 @@
+"""Scores of many scenarios without their traces: by the fast engine where it can, else by MuJoCo.
+
+Where the engine's numbers are shown, MuJoCo repeats some of them, and `Runs.checked` says how far
+apart they were.
+"""
+
+import math
+import random
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+
+from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine.form import Form
+from smc_mujoco.simulation import prepare
+from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace, warn_of_broken
+
+CHECKED = 20  # of the fast engine's runs, which MuJoCo makes again; chosen
+Scored = tuple[list[float], float | None]  # metrics, and the time of a failure, s
+Report = Callable[[float], None]  # called with the physics steps since its last call
+
+
+class Runs:
+    """Runs that are scored.
+
+    Args:
+      formulas: name of a metric -> its value for a trace of MuJoCo's.
+      device: of the fast engine.
+      threads: as in `run`.
+    """
+
+    def __init__(
+        self,
+        formulas: Mapping[str, Callable[[Trace], float]],
+        device: Device = "cpu",
+        threads: int | None = None,
+    ):
+        self.formulas = formulas
+        self.device = device
+        self.threads = threads
+        self.broken: dict[str, str] = {}  # law -> how it failed first, in a sentence
+        self.forms: dict[Hashable, Form] = {}
+        self.random = random.Random(0)
+        self.count = 0
+        self.drawn: list[tuple[Scenario, Scored]] = []
+
+    def scored(
+        self, cases: Sequence[Scenario], report: Report = lambda steps: None
+    ) -> list[Scored]:
+        """Return the scores of scenarios, in their order."""
+        from smc_mujoco.analysis.engine.group import Group, key
+
+        found: list[Scored] = [([], None)] * len(cases)
+        members: dict[Hashable, list[int]] = {}
+        for i, case in enumerate(cases):
+            group = key(case) if self.covers(case) else None
+            members.setdefault(group, []).append(i)
+        for group, indices in members.items():
+            some = [cases[i] for i in indices]
+            if group is None or prepare.why_not(some[0]):
+                scored = self.by_mujoco(some, report)
+            else:
+                made = Group(some, tuple(self.formulas), self.forms.get(group))
+                self.forms[group] = made.form
+                scored = made.scored(self.device, self.threads)
+                report(sum(case.work for case in some))
+                self._take(some, scored)
+            for i, scores in zip(indices, scored, strict=True):
+                found[i] = scores
+        return found
+
+    def covers(self, case: Scenario) -> bool:
+        """Return whether the fast engine can run a scenario."""
+        from smc_mujoco.analysis.engine.group import why_not
+
+        return not why_not(case, tuple(self.formulas), self.device)
+
+    def by_mujoco(
+        self, cases: Sequence[Scenario], report: Report = lambda steps: None
+    ) -> list[Scored]:
+        """Return the same, by MuJoCo alone."""
+        found: list[Scored] = [([], None)] * len(cases)
+        for i, trace in stream(cases, self.threads, report):
+            values = [math.nan] * len(self.formulas)
+            if trace.diverged_at is None:
+                values = [formula(trace) for formula in self.formulas.values()]
+            elif trace.broken:
+                self.broken.setdefault(trace.scenario.law.name, trace.broken)
+            found[i] = values, trace.diverged_at
+        return found
+
+    def _take(self, cases: Sequence[Scenario], scored: Iterable[Scored]) -> None:
+        """Draw runs evenly from all, see J. S. Vitter, ACM Trans. Math. Softw. 11:37, 1985,
+        algorithm R.
+        """
+        for pair in zip(cases, scored, strict=True):
+            self.count += 1
+            if len(self.drawn) < CHECKED:
+                self.drawn.append(pair)
+            elif (place := self.random.randrange(self.count)) < CHECKED:
+                self.drawn[place] = pair
+
+    def checked(self) -> str:
+        """Return in words how far the scores are from MuJoCo's, which repeats some runs.
+
+        Warn of laws that fail in these, or in MuJoCo's own.
+        """
+        others = self.by_mujoco([case for case, _ in self.drawn])
+        warn_of_broken(self.broken)
+        if not self.drawn:
+            return "MuJoCo made all runs"
+        apart = dict.fromkeys(self.formulas, 0.0)
+        failed = 0  # in one of the two
+        for (_, (ours, time)), (theirs, other_time) in zip(self.drawn, others, strict=True):
+            if (time is None) != (other_time is None):
+                failed += 1
+            elif time is None:
+                for name, value, other in zip(apart, ours, theirs, strict=True):
+                    if value != other and not (math.isnan(value) and math.isnan(other)):
+                        apart[name] = max(apart[name], abs(value - other))
+        parts = [f"{name} {value:.1g}" for name, value in apart.items()]
+        return (
+            f"MuJoCo repeated {len(self.drawn)} runs: {failed} failed in one engine alone, the "
+            f"others are apart by at most {', '.join(parts)}"
+        )
