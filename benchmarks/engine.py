@@ -128,7 +128,8 @@ def picture(path: str, device: str, side: int = 1000) -> None:
     )
     axes.set(xlabel="x(0), rad", ylabel="v(0), rad/s")
     share = 100.0 * found.share
-    axes.set_title(f"{share:.2f} % of {side**2:,} starts come upright\n{found.checked}", fontsize=9)
+    told = f"{share:.2f} % of {side**2:,} starts come upright: dark within 1.5 s, grey 4, yellow 10"
+    axes.set_title(f"{told}\n{found.checked}", fontsize=9)
     figure.savefig(path, dpi=200)
     print(f"{path}: {share:.3f} % of {side**2:,} starts in {seconds:.1f} s; {found.checked}")
 

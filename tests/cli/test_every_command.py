@@ -59,7 +59,7 @@ CALLS = {
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["analysis.margins.margins"],
     "margins --quick": ["analysis.margins.margins"],
-    "margins duffing --law pid --kinds delay,mass --gains default --quick --condition noise --x0 "
+    "margins duffing --law pid --kinds delay,mass --gains default --quick --device cuda --condition noise --x0 "
     "0.4 "
     "--json m.json --threads 2": ["analysis.margins.margins"],
     "worst duffing": ["studies.worst_case.worst_case"],

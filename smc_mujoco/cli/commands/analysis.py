@@ -32,6 +32,7 @@ Bound = Annotated[
 Metric = Annotated[
     str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")
 ]
+Device = Annotated[str, typer.Option(help="Of the fast engine: cpu, or cuda for an NVIDIA card.")]
 QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
     "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
@@ -63,9 +64,7 @@ def tune(
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
-    device: Annotated[
-        str, typer.Option(help="Of the fast engine: cpu, or cuda for an NVIDIA card.")
-    ] = "cpu",
+    device: Device = "cpu",
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
@@ -129,6 +128,7 @@ def margins(
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
+    device: Device = "cpu",
 ) -> None:
     """Find how much a law tolerates: the largest level at which the error still ends below 5 % of
     its start.
@@ -159,7 +159,16 @@ def margins(
     with bar("margins") as progress:
         start = options.starts(x0)
         results = search(
-            machines, chosen, kind, gains, quick, threads, progress.reached, condition, start
+            machines,
+            chosen,
+            kind,
+            gains,
+            quick,
+            threads,
+            progress.reached,
+            condition,
+            start,
+            device,
         )
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
