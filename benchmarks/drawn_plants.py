@@ -73,7 +73,7 @@ def hinge_nominal(x, v, i, p):
 
 def plant(name, unit, x0, parameters, mass, build, fields, nominal):
     """Return a plant of one channel."""
-    about = {"mass": mass, "unit": unit, "x0": (x0,), "lane": (0.0, 1.0, 0.0)}
+    about = {"mass": mass, "unit": unit, "x0": (x0,)}
     return Plant(
         name=name, parameters=parameters, build=build, fields=fields, nominal=nominal, **about
     )

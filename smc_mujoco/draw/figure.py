@@ -39,7 +39,7 @@ PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}
 BLOCK_WIDTHS = (1.4, 1.0, 1.0)  # relative: of panels over time, of single controls, of those beside
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
-LINE_ROW, LINES_ROW = 0.32, 0.45  # relative height of a row with one line, and with several
+LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
 ROW_FILLED = 0.82  # part of a row that its axes fill
 SLIDE_PANELS = "x", "u", "settling", "channels"
 
@@ -66,8 +66,8 @@ def figure(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure:
-    """Draw traces of one plant: x, u and s over time, the phase portrait, |x - r|, and a close-up
-    of the end of u.
+    """Draw traces of one plant: x, u, s and a disturbance over time, the phase portrait (of the
+    error where the reference moves), |x - r|, and a close-up of the end of u.
 
     x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis.
     Each run of a network has a row with a line for each channel, and there is the spread max x -
@@ -241,6 +241,8 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
     if several and traces[0].scenario.plant.direct:
         return ["channels", "tip", "contact", "settling"]
     names = ["x", "spread", "u", "delivered", "reaction"]
+    if any(np.nan_to_num(trace.d).any() for trace in traces):
+        names.insert(3, "d")
     if several:
         return [*names, "settling"]
     if np.nan_to_num(np.concatenate([trace.s for trace in traces])).any():

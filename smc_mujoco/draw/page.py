@@ -47,7 +47,7 @@ SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 TEXT_SIZE = 11.0  # points on a full page
 TITLE_SIZE = 17.0
-ENTRY_SAMPLE = 1.6  # of a legend's entry, in heights of its letters: its sample
+ENTRY_SAMPLE = 2.4  # of a legend's entry, in heights of its letters: its sample
 ENTRY_SPACE = 2.3  # and all its spaces
 TITLE_PAD = 5.0  # points on a full page, above the title
 # largest width of a legend's entry, of the page's: in several columns, in one
@@ -212,11 +212,12 @@ def run_handles(
     """
     handles: list[Handle] = []
     gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
-    for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
+    looks = style.looks(traces)
+    for trace, name, colour, source, look in zip(traces, names, colours, gains, looks, strict=True):
         words = style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE) + source
         if how := style.ending(trace):
             words += f" ({how})"
-        handles.append(entry(words, colour))
+        handles.append(entry(words, colour, lw=style.points(2.0), **look))
     return handles, shared
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
@@ -32,6 +32,7 @@ MIN_CLOSE_UP = 0.02
 MAX_DRAWN_CHANNELS = 40
 # of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
 LASTING_QUANTILE = 0.98
+LEAST_LASTING = 0.02  # of the peaks: an axis that holds these shows smaller lasting values, too
 MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words
 CROWDED_STRIP = 3  # groups of channels, from which on a film has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
@@ -54,9 +55,10 @@ REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
 ZOOM = 1.3
 MAX_ZOOMED = 0.5
 MIN_ERROR = 1e-9  # smaller errors are drawn at it; chosen
-MIN_RATIO = 20.0  # least ratio of a logarithmic axis; chosen
+MIN_RATIO = 4.0  # least ratio of a logarithmic axis, without its margin; chosen
 QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
     **dict.fromkeys(("spread", "e", "settling"), "x"),
+    "de": "v",
     **dict.fromkeys(("largest", "applied"), "u"),
     **dict.fromkeys(("reaction", "d"), "force"),
 }
@@ -66,6 +68,7 @@ WORDS = {
     "spread": "max − min x",
 }  # quantity -> words instead of a letter
 KINDS = {"v": "velocity", "s": "sliding variable", "e": "error", "d": "disturbance"}
+KINDS |= {"de": "its rate"}
 KINDS |= dict.fromkeys(("u", "applied"), "control")
 WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
@@ -101,6 +104,7 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
     "e": lambda trace: trace.x - trace.r,
     "v": lambda trace: trace.v,
+    "de": lambda trace: trace.v - np.gradient(trace.r, trace.t, axis=0),
     "u": lambda trace: trace.u,
     "applied": lambda trace: trace.applied,
     "d": lambda trace: trace.d,
@@ -154,7 +158,7 @@ class Panel(NamedTuple):
             return f"|v − r′|{unit}"
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
-        letter = WORDS.get(name, name)
+        letter = {"de": "e′"}.get(name, WORDS.get(name, name))
         if speed:
             letter = {"x": "v", "e": "v − r′"}.get(name, letter)
         if not group.driven:
@@ -216,15 +220,22 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
     """
     found = []
     for group, parts in style.split(traces).items():
-        runs = [part for part in parts if part.diverged_at is None] or parts
-        means = [np.nanmean(np.abs(part.x - part.r), axis=0) / scale(part) for part in runs]
-        found += zip(np.max(means, axis=0), by_channel(Panel("e", group, parts)), strict=True)
+        size = max(map(scale, parts))
+        for panel in by_channel(Panel("e", group, parts)):
+            found.append((mean_error(panel) / size, panel))
     found.sort(key=lambda one: -one[0])
     return [panel for _, panel in found]
 
 
+def mean_error(panel: Panel) -> float:
+    """Return the largest mean |x - r| of a panel's runs, those that failed included."""
+    return max(float(np.nansum(np.abs(run.x - run.r))) / len(run.t) for run in panel.traces)
+
+
 def by_channel(panel: Panel) -> list[Panel]:
-    """Return a panel for each channel of a panel's group whose error counts."""
+    """Return a panel for each channel of a panel's group whose error counts, first that of the
+    largest.
+    """
     if panel.quantity in SINGLE:
         return [panel]
     panels = []
@@ -234,7 +245,7 @@ def by_channel(panel: Panel) -> list[Panel]:
         traces = [group_trace(trace, within) for trace in panel.traces]
         group = dataclasses.replace(panel.group, channels=(channel,))
         panels.append(Panel(panel.quantity, group, traces, channel))
-    return panels
+    return sorted(panels, key=mean_error, reverse=True)
 
 
 def actuators(traces: Sequence[Trace]) -> list[Panel]:
@@ -410,6 +421,16 @@ def until(trace: Trace, time: float) -> Trace:
     return dataclasses.replace(trace, **part)
 
 
+def since(trace: Trace, time: float) -> Trace:
+    """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
+    first = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 2)
+    part = {name: array[first:] for name, array in trace.arrays().items()}
+    part["t"] = part["t"] - part["t"][0]
+    calm = {"duration": float(part["t"][-1]), "jump": None, "fault": None}
+    scenario = dataclasses.replace(trace.scenario, **calm)
+    return dataclasses.replace(trace, scenario=scenario, **part)
+
+
 def over_time(
     ax: Axes,
     panel: Panel,
@@ -432,17 +453,20 @@ def over_time(
     heights = limits(traces, name)
     if name in PEAKS:
         ax.set_yscale("log")
-        ax.yaxis.set_minor_formatter(NullFormatter())
+        if heights[1] > 10.0 * heights[0]:
+            ax.yaxis.set_minor_formatter(NullFormatter())
+        else:  # numbers between decades may be all there are
+            ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
     ax.set_ylim(limits(among or traces, name))
     set_numbers(ax.yaxis, panel._replace(traces=among or traces))
     if name == "reaction":
         clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
-    rows = zip(traces, colours, means, strict=True)
-    for trace, colour, mean in reversed(list(rows)):
+    rows = zip(traces, colours, means, style.looks(traces), strict=True)
+    for trace, colour, mean, look in reversed(list(rows)):
         y = QUANTITIES[name](trace)
-        look: dict[str, Any] = {"color": colour, "drawstyle": steps(trace, name)}
+        look |= {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:
             artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
         if y.shape[1] > 1:
@@ -453,8 +477,8 @@ def over_time(
         end = trace.t[-1] + trace.scenario.control_period
         if trace.diverged_at is not None and end > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
-            look: dict[str, Any] = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
-            artists += ax.plot(trace.t[-1], last, "X", **look)
+            ending: dict[str, Any] = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
+            artists += ax.plot(trace.t[-1], last, "X", **ending)
     if names and (name in SINGLE or len(panel.group.channels) == 1):
         lines = [(trace.t, y) for trace, y in zip(traces, means, strict=True)]
         tell_agreements(ax, agreements(lines, heights, name in PEAKS), names)
@@ -593,18 +617,18 @@ def agreement_words(shared: Sequence[Agreement], names: Sequence[str], named: bo
 
 
 def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
-    """Fit the vertical range to lasting reactions.
+    """Fit the vertical range to lasting reactions, such as friction, where there are any.
 
-    Mark short impacts outside it and print their size.
+    Mark short impacts outside it by arrows, the largest of each run with its size.
     """
     peak = 0.0
-    usual = max(map(abs, span(panel.traces, "u")))
+    usual = 0.0
     for trace in panel.traces:
         sizes = np.abs(trace.reaction[np.isfinite(trace.reaction)])
         if sizes.size:
             peak = max(peak, float(sizes.max()))
             usual = max(usual, float(np.quantile(sizes, LASTING_QUANTILE)))
-    if not peak > 2.0 * usual > 0.0:
+    if not peak > 2.0 * usual > LEAST_LASTING * peak:
         return
     top = 1.16 * usual
     ax.set_ylim(-top, top)
@@ -679,26 +703,33 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
 
 
 def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
-    """Draw v over x of a panel's traces.
+    """Draw v over x of a panel's traces; under a reference that moves, the error's rate over the
+    error.
 
     A ring marks the start of a trace.
     """
     traces = panel.traces
-    speed = panel._replace(quantity="v")
-    for axis, words in ((ax.xaxis, panel), (ax.yaxis, speed)):
+    names = "x", "v"
+    if any(np.nan_to_num(np.ptp(trace.r, axis=0)).any() for trace in traces):
+        names = "e", "de"
+    pair = [panel._replace(quantity=name) for name in names]
+    for axis, words in zip((ax.xaxis, ax.yaxis), pair, strict=True):
         set_numbers(axis, words)
         axis.set_label_text(words.label)
-    ax.set(xlim=limits(traces, "x"), ylim=limits(traces, "v"))
+    ax.set(xlim=limits(traces, names[0]), ylim=limits(traces, names[1]))
     one = traces[0].x.shape[1] == 1
     width = style.points(LINE if one else LIGHT_LINE)
-    for trace, colour in reversed(list(zip(traces, colours, strict=True))):
-        for i in drawn_channels(trace.x):
-            x = trace.x[:, i]
-            v = trace.v[:, i]
-            ax.plot(x, v, color=colour, lw=width)
+    rows = zip(traces, colours, style.looks(traces), strict=True)
+    for trace, colour, look in reversed(list(rows)):
+        places = QUANTITIES[names[0]](trace)
+        speeds = QUANTITIES[names[1]](trace)
+        for i in drawn_channels(places):
+            x = places[:, i]
+            v = speeds[:, i]
+            ax.plot(x, v, color=colour, lw=width, **look)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         if trace.diverged_at is not None:
-            ax.plot(trace.x[-1, 0], trace.v[-1, 0], "X", color=colour, zorder=5, **cross())
+            ax.plot(places[-1, 0], speeds[-1, 0], "X", color=colour, zorder=5, **cross())
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
 
@@ -711,11 +742,12 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     set_numbers(ax.yaxis, panel)
     begin = max(0.0, stop - LAST_SAMPLES * panel.traces[0].scenario.control_period)
     ends = []
-    for trace, colour in reversed(list(zip(panel.traces, colours, strict=True))):
+    rows = zip(panel.traces, colours, style.looks(panel.traces), strict=True)
+    for trace, colour, look in reversed(list(rows)):
         part = trace.t >= begin - 1e-9
         u = trace.u[part, 0]
         t = 1e3 * (trace.t[part] - stop)
-        ax.step(t, u, where="post", color=colour, lw=style.points(LINE))
+        ax.step(t, u, where="post", color=colour, lw=style.points(LINE), ls=look["ls"])
         if u.size:
             ends += [u.min(), u.max()]
     if ends:

@@ -56,6 +56,8 @@ PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}
 # where a word begins in DCMotor, but not in LuGre
 CAMEL = re.compile(r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])")
 MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve they begin again
+# of the runs in a picture, in widths of a line, for the same readers; chosen
+DASHES = ["-", (0, (6, 1.4)), (0, (5, 1.3, 1.2, 1.3)), (0, (1.5, 1.2)), (0, (9, 1.3)), (0, (3, 1))]
 MAX_VALUES = 8  # numbers of a label
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST = 61.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper
@@ -165,18 +167,18 @@ def law_colour(law: Component | str) -> str:
 
 
 def trace_colours(traces: Sequence[Trace]) -> list[str]:
-    """Return one colour per trace, that of its law, all different."""
+    """Return one colour per trace, that of its law."""
     return law_colours([trace.scenario.law for trace in traces])
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
-    """Return one colour per law for one picture, all different.
+    """Return one colour per law for one picture, all laws' different.
 
     The library's laws have their colours, in pictures of two and of many. Only one that would be
     mistaken for a law that is before it in the palette, wherever they stand, gets the colour
     farthest from all: any 12 laws are then 13.7 apart, 24 are 9.6. Laws that are not of the
-    library, whose colours say nothing, come after them. A law that runs several times has shades of
-    its colour, from light to dark.
+    library, whose colours say nothing, come after them. A law that runs several times has one
+    colour, and lines and marks tell its runs apart, see `looks`.
     """
     names = [_template(law)[1] for law in laws]
     everyone = range(len(laws))
@@ -189,16 +191,30 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     changed = []
     for i in dict.fromkeys([*library, *everyone]):
         wanted = law_colour(laws[i])
-        several = names.count(names[i])
-        if several > 1:
-            colours[i] = ramp(wanted, several)[names[:i].count(names[i])]
-        elif any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
+        if names.index(names[i]) < i:  # it has the colour of the first
+            continue
+        if any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
             changed.append(i)
         else:
             colours[i] = wanted
     found = _farthest([*colours.values(), *NEUTRAL], len(changed))
     colours |= zip(sorted(changed), found, strict=True)
-    return [colours[i] for i in everyone]
+    return [colours[names.index(name)] for name in names]
+
+
+def looks(traces: Sequence[Trace]) -> list[dict[str, Any]]:
+    """Return the look of the line of each trace in a picture, which tells it from the others
+    without colour: its dashes, and a mark of runs that share a law.
+    """
+    names = [_template(trace.scenario.law)[1] for trace in traces]
+    found = []
+    for i, name in enumerate(names):
+        look: dict[str, Any] = {"ls": DASHES[i % len(DASHES)]}
+        if names.count(name) > 1:
+            mark = MARKS[names[:i].count(name) % len(MARKS)]
+            look |= {"marker": mark, "ms": points(4.5), "markevery": (0.04 + 0.02 * i, 0.2)}
+        found.append(look)
+    return found
 
 
 @functools.cache

@@ -116,7 +116,6 @@ class Plant:
     # (x, v, i, p) -> f and g of channel i, from x and v of all channels, (n,) each, and nominal
     # parameters p
     nominal: Any
-    lane: tuple[float, float, float]  # m, offset between machines that stand side by side in a film
     # Kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs
     contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(
         default_factory=dict

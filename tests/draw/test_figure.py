@@ -101,8 +101,9 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
     spikes[100:103], spikes[200] = 900.0, -400.0
     calm = []
     for one in pair:
-        calm.append(dataclasses.replace(one, u=0.0 * one.u + 5.0, reaction=one.reaction * 0.0))
+        calm.append(dataclasses.replace(one, reaction=one.reaction * 0.0 + 20.0))
     for first, title in (
+        (dataclasses.replace(calm[0], reaction=20.0 + spikes), "|reaction| up to 920 N"),
         (dataclasses.replace(calm[0], reaction=spikes), "|reaction| up to 900 N"),
         (calm[0], ""),
     ):
@@ -115,7 +116,12 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
         marks = []
         for line in ax.lines:
             marks.append((line.get_color(), line.get_marker(), *line.get_xydata().tolist()))
-        sides = [("r", 2, [first.t[100], 5.8]), ("r", 3, [first.t[200], -5.8]), ("b", 2), ("b", 3)]
+        sides = [
+            ("r", 2, [first.t[100], 23.2]),
+            ("r", 3, [first.t[200], -23.2]),
+            ("b", 2),
+            ("b", 3),
+        ]
         assert ax.get_title(loc="right") == title
         assert marks == (sides if title else [])
 

@@ -266,7 +266,7 @@ ARM = """
 PANELS = {  # what is run -> labels that a figure of it has, and parts of labels that it has not
     "ideal": (
         {"plant": "duffing"},
-        ["position x (m)", "control u (N)", "velocity v (m/s)"],
+        ["position x (m)", "control u (N)", "its rate e′ (m/s)"],
         ["reaction", "delivered"],
     ),
     "friction": ({"plant": "duffing", "friction": Coulomb(0.5)}, ["reaction (N)"], ["delivered"]),
@@ -275,9 +275,9 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
         {"plant": "cart_pole", "law": "hierarchical", "model": "nominal"},
         [
             "position x (m)",
-            "velocity v (m/s)",
+            "its rate e′ (m/s)",
             "free angle q (rad)",
-            "velocity q′ (rad/s)",
+            "its rate e′ (rad/s)",
             "control u (N)",
         ],
         ["reaction", "sliding variable s ("],  # whose unit is the law's

@@ -3,8 +3,8 @@
 import itertools
 import random
 
-import numpy as np
 import pytest
+from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.control.gain_sets import COMPARED, LAWS
@@ -92,18 +92,19 @@ def test_a_users_laws_take_other_colours_than_the_librarys_which_keep_theirs():
     assert least(style.law_colours(mine[:8])) > style.MIN_DISTANCE
 
 
-def test_a_law_at_several_values_has_shades_of_its_colour_from_light_to_dark():
-    """Friction of 0, 0.005 and 0.02 was magenta, brown and green."""
-    for law in ("observer_free", "rotary_swing_up", "my_own"):
-        shades = style.law_colours([law, law, "classical", law])
-        assert shades.pop(2) == style.law_colour("classical")
-        lightness = [style._seen(shade)[0, 0] for shade in shades]
-        assert lightness == pytest.approx([61.0, 41.0, 21.0], abs=1.5)
-        assert least(shades) > 15.0
-        hues = []
-        for shade in [style.law_colour(law), *shades]:
-            hues.append(np.arctan2(*style._seen(shade)[0, :0:-1]))
-        assert np.ptp(np.unwrap(hues)) < 0.6
+def test_runs_of_one_law_have_its_colour_and_lines_and_marks_tell_them_apart_as_all_runs():
+    """Friction of 0, 0.005 and 0.02 was magenta, brown and green, then five reds."""
+    runs = []
+    for law in ("classical", "pid", "classical", "adaptive", "classical"):
+        runs.append(made(smc.Scenario(plant="duffing", law=law, duration=0.1)))
+    colours = style.trace_colours(runs)
+    assert colours[0] == colours[2] == colours[4] == style.law_colour("classical")
+    assert len(set(colours)) == 3
+    looks = style.looks(runs)
+    assert len({str(look["ls"]) for look in looks}) == len(runs)
+    marks = [look.get("marker") for look in looks]
+    assert marks[1] is marks[3] is None
+    assert len({marks[0], marks[2], marks[4]} - {None}) == 3
 
 
 def test_law_colours_never_repeat_in_one_picture():

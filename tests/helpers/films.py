@@ -27,7 +27,7 @@ def tracks(traces, colours):
     times = np.array([0.0, 0.1])
     found = []
     for trace, colour in zip(traces, colours, strict=False):
-        found.append(MachineTrack(trace, colour, times, times, {}, arms=True))
+        found.append(MachineTrack(trace, colour, times, times, {}))
     return found
 
 

@@ -35,5 +35,4 @@ SPRUNG_CART = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(0.0, 1.0, 0.0),  # m, from one machine to the next in a film
 )

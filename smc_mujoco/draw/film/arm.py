@@ -58,17 +58,17 @@ def key(traces: Sequence[Trace]) -> list[str]:
 
 
 class Overlay:
-    """What is drawn over pictures of a machine on its stage, between `edges`, (frames + 1,) s.
+    """What is drawn over pictures of a machine on its stage.
 
     These are the path of an arm's tip, or of the place of a free body. Arms have their forces too,
     with arrows `newton` m long a newton; `room` has what is shown below the label, left, top,
     right, bottom px.
     """
 
-    def __init__(self, stage: Stage, edges: np.ndarray, room: np.ndarray, newton: float):
+    def __init__(self, stage: Stage, room: np.ndarray, newton: float):
         self.stage = stage
         self.trace = trace = stage.track.trace
-        self.edges = edges
+        self.edges = edges = stage.track.edges
         self.room = room
         self.newton = newton
         self.scale = stage.scale
@@ -213,15 +213,15 @@ def room(traces: Sequence[Trace]) -> tuple[float, float]:
     return bars + number, BARS_HEIGHT
 
 
-def overlays(stages: Sequence[Stage], edges: np.ndarray, rooms: np.ndarray) -> list[Overlay]:
+def overlays(stages: Sequence[Stage], rooms: np.ndarray) -> list[Overlay]:
     """Return what is drawn over each stage; arrows of forces have one scale."""
     largest = 0.0
     for stage in stages:
         trace = stage.track.trace
         if tip.knows_contacts(trace.scenario):
-            push = windows(trace.t, tip.contacts(trace).push, edges).mean
+            push = windows(trace.t, tip.contacts(trace).push, stage.track.edges).mean
             largest = max(largest, float(np.linalg.norm(push, axis=1).max()))
         for blow in style.pushes([trace]):
             largest = max(largest, float(np.linalg.norm([blow.x, blow.y, blow.z])))
     newton = FORCE_ARROW / largest if largest else 0.0
-    return [Overlay(stage, edges, room, newton) for stage, room in zip(stages, rooms, strict=True)]
+    return [Overlay(stage, room, newton) for stage, room in zip(stages, rooms, strict=True)]

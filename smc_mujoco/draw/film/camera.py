@@ -132,7 +132,8 @@ def tiles(
         place = fit(points, turn, (wide, tall), Room(edge, edge, wide - edge, foot))
         distance = float((place - points.mean(axis=0)) @ turn[:, 2])
         scale = 1.0 / (pixel((wide, tall)) * distance)
-        layouts.append((scale, columns, View((wide, tall), turn, place)))
+        fits = strip(wide) < tall
+        layouts.append(((fits, scale), columns, View((wide, tall), turn, place)))
     _, columns, view = max(layouts, key=lambda one: one[0])
     wide, tall = view.size
     found = []

@@ -3,7 +3,9 @@ tile its label and state; with Pillow.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -14,7 +16,6 @@ from smc_mujoco.draw.film.arrows import Scale
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
 from smc_mujoco.metrics.conventions import Group
-from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 # Sizes are px of a film of full size, and chosen.
@@ -27,8 +28,9 @@ KEY_TOP = 46  # of the key's first line
 KEY_PITCH = 22  # from line to line
 GAP = 8  # around labels
 LEAST_LETTERS = 0.7  # of their size: labels and titles in smaller ones are cut
-STRIP_WIDTH = 110  # of an encoder's strip
-STRIP_COUNTS = 6
+HALF_LETTERS = 0.75  # of their size: largest letters of a label on two lines
+SAMPLE = 38  # of a label's line
+SAMPLE_WIDTH = 4
 LOOKS = {  # mood -> colours of a badge and of its rim
     CALM: (style.PAPER, style.MUTED),
     STUCK: (style.INK, style.PAPER),
@@ -40,7 +42,8 @@ class Caption:
     """The text of a film: above the tiles of the machines, from `top` px on, and at their feet.
 
     `below`, width and height in px of a full-size film, is what others draw in place of badges. The
-    `parts` of the key are by default what arrows and ghosts mean.
+    `parts` of the key are by default what arrows and ghosts mean. A close-up's deflections are
+    `factor` times as large.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Caption:
         states: Sequence[Sequence[State | None]] = (),
         below: tuple[float, float] | None = None,
         parts: Sequence[str] | None = None,
+        factor: float = 1.0,
     ):
         self.traces = traces
         self.names = style.distinct(names)
@@ -62,15 +66,18 @@ class Caption:
         self.size = size
         self.scale = s = scale
         self.changes = style.marks(traces, names, blows=False)
+        self.lines = [look["ls"] for look in style.looks(traces)]
+        self.beside = (1.9 * LETTERS + SAMPLE) * s  # of a label: its line, and its ends
         inside = size[0] - 2 * EDGE * s
         self.clock = style.width("00.000 s", TITLE_SIZE * s, bold=True) + EDGE * s
         self.clock += self.wide("8× slower") + 2 * LETTERS * s
         title = title or style.head([trace.scenario for trace in traces])
         self.title, self.title_size = fitted(title, inside - self.clock, TITLE_SIZE * s)
-        note = 0.0
+        self.close = f"last periods, deflections × {factor:g}"
+        note = self.wide(self.close) if factor > 1.0 else 0.0
         for time, words in self.changes.items():
             note = max(note, self.wide(f"{words} since {time:g} s"))
-        self.note_room = min(note + EDGE * s, 0.4 * inside)
+        self.note_room = min(note + EDGE * s, 0.5 * inside)
         sources = [trace.scenario.law.source.words for trace in traces]
         self.source = by_words(dict(zip(names, sources, strict=True)))
         if parts is None:
@@ -85,22 +92,16 @@ class Caption:
     ) -> np.ndarray:
         """Return width and height of what is shown below each label, (machines, 2) px.
 
-        It is a machine's state, the strip of its encoder, or what others draw.
+        It is a machine's state, or what others draw.
         """
         s = self.scale
         sizes = np.zeros((len(self.traces), 2))
-        self.gauges = np.zeros(len(self.traces), bool)
         if below is not None:
             sizes[:] = np.array(below) * s
             return sizes
-        for k, trace in enumerate(self.traces):
-            for state in states[k] if states else ():
-                if state:
-                    wide = self.wide(state.words) + 1.2 * LETTERS * s
-                    sizes[k, 0] = max(sizes[k, 0], wide)
-            self.gauges[k] = gauges(trace.scenario) and not sizes[k, 0]
-            if self.gauges[k]:
-                sizes[k, 0] = STRIP_WIDTH * s
+        for k, of_machine in enumerate(states):
+            for words in {state.words for state in of_machine if state}:
+                sizes[k, 0] = max(sizes[k, 0], self.wide(words) + 1.2 * LETTERS * s)
         if sizes.any():
             sizes[:, 1] = 1.6 * LETTERS * s
         return sizes
@@ -116,19 +117,24 @@ class Caption:
             return f"{self.names[k]}: {style.ending(trace)}"
         return self.names[k]
 
-    def widths(self, share: float = 1.0) -> np.ndarray:
-        """Return the widths of the labels with letters of a share of their size, (machines,) px."""
-        both = []
+    def widths(self, least: bool = False) -> np.ndarray:
+        """Return the widths of the labels, (machines,) px: on one line, or the least."""
+        found = []
         for k in range(len(self.names)):
-            both.append(max(self.wide(self.text(k)), self.wide(self.names[k])))
-        return share * np.array(both) + 2.5 * LETTERS * self.scale
+            text = self.text(k)
+            wide = self.wide(text)
+            if least:
+                half = max(map(self.wide, halves(text)))
+                wide = min(LEAST_LETTERS * wide, HALF_LETTERS * LEAST_LETTERS * half)
+            found.append(wide)
+        return np.array(found) + self.beside
 
     def strip(self, width: float) -> float:
         """Return the height, px, of labels and badges at the foot of tiles of a width, px; inf if
         they are wider.
         """
         room = width - 2 * GAP * self.scale
-        if max(self.widths(LEAST_LETTERS).max(), self.badge[:, 0].max()) > room:
+        if max(self.widths(least=True).max(), self.badge[:, 0].max()) > room:
             return math.inf
         tall = float(self.badge[:, 1].max())
         both = self.widths() + self.badge[:, 0] + GAP * self.scale * (tall > 0.0)
@@ -165,24 +171,23 @@ class Caption:
         failed: Sequence[bool],
         states: Sequence[State | None] = (),
         speed: float = 1.0,
+        factor: float = 1.0,
     ) -> np.ndarray:
-        """Return the picture with the text on it: machines that have failed, their states, and the
-        playback speed.
+        """Return the picture with the text on it: machines that have failed, their states, the
+        playback speed, and by how much deflections are enlarged.
         """
         image = Image.fromarray(picture)
         draw = ImageDraw.Draw(image)
-        self.head(draw, time, speed)
+        self.head(draw, time, speed, factor)
         for k in range(len(self.names)):
             colour = style.FAILED if failed[k] else self.colours[k]
-            self.label(draw, tuple(self.pills[k]), self.text(k, failed[k]), colour)
+            self.label(draw, k, self.text(k, failed[k]), colour)
             state = states[k] if states else None
             if state:
                 self.box(draw, self.badges[k], state.words, *LOOKS[state.mood])
-            if self.gauges[k] and not failed[k]:
-                self.strip_of(draw, k, time)
         return np.asarray(image)
 
-    def head(self, draw: ImageDraw.ImageDraw, time: float, speed: float) -> None:
+    def head(self, draw: ImageDraw.ImageDraw, time: float, speed: float, factor: float) -> None:
         """Write the title and where gains come from, the key, the clock, the playback speed, and
         the last change of the plant.
         """
@@ -213,8 +218,12 @@ class Caption:
             start = end - self.wide(pace) - LETTERS * s
             self.box(draw, (start, 30 * s - half, end, 30 * s + half), pace, *look, radius=half)
         change = max((at for at in self.changes if at <= time), default=None)
-        if change is not None:
+        words = ""
+        if factor > 1.0:
+            words = self.close
+        elif change is not None:
             words = f"{self.changes[change]} since {change:g} s"
+        if words:
             words, size = fitted(words, self.note_room - 8 * s, LETTERS * s)
             start = right - style.width(words, size, bold=True) - 8 * s
             box = (start, 45 * s, right + 8 * s, 67 * s)
@@ -239,50 +248,35 @@ class Caption:
         letters = style.font(size or LETTERS * s, bold=True)
         draw.text(middle, words, style.letters_on(fill), letters, anchor="mm")
 
-    def label(
-        self, draw: ImageDraw.ImageDraw, box: tuple[float, ...], text: str, colour: str
-    ) -> None:
-        """Draw a machine's label in a box, px, with a dot of its colour."""
+    def label(self, draw: ImageDraw.ImageDraw, k: int, text: str, colour: str) -> None:
+        """Draw a machine's label in its box with its line in the charts."""
         s = self.scale
-        left, top, _, bottom = box
-        half = (bottom - top) / 2
-        draw.rounded_rectangle(box, half, style.PAPER, style.RULE, max(1, round(s)))
-        disc(draw, left + 1.3 * half, top + half, 0.6 * half, colour)
-        place = (left + half + 1.1 * LETTERS * s, top + half)
-        text, size = fitted(text, box[2] - box[0] - 2.5 * LETTERS * s, LETTERS * s)
-        draw.text(place, text, style.INK, style.font(size, bold=True), anchor="lm")
-
-    def strip_of(self, draw: ImageDraw.ImageDraw, k: int, time: float) -> None:
-        """Draw the counts of machine k's encoder around its position at a time, s, and which of
-        them is read.
-        """
-        left, top, right, bottom = self.badges[k].tolist()
-        s = self.scale
-        trace = self.traces[k]
-        sensor = trace.scenario.encoder(0)
-        assert sensor is not None
-        count = sensor.quantum(trace.scenario.plant.unit == "rad")
-        now, then = np.interp([time, time - sensor.delay], trace.t, trace.x[:, 0]) / count
-        middle = (left + right) / 2
-        step = (right - left) / STRIP_COUNTS
-        thin = max(1, round(s))
-        box = (left, top, right, bottom)
-        draw.rounded_rectangle(box, 5 * s, style.PAPER, style.MUTED, thin)
-        first = math.ceil(now - STRIP_COUNTS / 2)
-        for tick in range(first, math.floor(now + STRIP_COUNTS / 2) + 1):
-            x = middle + (tick - now) * step
-            if left + 3 * s < x < right - 3 * s:
-                line = (x, top + 0.62 * (bottom - top), x, bottom - 2 * s)
-                draw.line(line, style.INK, max(1, round(1.5 * s)))
-        draw.line((middle, top + 2 * s, middle, bottom - 2 * s), style.MUTED, thin)
-        read = middle + (round(then + sensor.bias / count) - now) * step
-        read = float(np.clip(read, left + 5 * s, right - 5 * s))
-        disc(draw, read, top + 0.35 * (bottom - top), 3.5 * s, self.colours[k])
+        box = tuple(self.pills[k].tolist())
+        left, top, right, bottom = box
+        middle = (top + bottom) / 2
+        draw.rounded_rectangle(box, middle - top, style.PAPER, style.RULE, max(1, round(s)))
+        start = left + 0.7 * LETTERS * s
+        end = start + SAMPLE * s
+        for first, last in dashes(self.lines[k], SAMPLE_WIDTH):
+            place = (start + first * s, middle, min(start + last * s, end), middle)
+            if place[0] < end:
+                draw.line(place, colour, max(2, round(SAMPLE_WIDTH * s)))
+        place = (end + 0.5 * LETTERS * s, middle)
+        text, size = fitted(text, right - left - self.beside, LETTERS * s, lines=2)
+        look = {"font": style.font(size, bold=True), "anchor": "lm", "spacing": 0}
+        draw.text(place, text, style.INK, **look)
 
 
-def disc(draw: ImageDraw.ImageDraw, x: float, y: float, radius: float, colour: str) -> None:
-    """Fill a disc about a place, px."""
-    draw.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
+def dashes(look: Any, width: float) -> Iterator[tuple[float, float]]:
+    """Yield where the dashes of a sample of a line begin and end."""
+    if look == "-":
+        yield 0.0, SAMPLE
+        return
+    at = 0.0
+    while at < SAMPLE:
+        for dash, gap in zip(look[1][::2], look[1][1::2], strict=True):
+            yield at, at + dash * width
+            at += (dash + gap) * width
 
 
 def around(x: np.ndarray, y: np.ndarray, wide: np.ndarray, high: np.ndarray | float) -> np.ndarray:
@@ -313,8 +307,6 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     words.append("translucent: reference")
     if plant.scenery:
         words.append(plant.scenery)
-    if any(gauges(trace.scenario) for trace in traces):
-        words.append("strip: counts of the encoder, the line is the position, the dot what is read")
     count = max(trace.scenario.plant.n for trace in traces)
     if count > MAX_CHANNELS and not plant.direct:
         words.append(f"machines: the first {MAX_CHANNELS} of {count} pendulums")
@@ -333,12 +325,6 @@ def largest(scales: Mapping[Group, Scale], kind: str) -> str:
     return ", ".join(words)
 
 
-def gauges(scenario: Scenario) -> bool:
-    """Return whether a strip shows the counts of a scenario's encoder: for one channel."""
-    sensor = scenario.encoder(0)
-    return sensor is not None and sensor.counts < math.inf and scenario.plant.n == 1
-
-
 def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:
     """Return the parts in as few lines as the room allows."""
     lines: list[str] = []
@@ -351,11 +337,26 @@ def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:
     return lines
 
 
-def fitted(text: str, room: float, size: float) -> tuple[str, float]:
-    """Return the text on one line and the size of bold letters with which it fits the room; cut if
-    it is too wide in small ones.
+def halves(text: str) -> list[str]:
+    """Return the text on two lines of about equal length, broken at a space or behind a "_"."""
+    breaks = [found.end() for found in re.finditer(r"[ _](?=\S)", text)]
+    if not breaks:
+        return [text]
+    at = min(breaks, key=lambda place: abs(place - len(text) / 2))
+    return [text[:at].rstrip(), text[at:]]
+
+
+def fitted(text: str, room: float, size: float, lines: int = 1) -> tuple[str, float]:
+    """Return the text, on up to two lines, and the size of bold letters with which it fits the
+    room; cut if it is too wide in small ones.
     """
     text = " ".join(text.split())
     share = min(1.0, room / max(style.width(text, size, bold=True), 1.0))
+    if lines == 2 and share < HALF_LETTERS:
+        parts = halves(text)
+        wide = max(style.width(part, size, bold=True) for part in parts)
+        both = min(HALF_LETTERS, room / wide)
+        if both > share and both >= HALF_LETTERS * LEAST_LETTERS - 1e-9:
+            return "\n".join(parts), both * size
     least = max(share, LEAST_LETTERS) * size
     return style.cropped(text, room + 1.0, least, bold=True), least

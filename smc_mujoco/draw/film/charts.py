@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
@@ -49,7 +49,7 @@ Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, its colours
 
 class Charts:
     """The charts as pictures of `size` px, letters and lines `scale` times as large as in a film
-    1280 px wide.
+    1280 px wide. They begin at the time `start` of the film, s.
     """
 
     def __init__(
@@ -59,7 +59,9 @@ class Charts:
         colours: Sequence[str],
         size: tuple[int, int],
         scale: float,
+        start: float = 0.0,
     ):
+        self.start = start
         self.end = end(traces)
         self.window = panels.horizon(traces)
         self.times = [0.0, self.window, self.end]
@@ -92,6 +94,7 @@ class Charts:
                     row.tick_params(length=0)
                     panels.mark(row, style.marks(traces, names), named=False)
                     artists += panels.over_time(row, part, shades, panel.traces, bands, names)
+                    row.yaxis.set_minor_formatter(NullFormatter())
                     artists += settled(row, part, shades)
                     if laned:
                         tell_swing(row, part.traces[0], shades[0])
@@ -133,12 +136,13 @@ class Charts:
         ax.set_xlim(0.0, self.end)
         wide = ax.get_window_extent().width  # px
         point = ax.figure.dpi / 72
-        last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * point) / wide
+        last = 1.0 - style.width(f"000{self.end:.3g} s", LETTERS * point) / wide
         stop = min(1.01 * self.window, self.end)
         count = min(TIME_TICKS, int(wide * self.shares[1] / style.width("0.0000", LETTERS * point)))
         ticks = np.asarray(MaxNLocator(max(count, 1)).tick_values(0.0, self.window))
         ticks = ticks[(self.share(ticks) < last) & (ticks < stop)].tolist()
-        ax.set_xticks([*ticks, self.end], [*(f"{tick:g}" for tick in ticks), f"{self.end:g} s"])
+        last_words = f"{self.end:.3g} s"
+        ax.set_xticks([*ticks, self.end], [*(f"{tick:g}" for tick in ticks), last_words])
         for label in ax.get_xticklabels()[-1:]:
             label.set_horizontalalignment("right")
         if self.window < self.end:
@@ -146,6 +150,7 @@ class Charts:
 
     def at(self, time: float) -> np.ndarray:
         """Return the charts at a time in s, (height, width, 3) uint8."""
+        time -= self.start
         charts = self.faint.copy()
         dots = []
         for (left, top, right, bottom), paths in zip(self.frames, self.paths, strict=True):

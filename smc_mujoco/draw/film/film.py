@@ -23,7 +23,7 @@ from smc_mujoco.common import errors, extras, gl
 from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
-from smc_mujoco.draw import style
+from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.film import arrows, camera, pace, scene
 from smc_mujoco.draw.film.camera import Camera, checked
@@ -99,7 +99,8 @@ class Frames:
                 )
 
     def __len__(self) -> int:
-        return len(self.clock.times)
+        close = self.clock.close
+        return len(self.clock.times) + (len(close.times) if close else 0)
 
     def __iter__(self) -> Generator[np.ndarray]:
         return pictures(self)
@@ -286,50 +287,78 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     scale = (width / FULL_SIZE[0]) ** 0.6  # letters shrink less than pictures
     low = 2 * round(CHARTS_SHARE * height / 2)
     above = (width, height - low)
-    times = frames.clock.times
-    step = times[1] - times[0] if len(times) > 1 else 1 / FPS
-    edges = np.append(times[0] - step, times)
     traces = list(map(finite, traces))
     scenario = traces[0].scenario
-    scales = arrows.scales(traces)
-    arms = all(trace.scenario.plant.tip for trace in traces)
-    whole = end(traces)
-    count = min(MAX_GRID, max(1, round(FPS * whole)))
-    grid = np.linspace(0.0, whole, count + 1)  # also for a still
-    tracks = []
-    for trace, colour in zip(traces, colours, strict=True):
-        tracks.append(MachineTrack(trace, colour, edges, grid, scales, arms))
+    clock = frames.clock
+    tracks = tracks_at(clock.times, traces, colours)
     overlay = None
     below = None
     words = None
-    if arms or scenario.plant.pose:
+    if scenario.plant.tip or scenario.plant.pose:
         from smc_mujoco.draw.film import arm as overlay
-    if overlay and arms:
+    if overlay and scenario.plant.tip:
         below = overlay.room(traces)
         words = overlay.key(traces)
     grid_states = [track.grid_states for track in tracks]
-    title = frames.title
-    caption = Caption(
-        traces, names, colours, title, above, scale, scales, grid_states, below, words
-    )
+    factor = clock.close.factor if clock.close else 1.0
+    given = (frames.title, above, scale, arrows.scales(traces), grid_states, below, words, factor)
+    caption = Caption(traces, names, colours, *given)
     charts = Charts(traces, names, colours, (width, low), scale)
     with contextlib.ExitStack() as opened:
         stages = []
-        for stage in staged(tracks, frames.camera, caption, times):
+        for stage in staged(tracks, frames.camera, caption, clock.times):
             stages.append(opened.enter_context(stage))
-        overlays = overlay.overlays(stages, edges, caption.badges) if overlay else []
-        for frame, time in enumerate(times.tolist()):
-            picture = np.full((height - low, width, 3), 255, np.uint8)
-            for k, (left, top, right, bottom) in enumerate(caption.tiles.tolist()):
-                over = overlays[k] if overlays else None
-                picture[top:bottom, left:right] = shot(stages[k], over, frame, time)
-            speed = float(frames.clock.speeds[frame])
-            failed = [track.failed(time) for track in tracks]
-            states = [track.states[frame] for track in tracks]
-            picture = caption.over(picture, time, failed, states, speed)
-            for over in overlays:
-                picture = over.beside(picture, frame)
-            yield np.concatenate([picture, charts.at(time)])
+        overlays = overlay.overlays(stages, caption.badges) if overlay else []
+        yield from drawn(clock, stages, overlays, caption, charts)
+        if clock.close:
+            close = clock.close
+            start = float(close.times[0])
+            last = [panels.since(trace, start) for trace in traces]
+            charts = Charts(last, names, colours, (width, low), scale, start)
+            again = tracks_at(close.times, traces, colours)
+            for stage, track in zip(stages, again, strict=True):
+                middle = track.x.mean(axis=0)
+                track.x = middle + factor * (track.x - middle)
+                stage.track = track
+            yield from drawn(close, stages, overlays, caption, charts)
+
+
+def tracks_at(
+    times: np.ndarray, traces: Sequence[Trace], colours: Sequence[str]
+) -> list[MachineTrack]:
+    """Return what the runs do at the times of frames, s."""
+    step = times[1] - times[0] if len(times) > 1 else 1 / FPS
+    edges = np.append(times[0] - step, times)
+    count = min(MAX_GRID, max(1, round(FPS * end(traces))))
+    grid = np.linspace(0.0, end(traces), count + 1)  # also for a still
+    scales = arrows.scales(traces)
+    found = []
+    for trace, colour in zip(traces, colours, strict=True):
+        found.append(MachineTrack(trace, colour, edges, grid, scales))
+    return found
+
+
+def drawn(
+    clock: Clock,
+    stages: Sequence[Stage],
+    overlays: Sequence["arm.Overlay"],
+    caption: Caption,
+    charts: Charts,
+) -> Generator[np.ndarray]:
+    """Yield the pictures at the times of a clock."""
+    width, height = caption.size
+    for frame, time in enumerate(clock.times.tolist()):
+        picture = np.full((height, width, 3), 255, np.uint8)
+        for k, (left, top, right, bottom) in enumerate(caption.tiles.tolist()):
+            over = overlays[k] if overlays else None
+            picture[top:bottom, left:right] = shot(stages[k], over, frame, time)
+        speed = float(clock.speeds[frame])
+        failed = [stage.track.failed(time) for stage in stages]
+        states = [stage.track.states[frame] for stage in stages]
+        picture = caption.over(picture, time, failed, states, speed, clock.factor)
+        for over in overlays:
+            picture = over.beside(picture, frame)
+        yield np.concatenate([picture, charts.at(time)])
 
 
 def staged(

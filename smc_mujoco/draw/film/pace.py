@@ -5,9 +5,11 @@ The measure is how far something moves in the time of a frame, as a share of its
 whole run. Every machine should take 1/MAX_TRAVEL frames or more to cross its range, so the speed is
 1, 1/2, 1/4 or 1/8. Around impacts, and around pushes on an arm, it is 1/8. Where nothing has moved
 for a while, it is REST_SPEED. If a film would be too long, slow motion is reduced step by step,
-around pushes last. The same traces give the same film.
+around pushes last. Where nothing moves that can be seen, the last three periods follow in a
+close-up. The same traces give the same film.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
@@ -16,6 +18,9 @@ import numpy as np
 from smc_mujoco.common.constraints import Number, constrained
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
+from smc_mujoco.metrics.catalogue import chattering_amplitude, chattering_frequency
+from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 MAX_TRAVEL = 0.02  # of its range: how far a thing moves in a frame, if the speeds suffice; chosen
@@ -27,6 +32,12 @@ REST_SPEED = 4.0  # times real time
 MOTION_MARGIN = 0.1  # s before and after fast motion that are shown as slowly as it
 IMPACT_TIME = 0.04  # s around the start of a contact, and around the middle of a push
 REST_MARGIN = 0.3  # s after motion, and before it, that are not shown faster
+PERIODS = 3  # that a close-up shows at the end
+CLOSE_TIME = 4.0  # s of the film for a close-up, at most; chosen, as what follows
+MIN_FACTOR = 10.0  # of its deflections; smaller ones are seen without it
+SEEN_TURN = 0.25  # rad, of a hinge, and of a slide in extents of its machine: seen well
+SEEN_SLIDE = 0.08
+LITTLE = 0.2  # of these: a film of less motion shows nothing moving
 MAX_LENGTH = (
     1.85,
     8.0,
@@ -36,18 +47,16 @@ Speed = Annotated[float, Number(low=0.01, high=100.0)]  # times real time
 
 
 class Clock(NamedTuple):
-    """Times of a film's frames."""
+    """Times of a film's frames.
+
+    After them a film may show a part again, `close`, in which deflections about the mean are drawn
+    `factor` times as large.
+    """
 
     times: np.ndarray  # of the run, (frames,) s, ascending
     speeds: np.ndarray  # of playback, (frames,), 1 for real time
-    begin: float = (
-        0.0  # when the first is shown, s of the film: a part of a film is drawn as in the whole
-    )
-
-    @property
-    def shown(self) -> np.ndarray:
-        """When each frame is shown, (frames,) s of the film."""
-        return self.begin + np.append(0.0, np.cumsum(np.diff(self.times) / self.speeds[:-1]))
+    close: "Clock | None" = None
+    factor: float = 1.0
 
     def part(self, start: float, stop: float) -> "Clock":
         """Return the frames from `start` to `stop` of the run, s."""
@@ -71,7 +80,55 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
         now = wanted[np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1]
         times.append(min(times[-1] + now / fps, whole))
     frames = np.array(times)
-    return Clock(frames, wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1])
+    speeds_there = wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1]
+    return Clock(frames, speeds_there, close_up(traces, fps))
+
+
+def close_up(traces: Sequence[Trace], fps: float) -> Clock | None:
+    """Return the last periods of runs in which a film shows nothing moving: those that chatter
+    about one place, rattle in a backlash or stick. None of others.
+    """
+    runs = [trace for trace in traces if trace.diverged_at is None]
+    scenario = traces[0].scenario
+    if not runs or scenario.plant.pose or scenario.plant.tip:
+        return None
+    sizes = visible_sizes(scenario)
+    way = max(float((np.ptp(run.x, axis=0) / sizes).max()) for run in runs)
+    rattles = any(states.backlash_gap(run.scenario) for run in runs)
+    sticks = all(
+        states.has_dry_friction(run.scenario) and states.at_rest(run)[-1].all() for run in runs
+    )
+    if way > LITTLE and not rattles and not sticks:
+        return None
+    largest = max(runs, key=lambda run: np.nan_to_num(chattering_amplitude(run)))
+    frequency = chattering_frequency(largest)
+    if not frequency > 0.0:
+        return None
+    stop = float(largest.t[-1])
+    start = stop - PERIODS / frequency
+    deflections = []
+    for run in runs:
+        x = run.x[run.t >= start]
+        deflections.append(float((np.abs(x - x.mean(axis=0)) / sizes).max()))
+    factor = rounded(1.0 / max(*deflections, 1e-12))
+    if factor < MIN_FACTOR:
+        return None
+    speed = 1.0 / rounded(max(1.0, CLOSE_TIME * frequency / PERIODS))
+    times = np.arange(start, stop, speed / fps)
+    return Clock(times, np.full(len(times), speed), factor=factor)
+
+
+def visible_sizes(scenario: Scenario) -> np.ndarray:
+    """Return deflections of channels that are seen well, (n,) rad or m."""
+    extent = models.compile_model(scenario).stat.extent
+    units = np.array(scenario.plant.units)
+    return np.where(units == "rad", SEEN_TURN, SEEN_SLIDE * extent)
+
+
+def rounded(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is not larger than a value of 1 or more."""
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    return power * max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9))
 
 
 def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]:

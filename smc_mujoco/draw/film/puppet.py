@@ -116,8 +116,8 @@ class Puppet:
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
                 "give its bodies geoms, or its links <visual>"
             )
-        loose = ~links & ~plane & ~scene.still(model)
         falling = np.array([model.body(i).name.startswith(OWN) for i in model.geom_bodyid])
+        loose = ~links & ~plane & ~scene.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
         body = links | (loose & np.isin(roots, roots[links]))
         self.times = []
@@ -135,7 +135,6 @@ class Puppet:
             self.times.append(time)
             self.places.append(world[body].reshape(-1, 3))
             self.others.append(world[loose])
-            loose = loose & ~falling  # later it is anywhere
 
     @property
     def travels(self) -> bool:

@@ -125,7 +125,11 @@ def set_floor(
     cell = cells[np.abs(np.log(FLOOR_CELLS * cells / extent)).argmin()]
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     start = float(((points - place) @ -turn[:, 2]).max())
-    ray = turn[:, 1] * camera.pixel(size) * size[1] / 2 - turn[:, 2]  # at the top of the picture
+    half = turn[:, 1] * camera.pixel(size) * size[1] / 2
+    low = -half - turn[:, 2]
+    if low[2] < 0.0:  # where the foot of the picture meets the floor, below what flies
+        start = max(start, -place[2] / low[2])
+    ray = half - turn[:, 2]  # at the top of the picture
     stop = HAZE_HORIZON * start
     if ray[2] < 0.0 and -place[2] / ray[2] >= MIN_HAZE_DISTANCE * start:  # where it meets the floor
         stop = min(stop, -place[2] / ray[2])

@@ -63,8 +63,9 @@ class Stage:
         painted = self.model.mat_rgba[material]
         self.paint = np.where((material >= 0)[:, None], painted, self.model.geom_rgba)
         visible = (self.model.geom_group < GROUPS) & (self.paint[:, 3] > 0.0)
-        radius = self.largest_radius(float((self.place - points.mean(axis=0)) @ self.turn[:, 2]))
-        self.find_joints(visible, radius)
+        distance = float((self.place - points.mean(axis=0)) @ self.turn[:, 2])
+        tall = self.size[1] * camera.pixel(self.size) * distance  # m
+        self.find_joints(visible, arrows.MAX_BENT_SHARE * tall)
         self.shape = -1
         self.colour = ""
         self.set_shape(0.0)
@@ -104,14 +105,6 @@ class Stage:
             self.mounts.append(mount._replace(joint=ids[-1], radius=bent))
         moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
         self.links = np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible)
-
-    def largest_radius(self, distance: float) -> float:
-        """Return the largest radius of a bent arrow at a distance from the camera, m."""
-        layers = 0
-        for drawn in self.track.framing:
-            layers = max([layers, *(arrow.layer for _, arrow in drawn.arrows)])
-        most = arrows.MAX_BENT_SHARE * self.size[1] / (1.0 + arrows.BENT_DISTANCE * layers)  # px
-        return most * camera.pixel(self.size) * distance
 
     def look(self, frame: int) -> None:
         """Put the camera where it is at a frame."""

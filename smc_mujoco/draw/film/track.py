@@ -49,13 +49,14 @@ class MachineTrack:
         edges: np.ndarray,
         grid: np.ndarray,
         scales: Mapping[Group, arrows.Scale],
-        arms: bool = False,
     ):
+        arms = bool(trace.scenario.plant.tip)
         self.trace = trace
+        self.edges = edges
         self.colour = colour
         times = edges[1:]
         n = scene.first_channels(trace.scenario).plant.n
-        if arms:
+        if arms or not scales:
             sizes = []
         else:
             sizes = arrows.scales_by_channel(trace, scales)[:n]

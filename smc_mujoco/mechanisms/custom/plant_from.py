@@ -398,7 +398,6 @@ def _plant(
         build=build,
         fields=fields,
         nominal=without_model if why_not else NominalModel(build, fields),
-        lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
         underactuated=len(joints) - len(seen) > len(pairs),
         direct=True,
         smooth=smooth(model, rubs),

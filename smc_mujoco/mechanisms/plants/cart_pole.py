@@ -68,7 +68,6 @@ CART_POLE = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(0.0, 1.0, 0.0),
     contacts={"stops": stops},
     underactuated=True,
 )

@@ -112,7 +112,6 @@ DOUBLE_PENDULUM = Plant(
     build=build,
     fields=fields,
     nominal=NominalModel(build, fields),
-    lane=(0.9, 0.0, 0.0),
     limits=(TORQUE_LIMIT, TORQUE_LIMIT),
     dry=("cf1", "cf2"),
 )

@@ -105,7 +105,6 @@ DUFFING = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(0.0, 1.0, 0.0),
     jumps={"mild": {"alpha": 3.0}, "hard": {"alpha": 27.684}},
     contacts={"floor": on_floor, "stops": stops, "peg": peg},
     mechanisms={"springs": Variant(add_springs, spring_fields)},

@@ -101,7 +101,6 @@ FURUTA = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(0.32, 0.0, 0.0),
     underactuated=True,
     limits=(STALL_TORQUE,),
     dry=("cf", "cfq"),

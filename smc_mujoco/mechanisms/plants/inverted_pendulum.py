@@ -144,7 +144,6 @@ INVERTED_PENDULUM = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(1.3, 0.0, 0.0),
     jumps={"mild": {"mass": 2.0}, "hard": {"mass": 25.912}},
     contacts={"floor": on_floor, "stops": stops, "wall": wall, "peg": peg},
     placed={"l": LENGTH},

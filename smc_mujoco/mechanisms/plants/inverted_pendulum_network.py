@@ -44,7 +44,6 @@ INVERTED_PENDULUM_NETWORK = Plant(
     build=build,
     fields=pendulum_chain.fields,
     nominal=nominal,
-    lane=(1.15, 0.96, 0.0),  # across the view of `look`
     jumps={"mild": {"mass": 2.0}, "hard": {"mass": 22.681}},
     contacts={"bobs": pendulum_chain.bobs},
     mechanisms={"springs": Variant(pendulum_chain.springs, pendulum_chain.spring_fields)},

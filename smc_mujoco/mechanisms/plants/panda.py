@@ -201,7 +201,6 @@ PANDA = Plant(
     build=build,
     fields=fields,
     nominal=NominalModel(build, fields),
-    lane=(1.1, 0.0, 0.0),
     contacts={"table": table, "wall": wall},
     added={"payload": "kg", "delta": ""},
     uncertain={

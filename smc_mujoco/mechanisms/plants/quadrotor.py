@@ -262,7 +262,6 @@ QUADROTOR = Plant(
     build=build,
     fields=fields,
     nominal=NominalModel(build, fields),
-    lane=(1.0, 0.0, 0.0),
     added={"payload": "kg", "fade": "", "sag": "1/N"},
     uncertain={"m": (0.8, 1.2), "payload": (0.0, 0.006), "fade": (0.0, 0.1)},
     direct=True,

@@ -40,7 +40,6 @@ SERVO_AXIS = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(0.0, 0.5, 0.0),
     limits=(FORCE_LIMIT,),
     smooth=False,
     dry=("cf",),

@@ -124,7 +124,6 @@ VAN_DER_POL = Plant(
     build=build,
     fields=fields,
     nominal=nominal,
-    lane=(0.0, 0.9, 0.0),
     jumps={"mild": {"mu": 3.0}, "hard": {"mu": 9.0}},
     contacts={"floor": on_floor, "stops": stops, "peg": peg},
     mechanisms={"springs": Variant(add_springs, spring_fields)},

@@ -47,13 +47,13 @@ def struck(trace, **fields):
 def overlay(trace, edges=EDGES, body=(9.0, 0.0, 9.0)):
     """What is drawn over an arm at the origin, of which every body is at one place, m."""
     stage = SimpleNamespace(
-        track=SimpleNamespace(trace=trace, colour=COLOUR),
+        track=SimpleNamespace(trace=trace, colour=COLOUR, edges=edges),
         puppet=SimpleNamespace(height=0.0),
         project=project,
         scale=1.0,
         find=lambda name: np.array(body),
     )
-    (shown,) = arm.overlays([stage], edges, [np.array([100.0, 150.0, 300.0, 210.0])])
+    (shown,) = arm.overlays([stage], [np.array([100.0, 150.0, 300.0, 210.0])])
     return shown
 
 

@@ -293,7 +293,6 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
         edges,
         edges[:2],
         {},
-        arms=True,
     ).ahead
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1

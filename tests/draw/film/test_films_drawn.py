@@ -108,36 +108,6 @@ def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
         assert ("mass × 2 since 0.2 s" in picture) is changed
 
 
-def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_apart(pen):
-    sensor = smc.Encoder(counts=64, delay=0.05, bias=-0.2)
-    trace = machine("inverted_pendulum", sensor=sensor)
-    caption = Caption(
-        [trace], ["one"], COLOURS[:1], "A title", SIZE, 1.0, arrows.scales([trace]), [[None]]
-    )
-    caption.place(np.array([[0, 60, 640, 300]]))
-    caption.over(paper(), 0.25, (False,), (None,))
-    lines = []
-    for note in pen:
-        if note.startswith("line ("):
-            lines.append([float(x) for x in note[6:].split(")")[0].split(",")])
-    *_, dot = [
-        [float(x) for x in note[9:].split(")")[0].split(",")]
-        for note in pen
-        if note.startswith("ellipse (")
-    ]
-    count, step = 2.0 * math.pi / 64, 110 / 6  # rad, and px of the strip, which has six counts
-    now, then = np.interp([0.25, 0.2], trace.t, trace.x[:, 0]) / count
-    left, _, right, _ = caption.badges[0]
-    middle = (left + right) / 2
-    ticks = sorted(line[0] for line in lines if abs(line[0] - middle) > 0.6)
-    assert np.diff(ticks) == pytest.approx(step, abs=0.7)
-    assert (ticks[0] - middle) / step % 1.0 == pytest.approx(-now % 1.0, abs=0.05)
-    assert any("counts of the encoder" in words for words in caption.key)
-    assert (dot[0] + dot[2]) / 2 == pytest.approx(
-        middle + (round(then - 0.2 / count) - now) * step, abs=0.6
-    )
-
-
 @pytest.mark.parametrize(
     "limits",
     [
@@ -174,13 +144,13 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
     stage = SimpleNamespace(
-        track=SimpleNamespace(trace=trace, colour=COLOURS[0]),
+        track=SimpleNamespace(trace=trace, colour=COLOURS[0], edges=edges),
         puppet=SimpleNamespace(height=0.2),
         project=project,
         scale=0.8,
     )
     stage.find = lambda name: np.array([0.4, 0.0, 0.9])
-    (over,) = arm.overlays([stage], edges, [low])
+    (over,) = arm.overlays([stage], [low])
     within = []
     for a, b in itertools.pairwise(edges):
         within.append((trace.t >= a) & (trace.t < b))

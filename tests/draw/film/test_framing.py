@@ -18,12 +18,6 @@ from smc_mujoco.simulation import model as models
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SIZE = (1280, 720)
-REACHED = []  # points of the machines of the film
-CRATE = """<mujoco model="crate"><worldbody><geom type="plane" size="2 2 .1"/>
-  <body pos="0 0 .5"><joint name="arm" axis="0 1 0"/><geom type="capsule" size=".03"
-    fromto="0 0 0 0 0 .4"/></body>
-  <body name="crate" pos=".5 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody>
-  <actuator><motor joint="arm" ctrlrange="-1 1"/></actuator></mujoco>"""
 TWO_LINKS = """<mujoco model="two"><worldbody><body pos="0 0 1"><joint name="a" axis="0 1 0"/>
   <geom type="capsule" size=".03" fromto="0 0 0 0 0 .5" mass="1"/>
   <body pos="0 0 .5"><joint name="b" axis="0 1 0"/>
@@ -59,7 +53,6 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     """
     seen = []
     made_by = film.staged
-    fitted = film.camera.tiles
 
     def kept(tracks, chosen, words, times):
         for stage in made_by(tracks, chosen, words, times):
@@ -69,34 +62,12 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
 
     with without_charts, monkeypatch.context() as patch:
         patch.setattr(film, "staged", kept)
-        patch.setattr(
-            film.camera, "tiles", lambda *given: REACHED.append(given[4]) or fitted(*given)
-        )
         frames = film.Frames(traces, size=SIZE, at=0.0)
         frames.clock = Clock(np.array(times), np.ones(len(times)))
         made_of = iter(frames)
         assert [*itertools.islice(made_of, 2)]
         yield seen[:-1], seen[-1]
         made_of.close()
-
-
-@pytest.mark.parametrize(
-    "plant",
-    ["inverted_pendulum", "cart_pole", "furuta", "pendulum_network", "overhead_crane", "panda"],
-)
-def test_a_machine_fills_the_height_or_the_width_of_its_tile(plant, monkeypatch):
-    law = {"furuta": "rotary_swing_up", "panda": "none"}.get(
-        plant, "hierarchical" if smc.plant(plant).free else "classical"
-    )
-    traces = [made(smc.Scenario(plant=plant, law=law, duration=1.0))] * 3
-    with filmed(traces, monkeypatch) as (stages, words):
-        shown = stages[0]
-        places = shown.project(REACHED[-1])
-        wide, tall = np.ptp(places, axis=0)
-        size = np.array(shown.size) - (0.0, words.strip(shown.size[0]))
-        assert max(wide / size[0], tall / size[1]) > 0.9
-        assert places.min() >= -1.0
-        assert (places.max(axis=0) <= size + 1.0).all()
 
 
 @pytest.mark.parametrize("base", ["free", "fixed"])
@@ -157,17 +128,6 @@ def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeyp
         assert shown.model.geom("m/bob").size[0] == pytest.approx(1.3 * 0.065)
 
 
-def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
-    plant = smc.plant_from(CRATE, {"arm": smc.Channel(x0=0.5)})
-    traces = []
-    for law in ("super_twisting", "pid"):
-        traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3)))
-    with filmed(traces, monkeypatch) as (stages, _):
-        for shown in stages:
-            place = shown.data.body("m/crate").xpos - (0.0, 0.0, shown.puppet.height)
-            assert place == pytest.approx([0.5, 0.0, 0.1], abs=0.01)
-
-
 def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
     traces = []
@@ -191,5 +151,5 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
                 assert line is not None
                 anchor = shown.project(shown.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(shown.project(line) - anchor, axis=1)
-                assert radius.max() <= 0.08 * shown.size[1] + 1.0
+                assert radius.max() <= 0.1 * shown.size[1] + 1.0
                 assert shown.project(line).min() > 0.0

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.sketch import failed
+from helpers.sketch import failed, made
 
 import smc_mujoco as smc
 from smc_mujoco.draw import states, style
@@ -112,3 +112,34 @@ def test_a_diverged_run_does_not_make_the_others_rest(base):
     bad = failed(dataclasses.replace(base, x=np.exp(40.0 * base.t)[:, None]), 2000)
     assert at([good, bad], (0.1,)) == [0.125]
     assert len(pace.clock([bad], FPS).times) > 10
+
+
+CLOSE = {  # what runs do -> their motion over time, parts, and whether a close-up follows
+    "a relay behind lags": (lambda t: 2e-4 * np.sin(TURN * t), {}, True),
+    "a rattling backlash": (
+        lambda t: 0.4 * np.exp(-9.0 * t) + 2e-4 * np.sin(TURN * t),
+        {"actuator": smc.Backlash(0.01)},
+        True,
+    ),
+    "motion that is seen": (lambda t: 0.2 * np.sin(TURN * t), {}, False),
+    "rest": (lambda t: 0.0 * t, {}, False),
+}
+TURN = 2.0 * np.pi * 20.0  # rad/s
+
+
+@pytest.mark.parametrize("kind", CLOSE)
+def test_where_nothing_is_seen_to_move_the_last_three_periods_follow_slowly_and_large(kind):
+    x, parts, follows = CLOSE[kind]
+    trace = made(smc.Scenario(plant="duffing", law="classical", duration=2.0, **parts))
+    place = x(trace.t)[:, None]
+    run = dataclasses.replace(trace, x=place, s=20.0 * place, u=np.sign(place), r=0.0 * place)
+    found = pace.clock([run], FPS)
+    assert (found.close is not None) is follows
+    if not found.close:
+        return
+    span = found.times[-1] - found.close.times[0]
+    assert span == pytest.approx(3 / 20.0, rel=0.1)
+    size = float(pace.visible_sizes(run.scenario)[0])
+    assert 0.3 * size < 2e-4 * found.close.factor <= size
+    assert len(found.close.times) / FPS == pytest.approx(3.0, rel=0.5)
+    assert not found.part(0.0, 1.0).close
