@@ -72,10 +72,7 @@ def values(table: Columns, metric: str) -> np.ndarray:
     successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
     `Metric.absent`.
     """
-    if metric == SETTLES:
-        name = "settling_time"
-    else:
-        name = metric
+    name = _column(metric)
     scores = np.array(table.column(name), float)
     scores[np.isnan(scores)] = CATALOGUE[name].absent
     plants = np.asarray(table.column("plant"), str)
@@ -86,17 +83,17 @@ def values(table: Columns, metric: str) -> np.ndarray:
         lost = lost | ~has_arrived(table)
     scores[lost] = np.inf
     scores[np.isin(plants, list(lacking))] = np.nan
-    if metric == SETTLES:
-        return np.where(np.isnan(scores), np.nan, np.isinf(scores))
-    return scores
+    return _settled(scores) if metric == SETTLES else scores
+
+
+def _column(metric: str) -> str:
+    """Return the column that a metric is made of."""
+    return {SETTLES: "settling_time"}.get(metric, metric)
 
 
 def by_row(table: Columns, metric: str) -> ByRow:
     """Return a metric of the rows of a table, with what is charged to it."""
-    if metric == SETTLES:
-        name = "settling_time"
-    else:
-        name = metric
+    name = _column(metric)
     whole = values(table, metric)
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
     if not CATALOGUE[name].error:
@@ -104,9 +101,14 @@ def by_row(table: Columns, metric: str) -> ByRow:
     halves[np.isnan(whole)] = np.nan
     trends = _from_json(table, "trends", name, np.nan)
     if metric == SETTLES:
-        halves = np.where(np.isnan(halves), np.nan, np.isinf(halves))
+        halves = _settled(halves)
         trends[:] = np.nan
     return ByRow(whole, halves, trends, has_arrived(table).astype(float))
+
+
+def _settled(times: np.ndarray) -> np.ndarray:
+    """Return 0.0 for a time, 1.0 for never, NaN for none."""
+    return np.where(np.isnan(times), np.nan, np.isinf(times))
 
 
 def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndarray:
@@ -172,22 +174,19 @@ class Group:
         self.blocks = tuple(dict.fromkeys(keys))  # (plant, condition)
         laws, law = np.unique(columns["law"], return_inverse=True)
         self.laws = tuple(laws.tolist())
-        block = [self.blocks.index(key) for key in keys]
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
-        empty = np.full((len(laws), len(self.blocks), len(numbers)), -1)
-        self.rows = empty.copy()  # the run's row in the table
-        self.outcome = empty.copy()  # a number equal for runs that differ by rounding alone
-        self.sets = empty.copy()  # a number equal for equal gains
-        for i, cell in enumerate(zip(law, block, seed, strict=True)):
-            if self.rows[cell] >= 0:
-                where = ", ".join(keys[i])
-                raise ScenarioError(
-                    f"the table has several runs of {laws[law[i]]} on {where}, seed "
-                    f"{numbers[seed[i]]}: give those of one set of gains and one duration"
-                )
-            self.rows[cell] = rows[i]
-            self.outcome[cell] = columns["outcome"][i]
-            self.sets[cell] = columns["sets"][i]
+        cells = law, [self.blocks.index(key) for key in keys], seed
+        cubes = np.full((3, len(laws), len(self.blocks), len(numbers)), -1)
+        for cube, of_run in zip(cubes, (rows, columns["outcome"], columns["sets"]), strict=True):
+            cube[cells] = of_run
+        # the run's row in the table, a number equal for runs that differ by rounding alone, and one
+        # equal for equal gains
+        self.rows, self.outcome, self.sets = cubes
+        for i in np.flatnonzero(self.rows[cells] != rows):
+            raise ScenarioError(
+                f"the table has several runs of {laws[law[i]]} on {', '.join(keys[i])}, seed "
+                f"{numbers[seed[i]]}: give those of one set of gains and one duration"
+            )
 
     @property
     def common(self) -> np.ndarray:
@@ -206,7 +205,7 @@ class Group:
             cubes.append(np.where(self.rows >= 0, row[self.rows], np.nan))
         cube = cubes[0]
         if np.isnan(cube).all():
-            return Scores([], {}, {}, {}, {}, {}, {})
+            return Scores([], *[{}] * 6)
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
             where = ", ".join(self.name.values())

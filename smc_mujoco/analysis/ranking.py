@@ -57,6 +57,7 @@ A law is among the best if no other is better and all its runs have a value and 
 import copy
 import functools
 import hashlib
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, NamedTuple
@@ -162,10 +163,9 @@ class Comparison:
         self.floors = np.broadcast_to(np.asarray(floors, float), blocks)
         self.first_order = np.broadcast_to(np.asarray(first_order, bool), blocks)
         self.low, high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
-        if shares:
-            plain = self.cells
-            self.beyond = relevant  # what d must exceed
-        else:
+        plain = self.cells
+        self.beyond = relevant  # what d must exceed
+        if not shares:
             plain = _logarithms(self.cells, self.floors)
             self.beyond = -math.log1p(-relevant)
         ran = ~np.isnan(self.cells[0])
@@ -180,16 +180,16 @@ class Comparison:
         for k in range(blocks):
             for a in range(count):
                 self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
-                if self.floors[k] > 0.0 and not shares:
-                    first = first_of_kind(results[[a], k][:, None], ran[[k]])[0]
-                    own_units = linked(gains[a, k, first])
-                    # of an even number, the median is above q if only half are at most q
-                    centre = middle(_by_unit(high[a, k, first], own_units, seeds))
-                    self.below[a, k] = centre <= math.log(self.floors[k])
-                for b in range(a):
-                    first = first_of_kind(results[[a, b], k][:, None], ran[[k]])[0]
-                    units = linked(gains[a, k, first], gains[b, k, first])
-                    for i, j in ((a, b), (b, a)):
+                # the law alone, then beside each other
+                for b in range(a + 1):
+                    pair = sorted({a, b})
+                    first = first_of_kind(results[pair, k][:, None], ran[[k]])[0]
+                    units = linked(*gains[pair, k][:, first])
+                    if b == a and self.floors[k] > 0.0 and not shares:
+                        # of an even number, the median is above q if only half are at most q
+                        centre = middle(_by_unit(high[a, k, first], units, seeds))
+                        self.below[a, k] = centre <= math.log(self.floors[k])
+                    for i, j in itertools.permutations(pair, 2):
                         charged = _difference(self.low[j, k], high[i, k])[first]
                         self.leads[k, i, j] = _by_unit(charged, units, seeds)
                         as_run = _difference(plain[j, k], plain[i, k])[first]
@@ -246,15 +246,12 @@ class Comparison:
     @functools.cached_property
     def winners(self) -> list[str | None]:
         """The law of each block that is better than every other, if there is one."""
-        winners = []
         itself = np.eye(len(self.laws), dtype=bool)
         beats = (self.p <= self.limits.winner) & self._eligible
         wins = np.all(beats | itself, axis=2) & ~self.away.any(axis=2).T
-        for block in wins:
-            winners.append(self.laws[int(block.argmax())] if block.any() else None)
-        if len(self.laws) == 1:
-            return [None] * len(winners)
-        return winners
+        wins &= len(self.laws) > 1
+        names = np.array([*self.laws, None])
+        return names[np.where(wins.any(axis=1), wins.argmax(axis=1), -1)].tolist()
 
     @functools.cached_property
     def better(self) -> np.ndarray:
@@ -404,14 +401,9 @@ def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np
         centres[: by_run.size] = by_run
         return centres
     for unit in range(max(units) + 1):
-        ordered = np.sort(by_run[np.array(units) == unit])
-        low = ordered[(ordered.size - 1) // 2]
-        high = ordered[ordered.size // 2]
-        # the sum of two opposite infinite values is no number
-        if low == -high:
-            centres[unit] = 0.0
-        else:
-            centres[unit] = (low + high) / 2
+        of_unit = by_run[np.array(units) == unit]
+        # between two opposite infinite values lies 0
+        centres[unit] = np.nan_to_num(middle(of_unit), nan=0.0, posinf=np.inf, neginf=-np.inf)
     return centres
 
 

@@ -86,7 +86,7 @@ def agent(
 
 def _episode(environment: Any) -> Episode:
     for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
-        if isinstance(owner, Episode) and not owner.setting.scenario.plant.pose:
+        if isinstance(owner, Episode) and not getattr(owner, "flies", False):
             return owner
     cure = "give one of smc_mujoco.envs.suite, or a single one of smc_mujoco.envs.gym"
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")

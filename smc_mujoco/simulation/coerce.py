@@ -409,7 +409,7 @@ def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder,
     items = _by_joint(name, value, s, Encoder, "smc.Encoder(counts=...)", joints)
     for joint, taken in zip(joints, chains(items, joints), strict=True):
         if len(taken) > 1:
-            raise ScenarioError(f"{name} has two encoders on joint {joint!r}: give one")
+            raise ScenarioError(f"{name} has two parts on joint {joint!r}: give one")
     if len(items) == 1 and not items[0].on:
         return items[0]
     return tuple(items) or None

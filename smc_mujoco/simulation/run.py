@@ -386,7 +386,7 @@ class ScenarioBatch:
         delayed sensors.
         """
         names = ["qpos", "qvel"]
-        if self.scenarios[0].plant.pose and self.model.na:
+        if self.model.na:
             names.append("act")
         if self.model.nhistory:
             names.append("history")

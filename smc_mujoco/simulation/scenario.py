@@ -73,7 +73,7 @@ U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 NOT_OF_FREE_BODIES = {
     "friction": "friction but on a joint by name, as its pose has none that rubs",
     "actuator": "actuator, as its thrusters are its drives",
-    "sensor": "sensor, as an Encoder is of a joint",
+    "sensor": "sensor, which is of a joint",
     "feedforward": "feedforward",
     "clock": "clock with late or missed samples",
     "velocity": "estimated velocity",
@@ -836,12 +836,12 @@ def check_signals(s: Resolved) -> None:
         raise ScenarioError(
             "only a reference may have a signal for each channel: give one signal for all"
         )
-    winds = [d for d in s.disturbance if d.air]
-    if winds and not flies(s.plant):
-        raise ScenarioError(
-            f"disturbance {shown(winds[0])} is a wind, and {s.plant.name} has no drag: give a "
-            "force, or plant 'quadrotor'"
-        )
+    for d in s.disturbance:
+        if d.air and not flies(s.plant):
+            raise ScenarioError(
+                f"disturbance {shown(d)} is a wind, and {s.plant.name} has no drag: give a force, "
+                "or plant 'quadrotor'"
+            )
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
     forces = [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]
@@ -895,8 +895,8 @@ def check_law(s: Resolved) -> None:
     check_free_body(s)
     if s.model == "true" and (s.law.joint or s.jump or s.accelerates or s.clock.jitter):
         raise ScenarioError(
-            "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave "
-            "that out, or give model='nominal'"
+            "model 'true' has no law of many joints, jump, acceleration as u or jitter of the "
+            "clock: leave that out, or give model='nominal'"
         )
     for law in s.law.parts:
         if not suits(law, s.plant):
@@ -991,7 +991,7 @@ def check_free_body(s: Resolved) -> None:
         )
     if s.plant.base >= 0 and s.sensor is not None:
         raise ScenarioError(
-            f"the base of {s.plant.name} is measured, and an Encoder is of joints: leave sensor out"
+            f"the base of {s.plant.name} is measured, and a sensor is of joints: leave sensor out"
         )
     if not s.plant.pose:
         return

@@ -231,73 +231,66 @@ def _block(
     """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
     laws = np.array(comparison.laws)
     sets = comparison.sets[:, at]
-    several = sets[sets > 1].tolist()
-    changes = {}
-    for law in comparison.laws:
-        changes[law] = comparison.step_change(at, law)
-    best = [comparison.laws.index(law) for law in comparison.best[at]]
-    level = comparison.level[at][np.ix_(best, best)].all()
+    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
+    medians = dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True))
+    lacking = dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True))
+    best = ~comparison.beaten[:, at]
     runs = int(comparison.seeds[at])
-    order = sorted(
-        range(len(laws)),
-        key=lambda i: (comparison.without_value[i, at], comparison.centres[i, at]),
-    )
+    winner = comparison.winners[at]
+    # by failed runs, then by median
+    order = sorted(comparison.laws, key=lambda law: (law != winner, lacking[law], medians[law]))
     return Block(
         plant=name[0],
         condition=name[1],
-        medians=dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True)),
-        lacking=dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True)),
-        best=comparison.best[at],
+        medians=medians,
+        lacking=lacking,
+        best=tuple(laws[best].tolist()),
         below=tuple(laws[comparison.below[:, at]].tolist()),
         floor=floor,
         away=tuple(laws[comparison.away[:, at].any(axis=1)].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
-        ahead=comparison.winners[at],
+        ahead=winner,
         lead=_lead(comparison, at, order, floor),
-        level=bool(level),
+        level=bool(comparison.level[at][np.ix_(best, best)].all()),
         visible=_visible(comparison, at, order),
         by_step={law: change for law, change in changes.items() if change},
         seeds=seeds,
         runs=runs,
         samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
-        sets=min(several, default=1),
+        sets=min(sets[sets > 1].tolist(), default=1),
         given=bool((sets == 1).any()),
         untuned=untuned,
     )
 
 
-def _lead(comparison: Comparison, at: int, order: Sequence[int], floor: str) -> Lead | None:
-    """Return how the law in front of a block compares with its closest rival, that with the largest
-    p-value; the order of laws is by failed runs, then by median.
+def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> Lead | None:
+    """Return how the law in front of a block compares with its closest rival; `order` has the law
+    in front first.
     """
     if len(order) < 2 or comparison.shares:
         return None
-    first = order[0]
-    if winner := comparison.winners[at]:
-        first = comparison.laws.index(winner)
-    if comparison.without_value[first, at]:
+    first, rival = order[0], _closest(comparison, at, order)
+    a, b = comparison.laws.index(first), comparison.laws.index(rival)
+    lacking = comparison.without_value[:, at]
+    effect = comparison.effect(at, first, rival)
+    if lacking[a] or not effect.samples or comparison.unranked[at, a, b]:
         return None
-    rival = _closest(comparison, at, first, order)
-    names = comparison.laws[first], comparison.laws[rival]
-    effect = comparison.effect(at, *names)
-    if not effect.samples or comparison.unranked[at, first, rival]:
-        return None
-    lacking = ""
-    if lost := comparison.without_value[rival, at]:
-        lacking = f"{lost} of {comparison.seeds[at]}"
-    return Lead(*names, effect, floor if effect.below else "", lacking)
+    lost = ""
+    if lacking[b]:
+        lost = f"{lacking[b]} of {comparison.seeds[at]}"
+    return Lead(first, rival, effect, floor if effect.below else "", lost)
 
 
-def _closest(comparison: Comparison, at: int, first: int, order: Sequence[int]) -> int:
-    """Return the rival of a law with the largest p-value, of those with a value in every run if
-    there are some.
+def _closest(comparison: Comparison, at: int, order: Sequence[str]) -> str:
+    """Return the rival of the law in front with the largest p-value, of those with a value in every
+    run if there are some.
     """
-    rivals = [i for i in order if i != first]
-    rivals = [i for i in rivals if not comparison.without_value[i, at]] or rivals
-    return max(rivals, key=lambda i: comparison.p[at, first, i])
+    first, *rivals = (comparison.laws.index(law) for law in order)
+    complete = [i for i in rivals if not comparison.without_value[i, at]]
+    return comparison.laws[max(complete or rivals, key=lambda i: comparison.p[at, first, i])]
 
 
-def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str, float]:
+def _visible(comparison: Comparison, at: int, order: Sequence[str]) -> dict[str, float]:
     """Return law -> the least lead that would have been seen between it and the law in front, if
     all runs of both have values and neither is below the floor; {} without a test.
 
@@ -305,19 +298,14 @@ def _visible(comparison: Comparison, at: int, order: Sequence[int]) -> dict[str,
     """
     if len(order) < 2 or comparison.shares:
         return {}
-    names = comparison.laws
     first = order[0]
-    if winner := comparison.winners[at]:
-        first = names.index(winner)
     seen = {}
-    for i in sorted(order):
-        if i != first:
-            rival = i
-        else:
-            rival = _closest(comparison, at, first, order)
-        lead = comparison.visible(at, names[first], names[rival])
-        if not np.isnan(lead) and not comparison.without_value[[i, first, rival], at].any():
-            seen[names[i]] = lead
+    for law in comparison.laws:
+        rival = law if law != first else _closest(comparison, at, order)
+        lead = comparison.visible(at, first, rival)
+        pair = [comparison.laws.index(first), comparison.laws.index(rival)]
+        if not np.isnan(lead) and not comparison.without_value[pair, at].any():
+            seen[law] = lead
     return seen
 
 

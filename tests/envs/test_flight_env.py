@@ -82,23 +82,6 @@ def test_episodes_begin_where_they_are_told_or_about_rest_and_end_with_a_state_t
         environment.step(np.full(4, np.nan))
 
 
-def test_copies_move_like_single_environments():
-    options = {"changes": {"duration": 0.02}}
-    copies = gymnasium.make_vec(
-        "smc_mujoco:smc/Quadrotor-v0", num_envs=2, vectorization_mode="sync", **options
-    )
-    alone = gymnasium.make("smc_mujoco:smc/Quadrotor-v0", **options)
-    copies.reset(seed=4)
-    alone.reset(seed=5)
-    truncated = np.zeros(2, bool)
-    for _ in range(20):
-        observations, rewards, _, truncated, _ = copies.step(np.full((2, 4), 0.3, np.float32))
-        observation, reward, *_ = alone.step(np.full(4, 0.3, np.float32))
-        np.testing.assert_array_equal(observations[1], observation)
-        assert rewards[1] == reward
-    assert truncated.all()
-
-
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
 @pytest.mark.parametrize("steps", [0, 3])
 def test_a_copy_flies_on_from_where_its_original_is(steps, copied):

@@ -338,7 +338,7 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
 
 
 def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "heading"]:
-    """Return what of its pose a free body can hold, as in `Plant.pose`; warn if that is less than
+    """Return what of its pose a free body can hold, as a Plant has it; warn if that is less than
     its heading.
     """
     forces = exerted(model, model.joint(joint).id, thrusters(model, joint))

@@ -71,7 +71,8 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos  # the start, of a free body also the goal
     apart = "another keyframe, or <exclude> that pair in the file"
-    if source.label.lower().endswith(".urdf"):
+    of_urdf = source.label.lower().endswith(".urdf")
+    if of_urdf:
         apart = "one of these links no <collision> in the file"
     if model.joint(joints[0]).type[0] != own.FREE:
         for joint, x in zip(joints, own.goals(model, joints, keyframe)[0], strict=True):
@@ -80,6 +81,10 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
         mujoco.mj_fwdPosition(model, at)
         for contact in at.contact:
             bodies = model.geom_bodyid[contact.geom]
+            weld = model.body_weldid[bodies]
+            above = model.body_weldid[model.body_parentid[weld.max()]]
+            if of_urdf and weld.min() == above == 0:  # excluded where static links are the world
+                continue
             if contact.dist < -DEPTH and moved[bodies[0]] != moved[bodies[1]]:
                 first, second = (
                     model.geom(i).name or model.body(model.geom_bodyid[i]).name or f"geom {i}"

@@ -2,6 +2,7 @@
 read or that are missing, and impossible inertias.
 """
 
+import itertools
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
@@ -27,7 +28,9 @@ class Urdf(NamedTuple):
     raised: list[str]  # links with an inertia that no body has
 
     def spec(self) -> mujoco.MjSpec:
-        """Return it with its visual shapes, which replace the others in pictures."""
+        """Return it with its visual shapes, which replace the others in pictures. No link touches
+        the one that carries it, which MuJoCo does not see where that is part of the world.
+        """
         assets = {name: file.read_bytes() for name, file in self.meshes.items()}
         spec = mujoco.MjSpec.from_string(self.text, assets=assets)
         for body in spec.bodies:
@@ -35,6 +38,15 @@ class Urdf(NamedTuple):
                 for geom in body.geoms:
                     if geom.contype:
                         geom.group = UNSEEN_GROUP
+        fixed = ["world"]
+        carried = []
+        for body in spec.bodies[1:]:
+            if body.parent.name in fixed:
+                (carried if body.joints else fixed).append(body.name)
+        if spec.compiler.fusestatic:  # into the world
+            fixed = fixed[:1]
+        for first, second in itertools.product(fixed, carried):
+            spec.add_exclude(bodyname1=first, bodyname2=second)
         return spec
 
     def notes(self, label: str) -> list[str]:

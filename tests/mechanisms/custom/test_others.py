@@ -338,10 +338,14 @@ BLOCK = """<mujoco model="block"><worldbody><body name="post" pos="0 0 0">
 <geom type="box" size=".05 .05 .3"/></body><body name="rod" pos="-.4 0 0"><joint name="j" axis="0 0 1"/>
 <geom name="arm" type="capsule" fromto="0 0 0 .39 0 0" size=".02"/></body></worldbody>
 <actuator><motor joint="j" ctrlrange="-9 9"/></actuator>{more}</mujoco>"""
-URDF = """<robot name="block"><link name="base"><collision><geometry><box size=".1 .1 .6"/></geometry>
-</collision></link><link name="arm"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1"
- ixy="0" ixz="0" iyz="0"/></inertial>{shape}</link><joint name="j" type="continuous">
-<parent link="base"/><child link="arm"/><origin xyz="-.4 0 0"/><axis xyz="0 0 1"/></joint></robot>"""
+INERTIAL = """<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0"
+ iyz="0"/></inertial>"""
+URDF = f"""<robot name="block"><link name="base"><collision><geometry><box size=".1 .1 .6"/></geometry>
+</collision></link><link name="plate"/><link name="mid">{INERTIAL}</link><link name="arm">{INERTIAL}
+{{shape}}</link><joint name="bolted" type="fixed"><parent link="base"/><child link="plate"/></joint>
+<joint name="i" type="continuous"><parent link="plate"/><child link="mid"/><axis xyz="0 0 1"/></joint>
+<joint name="j" type="continuous"><parent link="{{parent}}"/><child link="arm"/>
+<origin xyz="-.4 0 0"/><axis xyz="0 0 1"/></joint></robot>"""
 SHAPE = """<collision><origin xyz=".2 0 0"/><geometry><box size=".38 .04 .04"/></geometry>
 </collision>"""
 CLEAR = {
@@ -363,12 +367,19 @@ def test_a_goal_inside_something_is_refused_and_each_cure_works(cure):
             smc.plant_from(text, inside, keyframe=key)
 
 
-def test_a_link_of_a_urdf_that_starts_inside_another_may_lose_its_collision(tmp_path):
+@pytest.mark.parametrize("mode", ["file", "locked"])
+@pytest.mark.parametrize("parent", ["plate", "mid"])
+def test_a_link_of_a_urdf_may_touch_all_but_the_one_that_carries_it(tmp_path, parent, mode):
     file = tmp_path / "block.urdf"
-    file.write_text(URDF.format(shape=SHAPE))
-    with pytest.raises(
-        smc.ScenarioError, match=r"mm inside .*give one of these links no <collision>"
-    ):
-        smc.plant_from(file, {"j": smc.Channel(motor=True)})
-    file.write_text(URDF.format(shape=""))
-    assert smc.plant_from(file, {"j": smc.Channel(motor=True)}).n == 1
+    moved = []
+    for shape in (SHAPE, ""):
+        file.write_text(URDF.format(shape=shape, parent=parent))
+        if shape and parent == "mid":
+            with pytest.raises(smc.ScenarioError, match=r"mm inside .*one of these links no <coll"):
+                smc.plant_from(file, {"j": smc.Channel(motor=True)}, others=mode)
+            continue
+        made = smc.plant_from(file, {"j": smc.Channel(motor=True)}, others=mode)
+        law = smc.law("pid", kp=9.0, ki=1.0, kd=2.0)
+        moved.append(smc.run(smc.Scenario(plant=made, law=law, x0=0.3, u_max=5.0, duration=0.3)).x)
+    assert np.ptp(moved[0]) > 0.1
+    np.testing.assert_allclose(moved[0], moved[-1], atol=2e-4)

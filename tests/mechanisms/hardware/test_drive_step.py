@@ -106,27 +106,6 @@ def test_a_lag_gives_a_free_mass_its_exact_velocity(tau):
     )
 
 
-def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
-    equal, nearly = (
-        drive_step((smc.Lag(0.01), smc.Lag(tau)), H, True) for tau in (0.01, 0.01 * (1.0 + 1e-13))
-    )
-    assert equal == pytest.approx(nearly, rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network"])
-def test_no_lag_and_no_limit_are_the_plants_own_actuator_to_the_bit(name):
-    common = {"plant": name, "law": "super_twisting", "duration": 0.2}
-    own, lag, rate = smc.run(
-        [
-            smc.Scenario(**common, actuator=a)
-            for a in (None, smc.Lag(0.0), smc.hardware.RateLimit(math.inf))
-        ]
-    )
-    for other in (lag, rate):
-        for signal in ("x", "v", "u", "force"):
-            np.testing.assert_array_equal(getattr(other, signal), getattr(own, signal))
-
-
 @smc.law_function(gains={"late": 0.3})
 def stepping(y, gains, memory):
     """1, and from `late` seconds on -1."""
@@ -154,19 +133,6 @@ def test_a_limited_rate_is_exactly_the_rate_starts_at_zero_and_stops_within_a_st
         rtol=0.0,
         atol=1e-5,
     )
-
-
-def test_a_motors_winding_counts_as_its_lag():
-    """A joint that hardly moves: the torque is that of two lags, mu and L/R."""
-    trace = smc.run(
-        scenario(
-            smc.Lag(0.01),
-            MOTOR,
-            mismatch={"mass": 1e9},
-            x0=0.0,
-        )
-    )
-    assert trace.force[1:, 0] == pytest.approx(mean_risen(trace.t, 0.01, MOTOR.delay), abs=1e-8)
 
 
 @pytest.mark.parametrize("inductance", [1e-4, 5e-3])

@@ -13,7 +13,7 @@ from helpers.python_controller import Controller
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, drive_step, rippled
+from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
@@ -95,35 +95,6 @@ def test_cogging_is_a_sine_of_the_rotors_angle():
         mujoco.mj_forward(model, data)
         expected = motor.gear * 5e-3 * math.sin(14.0 * motor.gear * x)
         assert data.actuator_force[0] == pytest.approx(expected, abs=1e-12)
-
-
-def test_a_commutator_raises_the_torque_where_a_brush_bridges_two_bars():
-    """By the formula: all of the ripple at either brush, 1/e of it where the cosine has fallen by
-    (bars bridge)^2.
-    """
-    motor = DCMotor(
-        inductance=0.0,
-        gear=2.0,
-        ripple=0.2,
-        bars=9.0,
-        bridge=0.02,
-        brush=0.1,
-        bridge_2=0.01,
-        brush_2=0.4,
-    )
-    step = drive_step((motor,), 1e-3, True)
-    even = motor.constant / motor.resistance * (3.0 - motor.constant * 5.0)
-    beside = 0.1 + math.acos(1.0 - (9.0 * 0.02) ** 2) / 9.0
-    for turned, share in (
-        (0.1, 0.2),
-        (0.4 - math.tau / 9.0, 0.2),
-        (beside, 0.2 / math.e),
-        (0.25, 0.0),
-    ):
-        V = rippled(step, 3.0, turned / 2.0, 5.0)
-        torque = motor.constant / motor.resistance * (V - motor.constant * 5.0)
-        assert torque == pytest.approx((1.0 + share) * even, rel=1e-6)
-    assert rippled(step, 100.0, 0.125, 0.0) == pytest.approx(motor.voltage, rel=1e-6)
 
 
 @NAMES
@@ -240,31 +211,6 @@ def test_play_comes_after_any_drive(name, order):
         for i in range(n):
             rotors.append(model.joint(ROTOR + model.joint(i).name).qposadr[0])
         assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.0105
-
-
-@smc.law_function
-def saturated(y, gains, memory):
-    """A law that does not compile and asks for more than there is."""
-    return float(str(-100.0)), y.e
-
-
-@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
-@pytest.mark.parametrize(
-    "law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"]
-)
-def test_the_command_of_a_motor_is_within_the_bound_to_the_last_bit(law):
-    """With this gear a command of 6 N becomes volts and comes back an ulp larger."""
-    motor = smc.DCMotor(gear=0.32761186154670086)
-    trace = smc.run(
-        smc.Scenario(
-            plant="duffing",
-            law=law,
-            duration=0.005,
-            x0=0.8,
-            actuator=motor,
-        )
-    )
-    assert np.abs(trace.applied).max() == trace.scenario.resolved.u_max
 
 
 VOLTAGE = DCMotor(

@@ -2,7 +2,6 @@
 formulas say.
 """
 
-import dataclasses
 import math
 
 import mujoco
@@ -197,23 +196,3 @@ def test_friction_is_on_every_joint_of_a_network(part):
     assert (data.qvel < math.exp(-own / 0.125 * 0.25)).all()
     assert data.qvel == pytest.approx(data.qvel[0])
     assert list(drive_ids(model)) == [0, 1, 2, 3]
-
-
-@EACH
-def test_friction_acts_on_driven_joints_or_on_those_that_it_names(part):
-    """One joint that it leaves alone moves as without it."""
-    at = plant("furuta")
-    models = {"plain": build(at, part)}
-    for name in ("arm", "hinge"):
-        models[name] = build(at, dataclasses.replace(part, on=(name,)))
-    assert len({dataclasses.replace(part, on=on).structure() for on in ((), ("hinge",))}) == 2
-    rates = {}
-    for name, model in {"none": build(at), **models}.items():
-        data = mujoco.MjData(model)
-        data.qvel[:] = 0.5, 0.5
-        mujoco.mj_forward(model, data)
-        rates[name] = data.qfrc_actuator + data.qfrc_constraint + data.qfrc_passive
-    assert rates["plain"].tolist() == rates["arm"].tolist()
-    rubbing = np.array([rates[name] - rates["none"] for name in ("arm", "hinge")])
-    assert (np.diag(rubbing) < -1e-6).all()
-    assert rubbing[0, 1] == rubbing[1, 0] == 0.0

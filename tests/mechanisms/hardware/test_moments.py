@@ -76,6 +76,7 @@ NOTHING = {
     "grease": {"friction": grease(cold=0.0)},
     "seen": {"friction": seen(scale=0.0)},
     "lag": {"actuator": smc.Lag(0.0)},
+    "rate": {"actuator": smc.hardware.RateLimit(math.inf)},
     "motor": {"actuator": motor()},
 }
 

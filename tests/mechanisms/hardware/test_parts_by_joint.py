@@ -84,7 +84,7 @@ def test_they_survive_text_json_and_the_order_of_a_mapping(field, pair):
         ({"sensor": {"c": FINE}}, "joint of two in sensor 'c': choose from a, b"),
         ({"sensor": {"a": smc.Lag(0.1)}}, "sensor is Lag"),
         ({"actuator": {"a": FINE}}, "actuator is Encoder"),
-        ({"sensor": (FINE, {"b": FINE})}, "two encoders on joint 'b': give one"),
+        ({"sensor": (FINE, {"b": FINE})}, "two parts on joint 'b': give one"),
         ({"actuator": (smc.DCMotor(), {"b": smc.Lag(0.1)})}, "give one drive"),
         ({"actuator": {"b": (smc.Lag(0.1), Stepper())}}, "Stepper is behind Lag"),
         ({"actuator": {"b": (smc.Backlash(0.1), smc.Backlash(0.2))}}, "give one of a kind"),

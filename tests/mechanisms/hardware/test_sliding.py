@@ -252,16 +252,6 @@ def test_a_joint_that_moves_with_others_rests_where_mujocos_set_valued_friction_
     assert np.abs(ours.x - theirs.x)[4000:, 0].max() < 4.0 * gives_way
 
 
-def test_friction_only_takes_energy():
-    trace = flywheel(
-        0.1, 1.0, friction=smc.hardware.Sigmoid(*(p[1] for p in (P1, P2, P3))), duration=3.0
-    )
-    energy = 0.05 * trace.v[:, 0] ** 2
-    bend = 0.5 * max(map(abs, limits(1))) ** 2 / (0.1 * 200.0**2)  # J, what a stuck joint can hold
-    assert np.all(energy[1:] <= np.minimum.accumulate(energy)[:-1] + bend)
-    assert abs(trace.v[-1, 0]) < 1e-6
-
-
 # both loops, threads, numbers of a simulation's own
 
 
@@ -341,16 +331,6 @@ def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
         assert_same(trace, reference.run(scenario))
         # a joint turned back, so it stuck
         assert np.abs(np.diff(np.sign(trace.v), axis=0)).sum() >= 2
-
-
-def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():
-    several = list(scenarios())
-    first = smc.run(several, threads=1)
-    for threads in (2, 4):
-        for one, other in zip(first, smc.run(several, threads=threads), strict=True):
-            assert_same(one, other)
-    for one, other in zip(first, several, strict=True):
-        assert_same(one, smc.run(other))
 
 
 # servos: the published code, in numpy
