@@ -186,18 +186,11 @@ def _board(
 
 def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of a metric, with that of u where it is the same voltage in all blocks."""
-    efforts = set()
-    for scenario in ran:
-        if scenario is None or scenario.force_command:
-            return UNITS[metric]
-        efforts.add(scenario.efforts[0])
-    if len(efforts) > 1:
-        return UNITS[metric]
+    efforts = {"" if not one or one.force_command else one.efforts[0] for one in ran}
     effort = efforts.pop()
-    if effort.isalpha():
-        bracketed = effort
-    else:
-        bracketed = f"({effort})"
+    if efforts or not effort:
+        return UNITS[metric]
+    bracketed = effort if effort.isalpha() else f"({effort})"
     return UNITS[metric].replace("({u})", bracketed).replace("{u}", effort)
 
 

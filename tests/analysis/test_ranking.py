@@ -255,23 +255,6 @@ def test_less_than_the_least_relevant_difference_is_a_tie_however_sure_it_is(
     assert found.best == [("a",) if wins else ("a", "b")]
 
 
-@pytest.mark.parametrize(
-    ("seeds", "wins"),
-    [
-        (1, False),
-        (6, False),
-        (7, True),
-    ],
-)
-def test_two_conditions_need_seven_seeds_as_the_least_p_is_two_to_the_one_minus_n(seeds, wins):
-    scores = {"a": blocks(1, 2, seeds=seeds), "b": blocks(2, 4, seeds=seeds)}
-    (board,) = leaderboard(table_of(scores), ["itae"])
-    assert board.winner == ("a" if wins else None)
-    assert board.too_few == (
-        "" if wins else f"too few runs ({seeds}), 7 can decide (seeds, searches)"
-    )
-
-
 @pytest.mark.slow
 def test_two_laws_apart_by_what_is_just_relevant_have_a_false_winner_in_at_most_five_percent():
     """The worst case of the hypothesis: a lead that just does not matter, and a third law far
