@@ -51,7 +51,7 @@ def plot(
     Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that
     share one of several sets of gains are one sample. There is a column of panels per metric and a
     row per plant. A hollow dot at the right edge, under "never" or "not arrived", is a law whose
-    median run fails, does not settle, or has not arrived. Sizes below 1e-9 are drawn as 1e-9.
+    median run fails, does not settle, or has not arrived. Sizes below 1e-9 are arrows at it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -202,6 +202,8 @@ def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> No
     median, low, high = interval[:3]
     color = look["color"]
     mark: dict[str, Any] = {**look, "ms": style.points(6)}
+    if median == MIN_SIZE:
+        mark["marker"] = "<"
     if np.isfinite(median):
         ax.plot(median, line, **mark)
     else:

@@ -13,8 +13,8 @@ TOUCH = 1.5  # px by which boxes of letters may overlap: letters fill less
 
 
 def recorded(monkeypatch):
-    """Return lists that grow while pictures are drawn: boxes of the words that were drawn, by their picture: (words, left, low, right, high) px; and
-    the shares of tiles that machines reach.
+    """Return lists that grow while pictures are drawn: boxes of the words that were drawn, by
+    their picture, (words, left, low, right, high) px; and the shares of tiles that machines reach.
     """
     boxes = defaultdict(list)
     shares = []
