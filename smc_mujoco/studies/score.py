@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, overload
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, find, has, items_of, shown
 from smc_mujoco.metrics import catalogue
@@ -71,6 +70,7 @@ def _table(
 ) -> "Table":
     import pyarrow as pa
 
+    from smc_mujoco.analysis.engine.runs import Runs
     from smc_mujoco.studies.table import Table
 
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
