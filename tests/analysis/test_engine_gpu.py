@@ -7,6 +7,7 @@ import types
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import engine
 from smc_mujoco.analysis.engine import group
 from smc_mujoco.analysis.engine.scores import METRICS
 from smc_mujoco.control.law import catalogue
@@ -67,6 +68,7 @@ def test_every_law_compiles_for_a_device(monkeypatch, law):
 
 def test_without_the_package_a_device_is_refused_in_one_sentence(monkeypatch):
     monkeypatch.delitem(sys.modules, "smc_mujoco.analysis.engine.gpu", raising=False)
+    monkeypatch.delattr(engine, "gpu", raising=False)
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "numba_cuda" else find(name)
