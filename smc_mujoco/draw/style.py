@@ -513,8 +513,7 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
-    one = isinstance(traces, Trace | Scenario)  # of which the latter is refused below
-    traces = [traces] if one else items_of("traces", traces)
+    traces = [traces] if isinstance(traces, Trace | Scenario) else items_of("traces", traces)
     for given in traces:
         if not isinstance(given, Trace):
             raise ScenarioError(

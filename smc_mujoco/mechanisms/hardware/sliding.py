@@ -104,10 +104,7 @@ class Sliding(JointForce):
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
         model = run.model
-        rows = []
-        for i, dof in enumerate(run.dofs):
-            rows.append((*self.parameters(i), *bristle(model, dof)))
-        return rows
+        return [(*self.parameters(i), *bristle(model, dof)) for i, dof in enumerate(run.dofs)]
 
     @property
     def exact(self) -> "Sliding":
@@ -129,10 +126,9 @@ def bristle(model: mujoco.MjModel, dof: int) -> tuple[float, float, float]:
     """Return stiffness and critical damping of a degree of freedom that sticks, and the inertia
     that a force on it moves, kg m^2 (kg), all in qpos0.
     """
-    inertia = float(model.dof_M0[dof])
+    inertia = model.dof_M0[dof]
     stiffness = inertia * BRISTLE_FREQUENCY**2
-    damping = 2.0 * math.sqrt(stiffness * inertia)
-    return stiffness, damping, 1.0 / float(model.dof_invweight0[dof])
+    return stiffness, 2.0 * math.sqrt(stiffness * inertia), 1.0 / model.dof_invweight0[dof]
 
 
 @functools.cache

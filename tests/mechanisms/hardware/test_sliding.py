@@ -236,17 +236,17 @@ def test_stuck_joints_are_critically_damped():
 # load, kg, gains of the loop, and friction, N: the load swings near the limit that holds the trolley
 @pytest.mark.parametrize(
     ("load", "kp", "kd", "level"),
-    [(0.72, 22.0, 3.86, 0.95), (0.66, 17.0, 3.16, 0.73), (0.94, 31.7, 2.95, 0.55)],
+    [(0.72, 22.0, 3.86, 0.95), (0.94, 31.7, 2.95, 0.55)],
 )
 def test_a_joint_that_moves_with_others_rests_where_mujocos_set_valued_friction_holds_it(
     load, kp, kd, level
 ):
+    crane = smc.plant("overhead_crane", M=1.0, m=load)
+    law = smc.law_from(np.array([[kp, 0.0, kd, 0.0]]), name="pd")
     runs = []
     for part in (Curious(level, 0.0, 0.0), smc.Coulomb(level)):
-        crane = smc.plant("overhead_crane", M=1.0, m=load)
-        law = smc.law_from(np.array([[kp, 0.0, kd, 0.0]]), name="pd")
-        given = {"friction": {"slide": part}, "x0": (0.3, 0.0), "duration": 8.0}
-        runs.append(smc.Scenario(plant=crane, law=law, **given))
+        on = {"slide": part}
+        runs.append(smc.Scenario(plant=crane, law=law, friction=on, x0=(0.3, 0.0), duration=8.0))
     ours, theirs = smc.run(runs)
     gives_way = level / ((1.0 + load) * 200.0**2)  # m, a bristle at its limit
     assert np.abs(ours.x - theirs.x)[4000:, 0].max() < 4.0 * gives_way
