@@ -198,7 +198,8 @@ def measured_joints(
     """
     if measured is None:
         return ()
-    if isinstance(measured, str) or not isinstance(measured, Iterable):
+    given = items_of("measured", measured)
+    if isinstance(measured, str) or not all(isinstance(name, str) for name in given):
         raise ScenarioError(
             f"measured is {shown(measured)}: give joints' names, such as ['pole', 'base']"
         )
@@ -206,7 +207,7 @@ def measured_joints(
     free = [names[i] for i in np.flatnonzero(model.jnt_type == FREE)]
     taken = joints_of(channels)
     found = []
-    for name in items_of("measured", measured):
+    for name in given:
         joint = name
         if name == "base" and name not in names and len(free) == 1:
             joint = free[0]
