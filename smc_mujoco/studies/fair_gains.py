@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
+from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import (
@@ -28,6 +28,7 @@ from smc_mujoco.common.errors import (
     ScenarioWarning,
 )
 from smc_mujoco.common.progress import bar, told
+from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue, known_laws
@@ -71,8 +72,6 @@ class Candidate(NamedTuple):
         """Return J on instances, whether their runs have arrived, J of one in four at half the
         physics step, and the sets' numbers.
         """
-        from smc_mujoco.analysis.tuning.evaluator import objectives
-
         laws = [self(instance) for instance in instances]
         values, arrived = objectives(plant, laws, goal, instances, threads)
         every = slice(None, None, REPEATED_SEEDS)
@@ -232,12 +231,12 @@ class Trial(NamedTuple):
         """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a
         plant.
         """
-        from smc_mujoco.analysis.tuning import search
-
-        goal = self._goal(plant, starts)
         reasons = []
         for law, candidate in zip(laws, known, strict=True):
-            reason = candidate.remark if candidate else search.why_not(plant, law, goal)
+            if candidate:
+                reason = candidate.remark
+            else:
+                reason = self._why_not(plant, law, starts)
             if not reason:
                 return
             reasons.append(reason)
@@ -246,6 +245,12 @@ class Trial(NamedTuple):
                 f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default "
                 "gains"
             )
+
+    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
+        """Return why a law cannot be tuned on a plant, or ""."""
+        from smc_mujoco.analysis.tuning import search
+
+        return search.why_not(plant, law, self._goal(plant, starts))
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
@@ -266,7 +271,6 @@ class Trial(NamedTuple):
         it cannot.
         """
         from smc_mujoco.analysis.tuning import result, search
-        from smc_mujoco.studies.searched_gains import candidate_of
 
         goal = self._goal(plant, starts)
         default = coerce.law(law)
@@ -359,3 +363,29 @@ class Trial(NamedTuple):
 
         file = self.folder / "worst" / f"{name}.json"
         return cached_worst_case(file, scenario, within, budget, self.threads, self.progress)
+
+
+def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
+    """Return a law with the gains of each search, or with those that it had if no search found
+    better ones.
+    """
+    from smc_mujoco.analysis.tuning import search_space
+
+    found = tuned.law.source
+    if tuned.before < tuned.objective:
+        if default.source.kind == source.DEFAULT:
+            own = "defaults"
+        else:
+            own = "own gains"
+        kept = default.sourced(found.kind, found.search)
+        return Candidate(kept, (kept,), f"its {own}, better than those tried")
+    sets = []
+    for tried in tuned.sets:
+        gains = dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True))
+        with_gains = dataclasses.replace(default, gains=gains)
+        sets.append(with_gains.sourced(found.kind, found.search))
+    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
+    remark = ""
+    if names := list(search_space.without_unit(default)):
+        remark = f"no unit, so searched about the default: {joined(names)}"
+    return Candidate(best, tuple(sets), remark)

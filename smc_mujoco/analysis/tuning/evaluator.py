@@ -19,12 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.step_halving import halved as halved_step
-from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Evaluation, Objective
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.analysis.tuning.objective import Evaluation, Objective
 from smc_mujoco.control.component import Component
-from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.catalogue import arrived
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import (
@@ -281,45 +277,3 @@ def sums(log: np.ndarray, period: float) -> tuple[float, float]:
     itae = np.cumsum(0.5 * (weighted[:-1] + weighted[1:]) * period)[-1]
     tv = np.cumsum(np.abs(np.diff(log["u"], axis=0)), axis=0)[-1].max()
     return float(itae), float(tv)
-
-
-def objectives(
-    plant: Plant | str,
-    laws: Sequence[Component],
-    goal: Objective = OBJECTIVES["balanced"],
-    instances: Sequence[int] | None = None,
-    threads: int | None = None,
-    halved: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo, and
-    whether all runs of an instance have arrived, (laws,).
-
-    Args:
-      laws: with their gains. Law i runs on instance i: its own starts and noise, one run for each
-        condition.
-      instances: numbers of the instances, in place of 0, 1, ...
-      threads: as in `run`.
-      halved: whether the runs have half their physics step.
-    """
-    if instances is None:
-        numbers = range(len(laws))
-    else:
-        numbers = instances
-    if len(numbers) != len(laws):
-        raise ScenarioError(
-            f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law"
-        )
-    cases = []
-    for law, number in zip(laws, numbers, strict=True):
-        cases += goal.holdout(plant, law, number)
-    if halved:
-        cases = list(map(halved_step, cases))
-    traces = run(cases, threads)
-    found = []
-    there = []
-    count = len(goal.conditions)
-    for first in range(0, len(cases), count):
-        runs = traces[first : first + count]
-        found.append(goal.evaluation(cases[first], runs).objective)
-        there.append(all(map(arrived, runs)))
-    return np.array(found), np.array(there)

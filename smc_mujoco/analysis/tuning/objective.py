@@ -24,11 +24,12 @@ gains beyond it cost more than that.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.step_halving import halved as halved_step
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Component
@@ -37,6 +38,7 @@ from smc_mujoco.mechanisms.rotation import pose_errors
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
 from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_starts
+from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -253,3 +255,45 @@ def restore(data: Mapping[str, Any]) -> Objective:
 
 
 OBJECTIVES = {"balanced": Objective(), "tracking": Objective(weight=0.0)}
+
+
+def objectives(
+    plant: Plant | str,
+    laws: Sequence[Component],
+    goal: Objective = OBJECTIVES["balanced"],
+    instances: Sequence[int] | None = None,
+    threads: int | None = None,
+    halved: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo, and
+    whether all runs of an instance have arrived, (laws,).
+
+    Args:
+      laws: with their gains. Law i runs on instance i: its own starts and noise, one run for each
+        condition.
+      instances: numbers of the instances, in place of 0, 1, ...
+      threads: as in `run`.
+      halved: whether the runs have half their physics step.
+    """
+    if instances is None:
+        numbers = range(len(laws))
+    else:
+        numbers = instances
+    if len(numbers) != len(laws):
+        raise ScenarioError(
+            f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law"
+        )
+    cases = []
+    for law, number in zip(laws, numbers, strict=True):
+        cases += goal.holdout(plant, law, number)
+    if halved:
+        cases = list(map(halved_step, cases))
+    traces = run(cases, threads)
+    found = []
+    there = []
+    count = len(goal.conditions)
+    for first in range(0, len(cases), count):
+        runs = traces[first : first + count]
+        found.append(goal.evaluation(cases[first], runs).objective)
+        there.append(all(map(metrics.arrived, runs)))
+    return np.array(found), np.array(there)

@@ -24,8 +24,7 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, all_combinations, grid
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate
-from smc_mujoco.studies.searched_gains import candidate_of
+from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, candidate_of
 
 BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace
 

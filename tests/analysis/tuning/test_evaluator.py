@@ -9,8 +9,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, PYTHON, Evaluator, objectives
-from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, PYTHON, Evaluator
+from smc_mujoco.analysis.tuning.objective import Objective, objectives
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import itae, tv
 
