@@ -47,6 +47,7 @@ from smc_mujoco.analysis.engine.form import FAILURE, SCORES, Form, row_places, w
 from smc_mujoco.analysis.engine.group import Group, why_not
 from smc_mujoco.analysis.engine.scores import METRICS, own
 from smc_mujoco.analysis.ranking import interval
+from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import BUDGET, OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.search import Task, task_of
@@ -63,8 +64,9 @@ from smc_mujoco.simulation.run import stream
 OBSERVERS = ("adrc", "pd_observer")
 RIVALS = (*OBSERVERS, "pid", "lqi")
 SMOOTH = ("boundary_layer", "observer_free")
-LAWS = ("super_twisting", "classical", "implicit_first_order", "extended_state", *SMOOTH, *RIVALS)
-TOLD = ("lqi", "mpc", "loop_shaping")  # told the linear plant, whatever --model says
+TWISTING = ("super_twisting",)
+LAWS = (*TWISTING, "classical", "implicit_first_order", "extended_state", *SMOOTH, *RIVALS)
+TOLD = ("lqi", "mpc", "loop_shaping")  # told the plant's line at rest, whatever --model says
 GOAL = OBJECTIVES["balanced"]
 SETS, SETS_BY_MUJOCO = 1500, 40
 KINDS_BY_MUJOCO = ("middle", "noisy", "calm")
@@ -317,14 +319,19 @@ class Bench:
 
     def admitted(self, gains: np.ndarray) -> list[bool | None]:
         """Return whether a law's theorem admits the load of each condition; None if it names no
-        bound.
+        bound. Its theorem is about accelerations, so without a model each force counts g times.
         """
         law = with_gains(self.task.law, self.names, gains.tolist())
+        g = 1.0 / self.task.scales["M"]
         its = SimpleNamespace(**law.gains)
+        if self.job.model == "none":
+            for name, value in law.gains.items():
+                if unit := search_space.unit(law, name):
+                    setattr(its, name, value * g**unit.force)
         bounds = catalogue()[self.job.law].admits
         found: list[bool | None] = []
         for condition in self.job.conditions:
-            force = condition.force * self.bound
+            force = g * condition.force * self.bound
             sizes = {"d": force, "d'": force * condition.ratio * self.job.wc}
             fits = [sizes[what] < most(its) for what, most in bounds.items()]
             found.append(all(fits) if fits else None)
@@ -467,14 +474,18 @@ class Sentence(NamedTuple):
     low: float = 0.0  # level
     high: float = math.inf
     model: str = "none"
-    within: bool = False  # only where the theorem of the first admits the load
+    within: bool | None = None  # only where super-twisting's theorem admits the load, or does not
 
 
+CHEAP = ("calm",)  # of the cheapest set, whatever the load
+LOADS = ("slow", "middle", "noisy", "delayed")
 SENTENCES = (
-    Sentence("slope", ("super_twisting",), RIVALS, ("slow", "middle"), low=2.0, within=True),
-    Sentence("smooth", RIVALS, SMOOTH, ("slow", "middle", "noisy")),
-    Sentence("sign", SMOOTH, ("classical",), ("middle",)),
-    Sentence("cheap", OBSERVERS, ("super_twisting", *SMOOTH, "classical"), ("calm",), "least"),
+    Sentence("integral", TWISTING, RIVALS, ("slow", "middle", "fast", "strong"), within=True),
+    Sentence("border", RIVALS, TWISTING, ("strong",), within=False),
+    Sentence("smooth", RIVALS, SMOOTH, LOADS, high=10.0),
+    Sentence("smooth, by noise", RIVALS, SMOOTH, ("slow", "middle"), "rate", high=300.0),
+    Sentence("sign", SMOOTH, ("classical",), LOADS),
+    Sentence("cheap", OBSERVERS, (*TWISTING, "classical", "implicit_first_order"), CHEAP, "least"),
 )
 ERROR = 0.025 / len(SENTENCES)  # beyond each end of an interval
 # factor by which a second search, of another seed, may move an error and a least J; chosen from a
@@ -493,7 +504,7 @@ class Verdict(NamedTuple):
     lead: float
     low: float
     high: float
-    verdict: str  # stands, open, contradicted, or not ranked
+    verdict: str  # stands, alone (the second laws have nothing), open, contradicted, or not ranked
 
 
 def best(points: Iterable[dict], laws: Sequence[str]) -> dict | None:
@@ -519,7 +530,7 @@ def verdict(sentence: Sentence, first: dict | None, second: dict | None) -> tupl
     """Return the lead of the first point over the second with its interval, and what it says."""
     if first is None or second is None:
         lead = math.nan
-        return lead, lead, lead, "stands" if first else "contradicted"
+        return lead, lead, lead, "alone" if first else "contradicted"
     ours, theirs = values(first), values(second)
     if second["price"] != "least" and max(np.median(ours), np.median(theirs)) <= FLOOR:
         return 1.0, 1.0, 1.0, "not ranked"
@@ -534,8 +545,12 @@ def verdict(sentence: Sentence, first: dict | None, second: dict | None) -> tupl
     return lead, low, high, said
 
 
-def judged(points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES) -> Iterator[Verdict]:
-    """Yield a verdict for every level of every condition that a sentence is about."""
+def compared(
+    points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES
+) -> Iterator[tuple[Sentence, dict | None, dict | None]]:
+    """Yield the best points of both sides at every level that a sentence is about, None where a
+    side has none.
+    """
     levels: dict[tuple, list[dict]] = {}
     for point in points:
         place = point["plant"], point["model"], point["condition"], point["price"], point["level"]
@@ -544,25 +559,46 @@ def judged(points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES) ->
     for sentence in sentences:
         if known.isdisjoint(sentence.first) or known.isdisjoint(sentence.second):
             continue
-        for (plant, model, condition, price, level), its in levels.items():
+        for (_, model, condition, price, level), its in levels.items():
             about = condition in sentence.conditions and price == sentence.price
             if not (about and model == sentence.model and sentence.low <= level <= sentence.high):
                 continue
-            sides = best(its, sentence.first), best(its, sentence.second)
-            if sides == (None, None):
-                continue
-            if sentence.within and not (sides[0] and sides[0]["within"]):
-                continue
-            laws = sides[0]["law"] if sides[0] else "none", sides[1]["law"] if sides[1] else "none"
-            found = verdict(sentence, *sides)
-            yield Verdict(sentence.name, plant, condition, level, laws, *found)
+            first, second = best(its, sentence.first), best(its, sentence.second)
+            twisting = best(its, TWISTING)
+            admitted = twisting["within"] if twisting else None
+            if (first or second) and sentence.within in (None, admitted):
+                yield sentence, first, second
+
+
+def judged(points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES) -> Iterator[Verdict]:
+    """Yield a verdict for every level that a sentence is about."""
+    for sentence, first, second in compared(points, sentences):
+        laws = first["law"] if first else "none", second["law"] if second else "none"
+        place = first or second or {}
+        found = verdict(sentence, first, second)
+        yield Verdict(
+            sentence.name, place["plant"], place["condition"], place["level"], laws, *found
+        )
+
+
+def rounded(point: dict) -> dict:
+    """Return what is kept of a point, to five digits, with what is read of its settings."""
+    settings = point["settings"]
+    kept = {"wc": settings["wc"], "least": settings["least"]}
+    for name in ("plant", "model", "law", "price", "level", "condition", "within", "gains"):
+        kept[name] = point[name]
+    kept["gains"] = {name: float(f"{value:.5g}") for name, value in point["gains"].items()}
+    name = "J" if point["price"] == "least" else "errors"
+    kept[name] = [float(f"{value:.4g}") for value in point[name]]
+    return kept | {"chose": point["chose"]}
 
 
 def line(point: dict) -> str:
     """Return a point as a row of a table."""
     gains = ", ".join(f"{name} {value:.3g}" for name, value in point["gains"].items())
     price = f"{point['price']} {point['level']:.3g}"
-    cells = [point["plant"], point["model"], point["law"], point["condition"], price]
+    model = point["model"] + ", its line" * (point["law"] in TOLD)
+    cells = [point["plant"], model, point["law"], point["condition"], price]
     errors = np.nan_to_num(point["errors"], nan=np.inf)
     cells += [f"{np.median(point['J']):.3g}", f"{np.median(errors):.2g}"]
     cells += [f"{np.median(point['rates']):.3g}", f"{point['settled']} of {UNSEEN}"]
@@ -635,6 +671,8 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
                 ax.set_xticks(TICKS[price], [f"{tick:g}" for tick in TICKS[price]])
                 ax.minorticks_off()
                 ax.set_title(title, fontsize=style.points(9.5), weight="normal")
+                place = {"transform": ax.transAxes, "ha": "right", "color": style.MUTED}
+                ax.text(0.98, 0.03, "not ranked", fontsize=style.points(9.0), **place)
             row[0].set_title(f"{style.plant_name(plant)}\n{row[0].get_title(loc='left')}")
             row[0].set_ylabel("rms error / start")
         handles = []
@@ -696,6 +734,7 @@ def main() -> None:
     parser.add_argument("--lot", type=int, metavar="SEED", help="draw loads and prices")
     parser.add_argument("--read", nargs="+", type=Path, default=[], help="points of earlier calls")
     parser.add_argument("--figure", type=Path)
+    parser.add_argument("--keep", type=Path, help="file of the points that sentences rest on")
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
     points = [point for path in asked.read for point in json.loads(path.read_text())]
@@ -713,6 +752,10 @@ def main() -> None:
         if asked.out:
             asked.out.write_text(json.dumps(points[read:]))
     print(f"| {HEADS.replace(', ', ' | ')} |", *map(line, points), *summary(points), sep="\n")
+    if asked.keep:
+        sides = (side for _, *both in compared(points) for side in both if side)
+        rest = {json.dumps(rounded(side)): None for side in sides}
+        asked.keep.write_text("[\n" + ",\n".join(rest) + "\n]\n")
     if asked.figure:
         known = {point["law"] for point in points}.difference(NOT_DRAWN)
         draw(points, asked.figure, [law for law in LAWS if law in known])

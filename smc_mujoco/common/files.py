@@ -29,7 +29,7 @@ NON_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
 
 def shipped(folder: str) -> Path:
-    """Return models/, scenes/ or benchmarks/papers/, of a checkout or of an installed wheel."""
+    """Return models/, scenes/, benchmarks/papers/ or docs/, of a checkout or an installed wheel."""
     here = Path(__file__).parents[1]
     for place in (here / folder, here.parent / folder):
         if place.is_dir():

@@ -17,9 +17,9 @@ from markupsafe import Markup
 from smc_mujoco.analysis import margins as margin_search
 from smc_mujoco.analysis.margins import MARGIN_KINDS, Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.common.files import read_json, shipped, write_json
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import capital, number
+from smc_mujoco.common.text import number
 from smc_mujoco.draw import dot_plot, figure
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.evidence.audit.audit import audit
@@ -42,6 +42,10 @@ UNBEATEN = (
     "A law is unbeaten in a condition if no other is shown to be better there, if each of its runs "
     "arrives, and if no other is shown to settle in more runs. It wins if it is shown to be better "
     "than every other. A table names the laws that are unbeaten in the most conditions."
+)
+FRONTS = (
+    "Of all gains that a law affords at a price, the least error under a load. In grey: below a "
+    "10,000th of the start, not ranked. Not of this report's runs: benchmarks/fronts.py."
 )
 LIMITS = (
     "Nothing was tried on hardware: all is simulated, from equations of the plants and models of "
@@ -79,7 +83,7 @@ def write(work: Work) -> Path:
         f"{len(grid.laws)} laws, {len(grid.conditions)} conditions, {grid.seeds} seeds of each",
         made_by=f"smc-mujoco report{quick}",
         sections=[
-            overview(compared, judged, shown),
+            overview(compared, judged),
             comparison(compared),
             Section("claims", "The paper's claims", [page.claims(judged)]),
             margins(work),
@@ -89,13 +93,16 @@ def write(work: Work) -> Path:
     )
 
 
-def overview(compared: Compared, judged: Sequence[Claim], shown: Sequence[Markup]) -> Section:
-    """Return the first screen: the unbeaten laws, the verdicts on the paper, and a film."""
+def overview(compared: Compared, judged: Sequence[Claim]) -> Section:
+    """Return the first screen: the unbeaten laws, the verdicts on the paper, and the fronts of
+    docs/where_sliding_mode_loses.md.
+    """
+    fronts = (shipped("docs") / "where_sliding_mode_loses.svg").read_bytes()
     parts = [
         text(UNBEATEN),
         *tables([leaders(compared.leaderboard)]),
         text(f"The paper, in claims: {summary(judged)}.", "strong"),
-        *shown[:1],
+        picture(lambda path: path.write_bytes(fronts), FRONTS),
     ]
     return Section("overview", "The answer", parts)
 
@@ -316,8 +323,5 @@ def method(work: Work, compared: Compared) -> Section:
         ),
         Tabular(headings=["metric", "unit", "is"], rows=meanings, title="Metrics", left=3),
     ]
-    limits = []
-    for limit in LIMITS:
-        limits.append(text(capital(limit)))
-    parts = [heading("What it does not tell"), *limits, *tables(shown)]
+    parts = [heading("What it does not tell"), *map(text, LIMITS), *tables(shown)]
     return Section("method", "How it was computed", parts)
