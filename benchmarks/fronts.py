@@ -477,14 +477,13 @@ class Sentence(NamedTuple):
     within: bool | None = None  # only where super-twisting's theorem admits the load, or does not
 
 
+QUIET = ("slow", "middle")
 CHEAP = ("calm",)  # of the cheapest set, whatever the load
-LOADS = ("slow", "middle", "noisy", "delayed")
 SENTENCES = (
-    Sentence("integral", TWISTING, RIVALS, ("slow", "middle", "fast", "strong"), within=True),
-    Sentence("border", RIVALS, TWISTING, ("strong",), within=False),
-    Sentence("smooth", RIVALS, SMOOTH, LOADS, high=10.0),
-    Sentence("smooth, by noise", RIVALS, SMOOTH, ("slow", "middle"), "rate", high=300.0),
-    Sentence("sign", SMOOTH, ("classical",), LOADS),
+    Sentence("integral", TWISTING, RIVALS, (*QUIET, "fast", "strong"), within=True),
+    Sentence("smooth", RIVALS, SMOOTH, (*QUIET, "noisy"), high=10.0),
+    Sentence("smooth, by noise", RIVALS, SMOOTH, QUIET, "rate", high=300.0),
+    Sentence("sign", SMOOTH, ("classical",), QUIET),
     Sentence("cheap", OBSERVERS, (*TWISTING, "classical", "implicit_first_order"), CHEAP, "least"),
 )
 ERROR = 0.025 / len(SENTENCES)  # beyond each end of an interval
