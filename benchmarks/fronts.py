@@ -666,7 +666,7 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
                     y = [np.median(one["errors"]) for one in its]
                     ax.plot(x, y, color=colour, marker=mark, ms=4)
                 ax.axhspan(1e-9, FLOOR, color=style.BAND, lw=0, zorder=0)
-                ax.set(xscale="log", yscale="log", ylim=(3e-8, 3e-2), xlabel=label)
+                ax.set(xscale="log", yscale="log", ylim=(5e-9, 3e-2), xlabel=label)
                 ax.set_xticks(TICKS[price], [f"{tick:g}" for tick in TICKS[price]])
                 ax.minorticks_off()
                 ax.set_title(title, fontsize=style.points(9.5), weight="normal")
