@@ -23,7 +23,7 @@ from numba import njit
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.rigs import firmware
-from smc_mujoco.simulation.prepare import IDEAL_SENSOR, pause_phase
+from smc_mujoco.simulation.prepare import pause_phase
 from smc_mujoco.simulation.signals import after_pauses
 from smc_mujoco.simulation.time_series import TimeSeries
 
@@ -198,7 +198,7 @@ def logged(trace: smc.Trace) -> dict[str, np.ndarray]:
         late.append(after_pauses(k, s.steps, pause, samples, phase) if pause else 0)
     ran = np.flatnonzero(np.array(late) >= 0)
     t = s.control_period * ran + s.physics_step * np.array(late)[ran]
-    sensor = s.sensor or IDEAL_SENSOR
+    sensor = s.encoder(0) or smc.Encoder(counts=math.inf)
     places = []
     for i in range(2):
         x = np.interp(t - sensor.delay - i * sensor.skew, trace.t, trace.x[:, i]) + sensor.bias

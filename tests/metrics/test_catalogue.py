@@ -89,6 +89,7 @@ def run(
         law=SimpleNamespace(name="classical"),
         noise=SimpleNamespace(position=noise),
         sensor=None,
+        encoder=lambda joint: None,
         tracks="position",
         scored_channels=tuple(range(n)),
     )

@@ -9,7 +9,6 @@ import random
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from smc_mujoco.analysis.engine import Device
 from smc_mujoco.simulation import prepare
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
@@ -35,7 +34,7 @@ class Runs:
     def __init__(
         self,
         formulas: Mapping[str, Callable[[Trace], float]],
-        device: Device = "cpu",
+        device: str = "cpu",
         threads: int | None = None,
     ):
         self.formulas = formulas
