@@ -116,7 +116,7 @@ def basin(
     """Map the region of attraction of a law on a plant.
 
     The fast engine makes the runs where it can, and MuJoCo repeats 20 of them: `checked` says how
-    many it decides alike.
+    many it decides otherwise.
 
     Args:
       plant, law: names, or your own plant and law.

@@ -435,7 +435,7 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
     """Return the changes of plants, and the `blows` on arms, time in s -> "mass × 2", "blow of 400
     N for 20 ms".
 
-    The labels of the runs precede what only some of them have.
+    The labels of the runs precede what only some of them have, where these do not say so.
     """
     who_at: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
@@ -451,7 +451,9 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
             who_at.setdefault(event, []).append(name)
     words: dict[float, str] = {}
     for (time, what), who in sorted(who_at.items()):
-        change = what if len(who) == len(traces) else f"{', '.join(who)}: {what}"
+        change = what
+        if len(who) < len(traces) and not all(what in name for name in who):
+            change = f"{', '.join(who)}: {what}"
         words[time] = f"{words[time]}; {change}" if time in words else change
     return words
 

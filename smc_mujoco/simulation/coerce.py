@@ -350,8 +350,8 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
 def _by_joint(
     name: str, value: Any, s: Any, kind: type[P], example: str, joints: Sequence[str]
 ) -> list[P]:
-    """Return parts from one, several or None, or by joint, with the joints that each acts on, of
-    these, if it does not act on what it does without a name.
+    """Return the parts given as one, several, None or by joint, each with the joints that it acts
+    on, which must be among `joints`.
     """
     several_parts = several(kind, example)
     items: list[P] = []

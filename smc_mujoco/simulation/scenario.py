@@ -895,8 +895,8 @@ def check_law(s: Resolved) -> None:
     check_free_body(s)
     if s.model == "true" and (s.law.joint or s.jump or s.accelerates or s.clock.jitter):
         raise ScenarioError(
-            "model 'true' has no law of many joints, jump, acceleration as u or jitter of the "
-            "clock: leave that out, or give model='nominal'"
+            "model 'true' does not go with a law of many joints, a jump, acceleration as u or a "
+            "clock with jitter: leave that out, or give model='nominal'"
         )
     for law in s.law.parts:
         if not suits(law, s.plant):

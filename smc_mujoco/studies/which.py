@@ -222,7 +222,7 @@ def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
     seconds, size = trial.expected(plant, laws, trial.starts, QUICK_BUDGET)
     last = min(FINALISTS, len(laws))
     searches = size * (1.0 + (QUICK_SEARCHES - 1) * last / len(laws))
-    runs = len(laws) * FEW + 3 * last * seeds  # the latter with twice the steps once more
+    runs = len(laws) * FEW + 3 * last * seeds  # each of these also at half the step
     length = len(trial.conditions) * trial.duration / (len(BRIEF.conditions) * BRIEF.duration)
     told(f"a law for {plant.name}", seconds * (searches + length * runs))
 

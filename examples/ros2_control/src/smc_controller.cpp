@@ -32,6 +32,7 @@ public:
   {
     joint_ = get_node()->get_parameter("joint").as_string();
     if (get_update_rate() != 1000) {
+      RCLCPP_ERROR(get_node()->get_logger(), "the law runs at 1000 Hz: set update_rate to 1000");
       return CallbackReturn::ERROR;
     }
     subscription_ = get_node()->create_subscription<std_msgs::msg::Float64>(
@@ -52,6 +53,7 @@ public:
   CallbackReturn on_activate(const rclcpp_lifecycle::State &) override
   {
     controller_start();
+    t_ = 0.0;
     reference_ = state_interfaces_[0].get_value();  // hold the pose until a reference comes
     return CallbackReturn::SUCCESS;
   }
@@ -62,18 +64,19 @@ public:
     return CallbackReturn::SUCCESS;
   }
 
-  return_type update(const rclcpp::Time & time, const rclcpp::Duration &) override
+  return_type update(const rclcpp::Time &, const rclcpp::Duration & period) override
   {
     double u, s;
-    controller(
-      time.seconds(), state_interfaces_[0].get_value(), state_interfaces_[1].get_value(), reference_, 0.0, &u, &s);
+    controller(t_, state_interfaces_[0].get_value(), state_interfaces_[1].get_value(), reference_, 0.0, &u, &s);
     command_interfaces_[0].set_value(u);
+    t_ += period.seconds();
     return return_type::OK;
   }
 
 private:
   std::string joint_;
   std::atomic<double> reference_{0.0};
+  double t_{0.0};  // s since the start, which is the time of the law
   rclcpp::Subscription<std_msgs::msg::Float64>::SharedPtr subscription_;
 };
 }  // namespace smc_controller

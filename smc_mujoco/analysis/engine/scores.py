@@ -1,6 +1,7 @@
 """Metrics that a run sums up sample by sample, so that it needs no log.
 
-Each is that of `metrics`; all but times are of the channels that have an actuator. A metric is two
+Each is that of `metrics`; all but settling_time, rest_share and outcome are of
+the channels that have an actuator. A metric is two
 compiled functions: one takes a sample into its numbers in `work`, the other makes the score of them
 at the end.
 """
@@ -187,7 +188,9 @@ def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
 
 
 def _rest_share(form: Form, at: int) -> tuple[Any, Any]:
-    """Return the largest |e| of the last part over its channel's scale."""
+    """Return the largest |e| of the last part over the scale of its channel's
+    group.
+    """
     n = form.n
     X, R = work_places(form).of("sample_x", "r")
     BANDS, LATE = row_places(form).of("bands", "late")

@@ -152,7 +152,7 @@ Quick = Annotated[
     bool,
     typer.Option(
         "--quick",
-        help="Less of everything: a first answer in minutes, or later if laws are tuned first.",
+        help="Less of everything: a first answer in minutes, longer if laws must be tuned first.",
     ),
 ]
 Relevant = Annotated[

@@ -35,8 +35,8 @@ REST_MARGIN = 0.3  # s after motion, and before it, that are not shown faster
 PERIODS = 3  # that a close-up shows at the end
 CLOSE_TIME = 4.0  # s of the film for a close-up, at most; chosen, as what follows
 MIN_FACTOR = 10.0  # of its deflections; smaller ones are seen without it
-SEEN_TURN = 0.25  # rad, of a hinge, and of a slide in extents of its machine: seen well
-SEEN_SLIDE = 0.08
+SEEN_TURN = 0.25  # rad: a turn of a hinge that is seen well
+SEEN_SLIDE = 0.08  # extents of its machine: the same of a slide
 LITTLE = 0.2  # of these: a film of less motion shows nothing moving
 MAX_LENGTH = (
     1.85,

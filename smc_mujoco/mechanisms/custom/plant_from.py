@@ -284,7 +284,7 @@ def soft(label: str, made: Plant) -> list[str]:
         blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
         rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
         if blow > GIVE:
-            parts.append(f"{what} by {1e3 * blow:.2g} mrad (mm) and {1e3 * rest:.1g} ({option})")
+            parts.append(f"its {what} by {1e3 * blow:.2g} and {1e3 * rest:.1g} ({option})")
 
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags
@@ -309,7 +309,7 @@ def soft(label: str, made: Plant) -> list[str]:
     sentences = []
     if parts:
         sentences.append(
-            f"{label} gives way to a blow of 1 rad/s (m/s), and about so far to its weight: "
+            f"{label} gives way, in mrad (mm), to a blow of 1 rad/s (m/s) and to its weight: "
             f"{', '.join(parts)}; a smaller first number of that option in the file makes it harder"
         )
     kinds = mujoco.mjtConstraint

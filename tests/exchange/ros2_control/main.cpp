@@ -25,7 +25,7 @@ int main()
       controller->on_activate({});
       controller->node->last->callback({0.2});
     }
-    controller->update({t}, {});
+    controller->update({}, {1e-3});
     std::printf("%.17g\n", controller->command_interfaces_[0].value);
   }
   controller->on_deactivate({});

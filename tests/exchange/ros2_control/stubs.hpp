@@ -9,8 +9,9 @@ namespace rclcpp_lifecycle { struct State {}; }
 namespace std_msgs { namespace msg { struct Float64 { double data; }; } }
 namespace rclcpp
 {
-struct Time { double at; double seconds() const { return at; } };
-struct Duration {};
+struct Time {};
+struct Duration { double s; double seconds() const { return s; } };
+struct Logger {};
 template <class M> struct Subscription
 {
   using SharedPtr = std::shared_ptr<Subscription<M>>;
@@ -22,6 +23,7 @@ struct Node
 {
   rclcpp::Subscription<std_msgs::msg::Float64>::SharedPtr last;
   Parameter get_parameter(const std::string &) const { return {"elbow"}; }
+  rclcpp::Logger get_logger() const { return {}; }
   template <class M, class F> typename rclcpp::Subscription<M>::SharedPtr create_subscription(const std::string &, int, F f)
   {
     return last = std::make_shared<rclcpp::Subscription<M>>(rclcpp::Subscription<M>{f});
@@ -52,4 +54,5 @@ struct ControllerInterface
   std::vector<Interface> state_interfaces_{2}, command_interfaces_{1};
 };
 }
+#define RCLCPP_ERROR(logger, text) (void)(logger), (void)(text)
 #define PLUGINLIB_EXPORT_CLASS(type, base) std::unique_ptr<base> made() { return std::make_unique<type>(); }
