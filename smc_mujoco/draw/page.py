@@ -47,7 +47,7 @@ SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 TEXT_SIZE = 11.0  # points on a full page
 TITLE_SIZE = 17.0
-ENTRY_SAMPLE = 2.4  # of a legend's entry, in heights of its letters: its sample
+ENTRY_SAMPLE = 3.4  # of a legend's entry, in heights of its letters: its sample
 ENTRY_SPACE = 2.3  # and all its spaces
 TITLE_PAD = 5.0  # points on a full page, above the title
 # largest width of a legend's entry, of the page's: in several columns, in one
