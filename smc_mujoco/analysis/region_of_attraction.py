@@ -38,7 +38,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
@@ -61,12 +61,10 @@ HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 EARLY_PARTS = 3  # an early verdict considers the last of so many equal parts of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 BATCH_STATES = 2**17  # of the fast engine's runs at once
-CHECKED = 20  # of its states, which MuJoCo decides again; chosen
 # X, chosen
 POSITION_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last third has one
-CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -193,11 +191,11 @@ def basin_of(
     states = np.stack([np.tile(x, v.size), np.repeat(v, x.size)], axis=1)
     checked = ""
     if why_not(base, (), device) or prepare(base).why_not:
-        outcome, decided_at = grid.decide(grid.by_mujoco, states, report)
+        outcome, decided_at = grid.decide(grid.by_mujoco, grid.traced, states, report)
     else:
-        outcome, decided_at = grid.decide(grid.by_engine(device), states, report)
+        outcome, decided_at = grid.decide(grid.by_engine(device), BATCH_STATES, states, report)
         drawn = np.random.default_rng(0).permutation(len(states))[:CHECKED]
-        again, _ = grid.decide(grid.by_mujoco, states[drawn], lambda done, needed: None)
+        again, _ = grid.decide(grid.by_mujoco, CHECKED, states[drawn], lambda done, needed: None)
         differ = np.count_nonzero(again != outcome[drawn])
         checked = f"MuJoCo repeated {drawn.size} states, {differ} with another outcome"
     warn_of_broken(grid.broken)
@@ -225,13 +223,16 @@ class _Grid:
         self.v = v
         self.threads = threads
         self.broken: dict[str, str] = {}
+        trace_bytes = 72 * (base.samples + 1) * base.plant.n
+        self.traced = max(32, int(BATCH_BYTES / trace_bytes))  # runs whose traces fit in memory
 
     def decide(
-        self, run: Callable, states: np.ndarray, report: Report
+        self, run: Callable, size: int, states: np.ndarray, report: Report
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the outcome of every state, and the duration of the run that decided, s.
 
-        `run` gets a scenario, states and whether it is the last, and returns their outcomes.
+        `run` gets a scenario, `size` states at most, and whether its verdict is final; it returns
+        their outcomes.
         """
         base = self.base
         outcome = np.full(len(states), UNDECIDED, np.int8)
@@ -242,9 +243,6 @@ class _Grid:
             final = horizon == HORIZONS[-1]
             shortened = dataclasses.replace(base, duration=horizon * base.duration)
             needed = done + left.size * base.work * sum(HORIZONS[i:])
-            size = BATCH_STATES
-            if run == self.by_mujoco:
-                size = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * base.plant.n)))
             for begin in range(0, left.size, size):
                 some = left[begin : begin + size]
                 outcome[some] = run(shortened, states[some], final)

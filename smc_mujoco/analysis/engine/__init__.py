@@ -3,12 +3,14 @@
 A search, a map and a share of failures need thousands of runs of one law on one plant. So `loop`
 writes the run of such a group out as one function: sensors, noise, estimator, law, delay,
 disturbances and the plant's equation under RK4 in a single loop, compiled together with the law.
-Scores are summed on the way. `form` tells what a group is, and what this engine cannot run;
-`targets` compiles it. Its numbers find gains and fill maps: those on record are MuJoCo's.
+Scores are summed on the way. `group` tells what this engine cannot
+run; `cpu` and `gpu` compile it. Its numbers find gains and fill maps: those on record are MuJoCo's.
 """
 
 from typing import Annotated
 
 from smc_mujoco.common.constraints import OneOf
 
+CHECKED = 20  # of its runs, which MuJoCo makes again where their numbers are shown; chosen
+CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1  # outcomes of a run
 Device = Annotated[str, OneOf(names=("cpu", "cuda"))]

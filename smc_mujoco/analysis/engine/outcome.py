@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.engine import CONVERGES, DOES_NOT, UNDECIDED
 from smc_mujoco.analysis.engine.form import Form, metric_places, row_places, work_places
 from smc_mujoco.analysis.engine.scores import METRICS, own
 from smc_mujoco.metrics.conventions import SETTLING_BAND
@@ -18,7 +19,6 @@ REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
 MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9
 NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
 PARTS = 5  # of the run, in which a run that approaches comes closer
-CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 NAME = "outcome"
 SIGNALS = 3  # x, v and u, whose ranges tell rest
 

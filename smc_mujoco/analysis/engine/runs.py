@@ -9,6 +9,7 @@ import random
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from smc_mujoco.analysis.engine import CHECKED
 from smc_mujoco.simulation import prepare
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
@@ -17,7 +18,6 @@ from smc_mujoco.simulation.trace import Trace, warn_of_broken
 if TYPE_CHECKING:
     from smc_mujoco.analysis.engine.form import Form
 
-CHECKED = 20  # of the fast engine's runs, which MuJoCo makes again; chosen
 Scored = tuple[list[float], float | None]  # metrics, and the time of a failure, s
 Report = Callable[[float], None]  # called with the physics steps since its last call
 
