@@ -29,6 +29,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     OnJoints,
     all_joints,
     chains,
+    driven_names,
     joint_names,
 )
 from smc_mujoco.mechanisms.named import as_plant
@@ -126,7 +127,7 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     by joint.
     """
     if isinstance(value, Mapping):
-        joints = joint_names(plant)[: plant.driven]
+        joints = driven_names(plant)
         for joint in value:
             if joint not in joints:
                 raise unknown(f"driven joint of {plant.name} in {name}", joint, joints)
@@ -266,7 +267,7 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     """
     at_goal = [Constant(x) for x in plant.rest] or [REST] * plant.n
     if isinstance(value, Mapping):
-        joints = joint_names(plant)[: plant.driven]
+        joints = driven_names(plant)
         value = dict(zip(joints, at_goal, strict=False)) | dict(value)
     elif getattr(value, "about", ""):
         value = [value] * plant.driven  # pyright: ignore[reportAssignmentType] a Sine
@@ -386,7 +387,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     """
     if value is None:
         return ()
-    driven = joint_names(s.plant)[: s.plant.driven]
+    driven = driven_names(s.plant)
     items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven)
     for chain in dict.fromkeys(chains(items, driven)):
         drives = tuple(part for part in chain if part.drives)

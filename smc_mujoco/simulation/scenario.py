@@ -44,6 +44,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     Part,
     chains,
     drive_ids,
+    driven_names,
     joint_names,
     moves_alone,
 )
@@ -431,7 +432,7 @@ class Scenario:
         """The actuators of each driven channel, in series."""
         if not self.actuator:
             return [()] * self.plant.driven
-        return chains(self.actuator, joint_names(self.plant)[: self.plant.driven])
+        return chains(self.actuator, driven_names(self.plant))
 
     @functools.cached_property
     def motors(self) -> list[Actuator]:
@@ -551,7 +552,7 @@ class Scenario:
         """Return the index of the actuator that the fault is on; -1 for all."""
         if self.fault is None or self.fault.on is None:
             return -1
-        names = joint_names(self.plant)[: self.plant.driven]
+        names = driven_names(self.plant)
         if self.plant.pose:
             model = compiled(self.plant.spec())
             names = [model.actuator(i).name for i in drive_ids(model).tolist()]

@@ -129,7 +129,7 @@ class OnJoints(Part):
 
     def joint_names(self, plant: Plant) -> tuple[str, ...]:
         """Return the names of the plant's joints that it acts on."""
-        return self.on or joint_names(plant)[: plant.driven]
+        return self.on or driven_names(plant)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -323,6 +323,11 @@ def joint_ids(model: mujoco.MjModel) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=32)
+def driven_names(plant: Plant) -> tuple[str, ...]:
+    """Return the names of the joints that have an actuator, (driven,)."""
+    return joint_names(plant)[: plant.driven]
+
+
 def joint_names(plant: Plant) -> tuple[str, ...]:
     """Return the name of each channel's joint, (n,)."""
     model = compiled(plant.spec())
