@@ -76,8 +76,8 @@ class Bar:
 def told(what: str, seconds: float) -> None:
     """Tell how long something takes at most, before it starts, if that is long."""
     if seconds > LINE_PERIOD:
-        minutes = f"{-(-seconds // 60.0):.0f} min" if seconds > 90.0 else f"{seconds:.0f} s"
-        print(f"{what}: {minutes} at most", file=sys.stderr)
+        length = f"{-(-seconds // 60.0):.0f} min" if seconds > 90.0 else f"{seconds:.0f} s"
+        print(f"{what}: {length} at most", file=sys.stderr)
 
 
 @contextlib.contextmanager

@@ -98,7 +98,7 @@ class Setting:
         fields = {"plant": plant, "law": "none"} | self.task.fields(plant) | changes
         self.scenario = Scenario(**fields).resolved
         # whether MuJoCo alone does not simulate it
-        self.called = flies or bool(self.scenario.acting)
+        self.uses_callback = flies or bool(self.scenario.acting)
         self.commanded = dataclasses.replace(
             self.scenario, law=commanded() if flies else commanded_by_channel()
         ).resolved
@@ -156,7 +156,7 @@ class Setting:
 
     def stepping(self) -> contextlib.AbstractContextManager:
         """Return the context in which MuJoCo steps: with the callback, if it is called."""
-        return callback.installed() if self.called else contextlib.nullcontext()
+        return callback.installed() if self.uses_callback else contextlib.nullcontext()
 
     def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options
@@ -255,7 +255,7 @@ class Episode:
         self.episodes = 0
         self.diverged = False
         self.sample = 0  # control samples since the episode began
-        self.told: list[np.ndarray] = []  # the commands of an episode with the callback
+        self.commands_given: list[np.ndarray] = []  # the commands of an episode with the callback
         self.x = self.v = np.zeros(setting.scenario.plant.n)
 
     def begin(
@@ -271,26 +271,26 @@ class Episode:
         setting = self.setting
         mujoco.mj_resetData(setting.model, data)
         data.qpos[:], data.qvel[:] = models.state_with(setting.model, setting.joints, *self.start)
-        if setting.called:
+        if setting.uses_callback:
             self.runs = Runs(setting, 1)
             data.userdata[:] = self.runs.begin(0, *self.start)
             if setting.model.nkey and setting.model.na:  # thrust behind a lag
                 data.act[:] = setting.model.key_act[0]
-        self.told = []
+        self.commands_given = []
         self.sample = 0
         self.read_state(data)
 
     def tell(self, data: mujoco.MjData, command: np.ndarray) -> None:
         """Give the drives a command, (driven,)."""
-        if self.setting.called:
-            self.told.append(command)
+        if self.setting.uses_callback:
+            self.commands_given.append(command)
             self.runs.commands[0, : len(command)] = command
         else:
             data.ctrl[self.setting.ctrl] = self.setting.scale * command
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
-        if self.setting.called:
+        if self.setting.uses_callback:
             self.runs.check()
         self.x = data.qpos[self.setting.qpos]
         self.v = data.qvel[self.setting.qvel]

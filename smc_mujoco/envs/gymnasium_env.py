@@ -127,15 +127,15 @@ class PlantEnv(Episode, gymnasium.Env):
         A copy of an episode with the callback repeats it.
         """
         kept = self.__dict__ | {"renderer": None}
-        if self.setting.called:
+        if self.setting.uses_callback:
             kept |= {"runs": None, "data": None}
         return kept
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        if self.setting.called:
+        if self.setting.uses_callback:
             self.data = mujoco.MjData(self.setting.model)
-            told = self.told
+            told = self.commands_given
             if self.episodes or told:
                 self.begin_at_start(self.data)
             for command in told:

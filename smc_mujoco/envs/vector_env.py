@@ -79,7 +79,7 @@ class BatchEnv(VectorEnv):
             self.setting.model,
             self.num_envs,
             min(cores(threads), self.num_envs),
-            persistent=self.setting.called,
+            persistent=self.setting.uses_callback,
         )
         self.qpos, self.qvel, self.ctrl, self.userdata = (
             self.batch.bind(name) for name in ("qpos", "qvel", "ctrl", "userdata")
@@ -154,7 +154,7 @@ class BatchEnv(VectorEnv):
         for i in ids.tolist():
             start = self.setting.draw_start(self.randoms[i], options)
             self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)
-            if self.setting.called:
+            if self.setting.uses_callback:
                 self.userdata[i] = self.runs.begin(i, *start)
         self.samples[mask] = 0
         self.ended[mask] = False
@@ -167,11 +167,11 @@ class BatchEnv(VectorEnv):
         setting = self.setting
         failed = np.zeros(self.num_envs, bool)
         self.runs.commands[:, : commands.shape[1]] = commands
-        if not setting.called:
+        if not setting.uses_callback:
             self.ctrl[:, setting.ctrl] = setting.scale * commands
         try:
             # a Batch refuses Python callbacks, which runs of other threads may have set
-            with setting.stepping() if setting.called else mjcb.installed(None):
+            with setting.stepping() if setting.uses_callback else mjcb.installed(None):
                 self.batch.step(ids, nstep=setting.scenario.steps)
         except SimulationError as error:
             failed[list(error.ids)] = True

@@ -322,9 +322,10 @@ def broken(where: str, error: str) -> ScenarioError:
     for file in sorted(Path(where).parent.glob("*.xml")):
         if not cure and any(part.get("file") == Path(where).name for part in _elements(file)):
             cure = f"give {file.name}, which includes it, or fix the file"
-    cure = cure or "fix the file"
-    if cure == "fix the file" and any(words in error for words in OF_A_PART):
-        cure += ", or give the one that includes it"
+    if not cure:
+        cure = "fix the file"
+        if any(words in error for words in OF_A_PART):
+            cure += ", or give the one that includes it"
     return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): {cure}")
 
 

@@ -41,8 +41,12 @@ class Urdf(NamedTuple):
         fixed = ["world"]
         carried = []
         for body in spec.bodies[1:]:
-            if body.parent.name in fixed:
-                (carried if body.joints else fixed).append(body.name)
+            if body.parent.name not in fixed:
+                continue
+            if body.joints:
+                carried.append(body.name)
+            else:
+                fixed.append(body.name)
         if spec.compiler.fusestatic:  # into the world
             fixed = fixed[:1]
         for first, second in itertools.product(fixed, carried):
