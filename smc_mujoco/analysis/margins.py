@@ -14,8 +14,9 @@ amplitude that grows from 0, so it tolerates a little more. Theory also gives th
 dry friction, that holds the plant at 5 % of its scale; with friction it may stop closer to the
 reference.
 
-All searches advance together, a batch of runs per round. The fast engine runs what it can. MuJoCo
-then runs both ends of what it found, and searches again where it does not agree.
+All searches advance together, a batch of runs per round. The fast engine runs what it can, but
+in quick searches. MuJoCo then runs both ends of what it found, and searches again where it does not
+agree.
 """
 
 import dataclasses
@@ -349,7 +350,8 @@ def margins(
         estimate until the end.
       condition: condition of the runs, such as "coulomb".
       starts: initial states, see `smc.starts`. Default: the plant's own x0.
-      device: on which the fast engine searches, "cpu" or "cuda".
+      device: on which the fast engine searches, "cpu" or "cuda"; a quick search on the processor is
+        MuJoCo's.
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
@@ -411,12 +413,19 @@ def margins_of(
     firsts = [(i, None) for i in range(0, len(cells), len(kinds))]
     held = tolerated(firsts, runs.by_mujoco)
     going = {i: search for i, search in enumerate(searches) if held[i // len(kinds)]}
-    find_boundaries(going, lambda tried: tolerated(tried, runs.scored))
+    # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
+    fast = resolution != COARSE or device != "cpu"
+    searching = runs.scored if fast else runs.by_mujoco
+    find_boundaries(going, lambda tried: tolerated(tried, searching))
     ends = []  # MuJoCo has the last word on them
     for i, search in going.items():
         base, kind = cells[i]
         for level in (search.low, search.high):
-            if kind.none < level < math.inf and runs.covers(kind.scenarios(base, level)[0]):
+            if (
+                fast
+                and kind.none < level < math.inf
+                and runs.covers(kind.scenarios(base, level)[0])
+            ):
                 ends.append((i, level))
     again = {}
     for (i, level), good in zip(ends, tolerated(ends, runs.by_mujoco), strict=True):

@@ -162,7 +162,8 @@ class Loop:
         for part in scenario.actuator:
             if isinstance(part, stepper.Stepper):
                 self.motors = [Motor(part, values) for values in motors_at_start(self.scenario)]
-        self.delayed = np.zeros(n)  # the commands whose delay has passed
+        self.sent = np.zeros(n)  # the commands whose delay has passed
+        self.delayed = np.zeros(n)  # those that the actuators get
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
@@ -246,7 +247,8 @@ class Loop:
             self.log["r"][k] = self.controller.r
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
-            self.delayed = self.commands[past // self.scenario.steps]
+            self.sent = self.commands[past // self.scenario.steps]
+        self.delayed = self.with_fault(step)
         if self.motors:
             sample, rest = divmod(past, self.scenario.steps)
             arrives = past >= 0 and rest == self.late(sample)
@@ -272,6 +274,19 @@ class Loop:
             )
             control = np.array([rippled(self.drive_step, *each) for each in moving])
         data.ctrl[self.channels["ctrl"][self.driven]] = control[self.driven]
+
+    def with_fault(self, step: int) -> np.ndarray:
+        """Return the commands that the actuators get in a physics step."""
+        fault = self.scenario.fault
+        if fault is None or step < self.scenario.fault_step:
+            return self.sent
+        faulty = self.delayed
+        if not fault.stuck:
+            faulty = fault.gain * self.sent + fault.bias
+        failing = self.scenario.failing()
+        if failing < 0:
+            return faulty
+        return np.where(np.arange(len(faulty)) == failing, faulty, self.sent)
 
     def apply_motors(self, data: mujoco.MjData, stage: int) -> None:
         """Give every stepper motor its torque at a stage."""

@@ -41,7 +41,9 @@ def shortened(s, duration):
         for d in s.disturbance
     )
     jump = s.jump and smc.Jump(time=s.jump.time * shrink, factors=s.jump.factors)
-    return dataclasses.replace(s, duration=duration, disturbance=signals, jump=jump)
+    fault = s.fault and dataclasses.replace(s.fault, at=s.fault.at * shrink)
+    changes = {"disturbance": signals, "jump": jump, "fault": fault}
+    return dataclasses.replace(s, duration=duration, **changes)
 
 
 @pytest.mark.slow

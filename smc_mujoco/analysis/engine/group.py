@@ -119,7 +119,7 @@ class Group:
         delay = max(s.delay_steps // s.steps for s in resolved)
         slots = 1
         while slots < delay + 1 + clock:  # few sizes, each of which is compiled
-            slots *= 16
+            slots *= 256
         kinds_of_all: Counter[type] = Counter()
         for s in resolved:
             kinds_of_all |= Counter(map(type, s.disturbance))
