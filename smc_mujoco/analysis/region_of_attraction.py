@@ -83,6 +83,11 @@ class Basin:
     source: str = NONE  # where the law's gains come from, a kind of `control.source`
     checked: str = ""  # how many states MuJoCo decided, and how many of them otherwise
 
+    def __repr__(self) -> str:
+        share = f"{100 * self.share:.3g} % of {self.outcome.size} states"
+        found = f"{self.law} on {self.plant}: {share} come to rest within {self.duration:g} s"
+        return f"Basin({found}{self.checked and '; '}{self.checked})"
+
     @property
     def share(self) -> float:
         """The share of the states that converge within the duration."""

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 # called with the work done and the whole work, which may be an estimate
 Report = Callable[[float, float], None]
-SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left
+KEPT = 0.1  # s; a piece of work that took less was read from a file, and tells no speed
 LINE_PERIOD = 10.0  # s between two lines of a log
 
 
@@ -34,6 +35,8 @@ class Bar:
         self.draw = draw
         self.period = period
         self.done = 0.0
+        self.pieces: list[float] = []  # s that each finished piece took
+        self.end: float | None = None  # s, when the last piece is expected to end
         self.start = time.monotonic()
         self.due = self.start + delay  # s, of the next drawing
 
@@ -54,6 +57,15 @@ class Bar:
         self.what = text
         self.advance(work)
 
+    def finished(self, seconds: float, left: int) -> None:
+        """Say how long a piece of the work took, s, and how many are left: each is expected to
+        take the median.
+        """
+        if seconds > KEPT:
+            self.pieces.append(seconds)
+        if self.pieces:
+            self.end = time.monotonic() + left * statistics.median(self.pieces)
+
     @property
     def share(self) -> float:
         """The share of the work that is done."""
@@ -61,16 +73,25 @@ class Bar:
             return min(1.0, self.done / self.whole)
         return 0.0
 
+    @property
+    def left(self) -> str:
+        """The time that is left, such as "12 s left"; "" if nothing is known."""
+        now = time.monotonic()
+        if self.end is not None:
+            seconds = max(0.0, self.end - now)
+        elif self.share:
+            seconds = (now - self.start) * (1.0 / self.share - 1.0)
+        else:
+            return ""
+        return f"{seconds:.0f} s left"
+
     def __str__(self) -> str:
         if not self.whole:
             return self.what
         text = f"{self.what} {100 * self.share:.0f} %"
         if self.counted:
             text = f"{self.what} {self.done:g}/{self.whole:g}"
-        if self.share:
-            left = (time.monotonic() - self.start) * (1.0 / self.share - 1.0)
-            text += f", {left:.0f} s left"
-        return text
+        return ", ".join(filter(None, (text, self.left)))
 
 
 def told(what: str, seconds: float) -> None:
@@ -119,13 +140,11 @@ def _on_terminal(
 
     share = progress.MofNCompleteColumn() if counted else progress.TaskProgressColumn()
     text = progress.TextColumn("{task.description}", markup=False)
-    columns = text, progress.BarColumn(), share, progress.TimeRemainingColumn()
-    with progress.Progress(
-        *columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW
-    ) as drawn:
-        task = drawn.add_task(what, total=whole)
+    columns = text, progress.BarColumn(), share, progress.TextColumn("{task.fields[left]}")
+    with progress.Progress(*columns, transient=True, console=console) as drawn:
+        task = drawn.add_task(what, total=whole, left="")
         yield lambda bar: drawn.update(
-            task, completed=bar.done, total=bar.whole, description=bar.what
+            task, completed=bar.done, total=bar.whole, description=bar.what, left=bar.left
         )
 
 

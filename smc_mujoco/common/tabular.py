@@ -67,6 +67,7 @@ class Tabular:
     title: str = ""
     notes: Sequence[str] = ()  # paragraphs below the table
     left: int = 1  # columns of names, which are aligned to the left
+    under: Sequence[str] = ()  # lines that LaTeX prints below the table: what its cells mean
 
     def __str__(self) -> str:
         return plain(self)
@@ -184,7 +185,7 @@ class Tabular:
 
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the title and the
-        notes.
+        notes; the lines `under` the table are in print.
         """
         lines = []
         for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT):
@@ -196,7 +197,11 @@ class Tabular:
         ]
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
         lines += [_tex_line(map(_tex_cell, row)) for row in self.rows]
-        return "\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"])
+        lines.append("\\bottomrule")
+        for text in self.under:
+            wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
+            lines.append(_tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"]))
+        return "\n".join([*lines, "\\end{tabular}\n"])
 
 
 class Tables:

@@ -37,6 +37,15 @@ MARKS = (
     f"the physics step and at half of it, which differ by more than {APART}; {RANGE}."
 )
 
+# A word in a table's cells -> what LaTeX prints below the table about it.
+UNDER = {
+    "": f"Median [{100 * LEVEL:g} % interval]; bold: no law is better.",
+    "detects": f"Detects 24 %: a lead of 24 % would be seen in {100 * POWER:g} % of such tests.",
+    "no lead": "Detects no lead: too few runs to see any lead.",
+    "below": "Below: smaller than what the problem can show, so not ranked.",
+    "by the step": "By the step: the median at the physics step, and at half of it.",
+}
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Entry:
@@ -398,11 +407,13 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
     samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
+    words = str([*cells.values()])
     return Tabular(
         headings=["law", *map(heading, boards)],
         rows=rows,
         title=f"{name}: {samples}",
         notes=_verdicts(boards),
+        under=[text for word, text in UNDER.items() if word in words],
     )
 
 

@@ -298,3 +298,5 @@ def test_a_map_survives_its_file(weak, tmp_path):
     for field in dataclasses.fields(Basin):
         assert np.array_equal(getattr(again, field.name), getattr(weak, field.name))
     assert again.outcome.dtype == np.int8
+    assert repr(again).startswith(f"Basin({weak.law} on {weak.plant}: ")
+    assert len(repr(again)) < 200

@@ -9,8 +9,9 @@ from smc_mujoco.common import progress
 pytestmark = pytest.mark.quick
 
 
-def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monkeypatch):
+def test_a_terminal_s_bar_vanishes_and_shows_the_time_left(monkeypatch):
     """rich is given; what it is asked is told."""
+    monkeypatch.setattr(progress.time, "monotonic", lambda: 1.0)
     monkeypatch.setattr("rich.progress.Progress", rich := MagicMock())
     monkeypatch.setattr("rich.console.Console.is_terminal", True)
     for counted, share in (
@@ -24,20 +25,17 @@ def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monk
         columns = []
         for each in rich.call_args.args:
             columns.append(type(each).__name__)
-        assert columns == ["TextColumn", "BarColumn", share, "TimeRemainingColumn"]
+        assert columns == ["TextColumn", "BarColumn", share, "TextColumn"]
         console = rich.call_args.kwargs["console"]
-        assert rich.call_args.kwargs == {
-            "transient": True,
-            "console": console,
-            "speed_estimate_period": 120.0,
-        }
+        assert rich.call_args.kwargs == {"transient": True, "console": console}
         assert console.stderr
     task = (shown := rich.return_value.__enter__.return_value).add_task.return_value
     states = (2.0, 8.0, "runs"), (3.0, 9.0, "runs"), (3.5, 9.0, "more")
     drawn = []
     for done, whole, what in states:
-        drawn.append(call.update(task, completed=done, total=whole, description=what))
-    assert shown.mock_calls[-4:] == [call.add_task("runs", total=8.0), *drawn]
+        told = {"completed": done, "total": whole, "description": what, "left": "0 s left"}
+        drawn.append(call.update(task, **told))
+    assert shown.mock_calls[-4:] == [call.add_task("runs", total=8.0, left=""), *drawn]
 
 
 def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
@@ -51,6 +49,26 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
     assert out == ""
     assert err.splitlines()[:2] == ["duffing 25 %, 30 s left", "duffing 50 %, 20 s left"]
     assert len(err.splitlines()) == 4
+
+
+def test_the_time_left_is_the_median_of_pieces_that_were_not_read_from_a_file(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    shown = progress.Bar("pid", 6.0)
+    said = []
+    for i, seconds in enumerate((0.01, 9.0, 4.0, 5.0)):
+        now[0] += seconds
+        shown.finished(seconds, 5 - i)
+        shown.reached(i + 1.0, 6.0)
+        said.append(str(shown).partition(", ")[2])
+    now[0] += 3.0
+    assert [*said, shown.left] == [
+        "0 s left",
+        "36 s left",
+        "20 s left",
+        "10 s left",
+        "7 s left",
+    ]
 
 
 def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):

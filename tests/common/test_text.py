@@ -49,6 +49,7 @@ TABLE = Tabular(
         ],
     ],
     notes=["A note.", "Another."],
+    under=["A word: 5 %."],
     left=2,
 )
 

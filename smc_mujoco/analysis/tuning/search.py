@@ -169,7 +169,9 @@ def tune(
     ) as shown:
 
         def found(i: int) -> SearchResult:
+            start = time.monotonic()
             made = task.kept(i, failure, shown.advance, folder, codes)
+            shown.finished(time.monotonic() - start, searches - i - 1)
             shown.reached((i + 1) * task.size, searches * task.size)
             return made
 
