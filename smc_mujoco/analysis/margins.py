@@ -240,8 +240,11 @@ def _with_missed(base: Scenario, level: float) -> Scenario:
 
 
 def _with_lost_gain(base: Scenario, level: float) -> Scenario:
-    """Return the scenario with a share of the actuators' gain lost from its start on."""
-    return dataclasses.replace(base, fault=Fault(at=0.0, gain=1.0 - level))
+    """Return the scenario with a share of gain lost from its start on, by the actuator of its fault
+    or by all.
+    """
+    on = base.fault.on if base.fault else None
+    return dataclasses.replace(base, fault=Fault(at=0.0, gain=1.0 - level, on=on))
 
 
 MARGIN_KINDS: dict[str, Kind] = {
@@ -286,7 +289,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         put=_with_missed,
     ),
     "gain": Kind(
-        label="share of the actuator's gain that is lost",
+        label="share of gain that an actuator loses",
         unit="1",
         levels=tuple(i / 10 for i in range(1, 10)),
         put=_with_lost_gain,
@@ -340,8 +343,9 @@ def margins(
     Args:
       plants, laws: names, or your own plants and laws, one or several.
       kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "jitter"
-        and "missed", of the controller's clock, and "gain", the share of its gain that every
-        actuator has lost from the start on, which are left out by default.
+        and "missed", of the controller's clock, and "gain", the share of its gain that an actuator
+        has lost from the start on, which are left out by default. All actuators lose it, or the one
+        that the condition's fault is on.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first
         look.

@@ -91,7 +91,7 @@ def test_a_page_has_all_that_is_known(name, template: Template, call):
 
 def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
     out = flat(call("list", "pid")[1])
-    assert "kp kd > ki" in out
+    assert "kp kd > M ki" in out
     assert "tt = 0.5 > 0" in out
     assert "kp = 10 >= 0" in out
     assert "degree 2: acts on e, with u in e''" in out

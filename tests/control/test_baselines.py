@@ -94,7 +94,7 @@ def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceede
     """Held at e = 1 the integrator rests where (sat(u) - u) / tt = ki e: u exceeds the bound by ki
     tt.
     """
-    with pytest.warns(smc.errors.ScenarioWarning, match="kp kd > ki"):
+    with pytest.warns(smc.errors.ScenarioWarning, match="kp kd > M ki"):
         law = smc.law(
             "pid",
             kp=10.0,

@@ -164,6 +164,24 @@ def test_the_gain_that_may_be_lost_is_what_holds_the_start(kp, x0):
     assert found[0].value == pytest.approx(held, abs=0.03)
 
 
+LIFTS = """<mujoco model="lifts"><option><flag contact="disable"/></option><worldbody>
+<body><joint name="one" type="slide" axis="0 0 1"/><geom size=".1" mass="1"/></body>
+<body><joint name="three" type="slide" axis="0 0 1"/><geom size=".1" mass="3"/></body>
+</worldbody></mujoco>"""
+
+
+def test_the_margin_of_gain_is_of_all_actuators_or_of_the_one_that_a_fault_names():
+    channel = smc.Channel(motor=True, u_max=50.0, x0=0.3)
+    plant = smc.plant_from(LIFTS, {"one": channel, "three": channel})
+    law = smc.law("pid", kp=90.0, ki=200.0, kd=40.0)
+    found = []
+    for on in (None, "three", "one"):
+        loss = smc.condition("loss", fault=smc.Fault(at=0.0, on=on))
+        found += smc.margins(plant, law, "gain", quick=True, threads=1, condition=loss)
+    every, heavy, light = [margin.value for margin in found]
+    assert every == heavy < 1.0 - 3.0 * 9.81 / 50.0 < light < 1.0 - 9.81 / 50.0
+
+
 @pytest.mark.parametrize(
     "fields",
     [{"at": -1.0}, {"at": 0.1, "gain": np.nan}, {"at": 0.1, "stuck": True, "gain": 0.5}],

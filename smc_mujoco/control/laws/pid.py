@@ -2,8 +2,8 @@
 
 A baseline without a sliding mode. The filter tau limits the amplification of noise by the
 derivative. Back-calculation prevents wind-up: while u is beyond the bound +-u_max, w tends with the
-time constant tt to the value that brings u back to its bound; with ki = 0, w = 0. On x'' = u the
-loop is stable if and only if kp kd > ki (Routh, tau = 0), and a constant disturbance leaves no
+time constant tt to the value that brings u back to its bound; with ki = 0, w = 0. On M x'' = u the
+loop is stable if and only if kp kd > M ki (Routh, tau = 0), and a constant disturbance leaves no
 error. D is computed by the implicit (backward) Euler method, starting at the first de, and w by the
 explicit one. The trace's s is kp e + kd D.
 Gains: kp, proportional [N/m]; ki, integral [N/(m s)]; kd, derivative [N s/m]; tau, of the filter
@@ -29,8 +29,12 @@ from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, TIME, 
     },
     memory=3,
     relative_degree=2,
-    # no theorem: it is Routh's condition for x'' = u, and no plant of the suite is that
-    advice={"kp kd > ki or ki = 0": lambda g: g.kp * g.kd > g.ki or g.ki == 0.0},
+    # no theorem: it is Routh's condition for M x'' = u, and no plant of the suite is that
+    advice={
+        "kp kd > M ki, or ki = 0 (M is the mass or inertia of the joint, taken as 1 here)": (
+            lambda g: g.kp * g.kd > g.ki or g.ki == 0.0
+        )
+    },
     label="PID",
     short="PID",
 )

@@ -70,14 +70,11 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
         moved[i] |= moved[model.body_parentid[i]]
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos  # the start, of a free body also the goal
-    apart = "another keyframe, or <exclude> that pair in the file"
     of_urdf = source.label.lower().endswith(".urdf")
-    if of_urdf:
-        apart = "one of these links no <collision> in the file"
     if model.joint(joints[0]).type[0] != own.FREE:
         for joint, x in zip(joints, own.goals(model, joints, keyframe)[0], strict=True):
             at.qpos[model.joint(joint).qposadr[0]] = x
-    for what, cure in (("goal", apart), ("start", "another x0")):
+    for what in ("goal", "start"):
         mujoco.mj_fwdPosition(model, at)
         for contact in at.contact:
             bodies = model.geom_bodyid[contact.geom]
@@ -90,6 +87,15 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
                     model.geom(i).name or model.body(model.geom_bodyid[i]).name or f"geom {i}"
                     for i in contact.geom.tolist()
                 )
+                pair = [model.body(i).name or "GIVE-IT-A-NAME" for i in bodies.tolist()]
+                cure = (
+                    "a keyframe in which they do not touch, or <exclude "
+                    f'body1="{pair[0]}" body2="{pair[1]}"/> in the <contact> of the file'
+                )
+                if what == "start":
+                    cure = "another x0"
+                elif of_urdf:
+                    cure = "one of these links no <collision> in the file"
                 raise ScenarioError(
                     f"the {what} of {source.label} has {first!r} {-1e3 * contact.dist:.0f} mm "
                     f"inside {second!r}: give {cure}"
