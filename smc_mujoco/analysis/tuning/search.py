@@ -68,6 +68,7 @@ from smc_mujoco.common.errors import (
 from smc_mujoco.common.progress import bar, told
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
+from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.simulation import coerce, serialise
@@ -158,6 +159,8 @@ def tune(
     )
     task = task_of(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
     task = task._replace(device=device)
+    if why := falls(task.plant):
+        _warn(why)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
@@ -624,7 +627,7 @@ def _warn_of_result(tuned: Tuned) -> None:
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.plant.is_user_model:
-        _warn_of_machine(run(first))
+        _warn_if_it_leans(run(first))
     if tuned.definition.excess(first):
         _warn(
             f"all gains {tried} are predicted to chatter with more than "
@@ -632,17 +635,13 @@ def _warn_of_result(tuned: Tuned) -> None:
         )
 
 
-def _warn_of_machine(trace: Trace) -> None:
-    """Warn of a run of a user's model that falls or leans on something."""
-    from smc_mujoco.mechanisms.custom.scales import falls
-
-    who = f"{trace.scenario.law.name} on {trace.scenario.plant.name}"
-    if why := falls(trace.scenario.plant):
-        _warn(why)
-    elif leans(trace):
+def _warn_if_it_leans(trace: Trace) -> None:
+    """Warn of a run of a user's model that leans on something."""
+    if leans(trace) and not falls(trace.scenario.plant):
         _warn(
-            f"{who} stays at the bound of u with its best gains: it leans on something, or needs "
-            "more force; give another goal or start, or a larger u_max if the motor gives more"
+            f"{trace.scenario.law.name} on {trace.scenario.plant.name} stays at the bound of u "
+            "with its best gains: it leans on something, or needs more force; give another goal or "
+            "start, or a larger u_max if the motor gives more"
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.mechanisms.custom import others, scales
 from smc_mujoco.mechanisms.named import as_plant
@@ -312,7 +313,7 @@ def test_a_joint_that_leans_on_its_stop_never_settles():
         assert np.isinf(smc.score(trace)["settling_time"]) >= leaning
 
 
-def test_a_robot_that_falls_is_told_so_and_never_settles():
+def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch):
     standing = plant("walker", "held")
     assert scales.falls(standing) == ""
     text = WALKER.format(
@@ -331,6 +332,10 @@ def test_a_robot_that_falls_is_told_so_and_never_settles():
     trace = smc.run(smc.Scenario(plant=limp, law="pid", duration=0.1))
     assert np.isinf(smc.score(trace)["settling_time"])
     assert not arrived(trace)
+    monkeypatch.setattr(search, "_failure_of_law", None)  # told before the first run of a search
+    with pytest.warns(ScenarioWarning, match="others='locked'"):
+        with pytest.raises(TypeError, match="NoneType"):
+            smc.tune(limp, "pid", searches=1)
     assert scales.falls(plant("walker", "locked")) == ""
 
 
