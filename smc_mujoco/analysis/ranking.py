@@ -151,32 +151,30 @@ class Comparison:
         self.laws = tuple(sorted(scores))
         self.shares = shares
         self.relevant = relevant
-        self.cells = self._cube(scores, float)  # (laws, blocks, seeds)
+        self.cells = self._cube(scores, math.nan)  # (laws, blocks, seeds)
         count, blocks, seeds = self.cells.shape
-        unknown = dict.fromkeys(self.laws, np.full((blocks, seeds), math.nan))
-        self.halves = self._cube(halves or unknown, float)  # y'
-        rises = self._cube(trends or unknown, float)
-        alike = dict.fromkeys(self.laws, np.zeros((blocks, seeds)))
-        gains = self._cube(sets or alike, np.int64)
-        own = dict.fromkeys(self.laws, np.tile(np.arange(seeds), (blocks, 1)))
-        results = self._cube(outcomes or own, np.int64)
+        self.halves = self._cube(halves, math.nan)  # y'
+        rises = self._cube(trends, math.nan)
+        gains = self._cube(sets, 0)
+        results = self._cube(outcomes, np.arange(seeds))
         self.floors = np.broadcast_to(np.asarray(floors, float), blocks)
         self.first_order = np.broadcast_to(np.asarray(first_order, bool), blocks)
-        self.low, high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
+        self.low, self.high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
         plain = self.cells
         self.beyond = relevant  # what d must exceed
         if not shares:
             plain = _logarithms(self.cells, self.floors)
             self.beyond = -math.log1p(-relevant)
         ran = ~np.isnan(self.cells[0])
-        self.away = np.isinf(self.cells)  # runs that failed, have no value or have not arrived
-        if arrived:
-            self.away |= self._cube(arrived, float) == 0.0
+        # runs that failed, have no value or have not arrived
+        self.away = np.isinf(self.cells) | (self._cube(arrived, 1) == 0)
         self.below = np.zeros((count, blocks), bool)
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
         # d of the first law over the second by unit, then NaN; and without halves and trends
         self.leads = np.full((blocks, count, count, seeds), math.nan)
         self.plain = self.leads.copy()
+        charged = self.leads, self.low, self.high
+        as_run = self.plain, plain, plain
         for k in range(blocks):
             for a in range(count):
                 self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
@@ -187,30 +185,29 @@ class Comparison:
                     units = linked(*gains[pair, k][:, first])
                     if b == a and self.floors[k] > 0.0 and not shares:
                         # of an even number, the median is above q if only half are at most q
-                        centre = middle(_by_unit(high[a, k, first], units, seeds))
+                        centre = middle(_by_unit(self.high[a, k, first], units, seeds))
                         self.below[a, k] = centre <= math.log(self.floors[k])
                     for i, j in itertools.permutations(pair, 2):
-                        charged = _difference(self.low[j, k], high[i, k])[first]
-                        self.leads[k, i, j] = _by_unit(charged, units, seeds)
-                        as_run = _difference(plain[j, k], plain[i, k])[first]
-                        self.plain[k, i, j] = _by_unit(as_run, units, seeds)
+                        for leads, low, high in charged, as_run:
+                            by_run = _difference(low[j, k], high[i, k])[first]
+                            leads[k, i, j] = _by_unit(by_run, units, seeds)
         # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
         self.p = p_values(self.leads - self.beyond)
         self.p[self.unranked] = 1.0
         self.limits = corrected_limits([self])  # of the p-values, after the correction
 
-    def _cube(self, by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
-        return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
+    def _cube(self, by_law: Mapping[str, ArrayLike] | None, unknown: ArrayLike) -> np.ndarray:
+        if by_law:
+            return np.array([np.atleast_2d(by_law[law]) for law in self.laws], float)
+        return np.broadcast_to(unknown, self.cells.shape)
 
     def limited(self, limits: Limits) -> "Comparison":
         """Return the same comparison as part of a larger family, which has these limits."""
         other = copy.copy(self)
-        for name in ("winners", "better"):
-            other.__dict__.pop(name, None)
         other.limits = limits
         return other
 
-    @functools.cached_property
+    @property
     def centres(self) -> np.ndarray:
         """The medians, or means, over the seeds, (laws, blocks)."""
         if self.shares:
@@ -222,7 +219,7 @@ class Comparison:
         """Whether two laws are both below the floor, (blocks, laws, laws)."""
         return self.below.T[:, :, None] & self.below.T[:, None, :]
 
-    @functools.cached_property
+    @property
     def without_value(self) -> np.ndarray:
         """The number of runs that failed or have no value, (laws, blocks); 0 for shares."""
         return np.isinf(self.cells).sum(axis=2)
@@ -232,18 +229,18 @@ class Comparison:
         """The number of seeds of each block, (blocks,)."""
         return (~np.isnan(self.cells[0])).sum(axis=1)
 
-    @functools.cached_property
+    @property
     def samples(self) -> np.ndarray:
         """The number of units of two laws, (blocks, laws, laws)."""
         return (~np.isnan(self.leads)).sum(axis=3)
 
-    @functools.cached_property
+    @property
     def _eligible(self) -> np.ndarray:
         """Whether a law has no more runs `away` than another, (blocks, laws, laws)."""
         lacking = self.away.sum(axis=2).T
         return lacking[:, :, None] <= lacking[:, None, :]
 
-    @functools.cached_property
+    @property
     def winners(self) -> list[str | None]:
         """The law of each block that is better than every other, if there is one."""
         itself = np.eye(len(self.laws), dtype=bool)
@@ -253,7 +250,7 @@ class Comparison:
         names = np.array([*self.laws, None])
         return names[np.where(wins.any(axis=1), wins.argmax(axis=1), -1)].tolist()
 
-    @functools.cached_property
+    @property
     def better(self) -> np.ndarray:
         """Whether a law is better than another, (blocks, laws, laws)."""
         better = (self.p <= self.limits.pair) & self._eligible
@@ -288,12 +285,6 @@ class Comparison:
         level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS)
         level &= ~(self.below.T[:, :, None] | self.below.T[:, None, :])
         return level | np.eye(len(self.laws), dtype=bool)
-
-    @property
-    def best(self) -> list[tuple[str, ...]]:
-        """The laws of each block that are not beaten."""
-        names = np.array(self.laws)
-        return [tuple(names[block].tolist()) for block in ~self.beaten.T]
 
     def effect(self, block: int, law: str, rival: str) -> Effect:
         """Return how a law compares with a rival in a block, at a winner's level."""
@@ -333,11 +324,8 @@ class Comparison:
             return math.nan
         error = self.limits.winner if self.winners[block] else self.limits.first
         lead = least_visible_lead(self.leads[at], error, self.relevant)
-        charged = _difference(self.plain[at], self.leads[at])
-        known = charged[~np.isnan(charged)]
-        if known.size:
-            return 1.0 - (1.0 - lead) * math.exp(-max(float(np.median(known)), 0.0))
-        return lead
+        charged = np.nan_to_num(middle(_difference(self.plain[at], self.leads[at])))
+        return 1.0 - (1.0 - lead) * math.exp(-max(float(charged), 0.0))
 
     def step_change(self, block: int, law: str) -> tuple[float, float] | None:
         """Return the medians of a law's runs that were repeated at half the physics step, before
@@ -366,8 +354,8 @@ def bounds(
     """
     if shares:
         return np.fmin(cells, halves), np.fmax(cells, halves)
-    whole = _logarithms(cells, np.zeros(len(floors)))
-    half = _logarithms(halves, np.zeros(len(floors)))
+    whole = _logarithms(cells)
+    half = _logarithms(halves)
     change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
     # of a law in a block, for its runs that were not repeated
     widening = np.minimum(np.nan_to_num(middle(change)), MAX_LOG)[..., None]
@@ -375,16 +363,16 @@ def bounds(
         rise = np.log(middle(trends))[..., None]
     matters = np.abs(rise) > (relevant or RELEVANT)
     rise = TREND_POWER * np.where(matters, np.clip(rise, -MAX_RISE, MAX_RISE), 0.0)
-    q = np.log(np.maximum(floors, np.finfo(float).tiny))[None, :, None]
+    q = _logarithms(floors[:, None])
     once = np.isnan(half)
     low = np.fmin(whole, np.where(once, whole - widening, half)) + np.minimum(rise, 0.0)
     high = np.fmax(whole, np.where(once, whole + widening, half)) + np.maximum(rise, 0.0)
     return np.maximum(low, q), np.maximum(high, q)
 
 
-def _logarithms(values: np.ndarray, floors: np.ndarray) -> np.ndarray:
+def _logarithms(values: np.ndarray, floors: ArrayLike = 0.0) -> np.ndarray:
     """Return the logarithms of values (laws, blocks, seeds), at least those of the floors."""
-    least = np.maximum(floors, np.finfo(float).tiny)[None, :, None]
+    least = np.maximum(np.reshape(floors, (-1, 1)), np.finfo(float).tiny)
     return np.log(np.maximum(np.abs(values), least))
 
 
@@ -521,13 +509,11 @@ def ranks(comparison: Comparison) -> list[Rank]:
     by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
     means = by_block.mean(axis=1).tolist()
     doubted = np.any(comparison.beaten, axis=1).tolist()
-    order = []
-    for n, mean in zip(lacking.sum(axis=1), means, strict=True):
-        order.append((int(n), round(mean, 9)))
+    order = list(zip(lacking.sum(axis=1).tolist(), np.round(means, 9), strict=True))
     found = []
-    for i, law in enumerate(comparison.laws):
-        place = sum(other < order[i] for other in order) + (1 + order.count(order[i])) / 2
-        found.append(Rank(law, means[i], place, not bool(doubted[i])))
+    for law, mean, own, doubt in zip(comparison.laws, means, order, doubted, strict=True):
+        place = sum(other < own for other in order) + (1 + order.count(own)) / 2
+        found.append(Rank(law, mean, place, not doubt))
     return sorted(found, key=lambda rank: (rank.place, rank.law))
 
 
@@ -542,7 +528,7 @@ def exceeds(
     """
     larger = np.asarray(np.maximum(a, floor))
     smaller = np.asarray(np.maximum(b, floor))
-    return np.asarray((larger > smaller) & ((1.0 - relevant) * larger > smaller))
+    return np.asarray((1.0 - relevant) * larger > smaller)
 
 
 # the signed-rank test
@@ -560,17 +546,10 @@ def p_values(differences: ArrayLike) -> np.ndarray:
     for at in np.ndindex(p.shape):
         known = given[at][~np.isnan(given[at])]
         if known.size:
-            p[at] = _tail(known.size, _positive_pairs(known))
+            i, j = np.triu_indices(known.size)
+            with np.errstate(invalid="ignore"):  # the sum of opposite infinities is not above 0
+                p[at] = _tail(known.size, int((known[i] + known[j] > 0.0).sum()))
     return p
-
-
-def _positive_pairs(values: np.ndarray) -> int:
-    """Return the number of pairs i <= j of values (n,) whose sum is above 0; opposite infinities
-    have none.
-    """
-    above = values.size - np.searchsorted(np.sort(values), -values, side="right")
-    alone = int((values > 0).sum())
-    return (int(above.sum()) - alone) // 2 + alone  # `above` counts a pair twice, i = j once
 
 
 def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]:
