@@ -103,7 +103,9 @@ def read(folder: str | os.PathLike[str]) -> Entry:
     if len(laws) != 1:
         names = " and ".join(path.name for path in laws) or "none of them"
         raise ScenarioError(f"entry {str(folder)!r} has {names}: give one of {', '.join(FILES)}")
-    with reading(folder / ABOUT, ABOUT, f"write {', '.join(TEXTS)} and authors in it") as file:
+    with reading(
+        folder / ABOUT, "description of an entry", f"write {', '.join(TEXTS)} and authors in it"
+    ) as file:
         text = file.read_bytes()
         try:
             about = tomllib.loads(text.decode("utf-8-sig"))
