@@ -25,6 +25,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, Values
@@ -79,7 +80,10 @@ class Task:
         """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring
         joints' ranges.
         """
-        reach = np.abs(plant.x0 - rest(plant))
+        start = plant.x0
+        if plant.is_user_model and not plant.pose and start == plant.origin:
+            start = beside_goal(plant)
+        reach = np.abs(start - rest(plant))
         return -reach, reach
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:

@@ -225,6 +225,8 @@ def test_a_model_of_one_s_own_keeps_its_floor_in_a_batch(tmp_path):
     for _ in range(500):
         assert np.abs(many.step(np.zeros((2, 1)))[0] - single.step([0.0])[0]).max() < 1e-12
     assert 0.8 < single.data.qpos[0] < 0.9  # it lies on the floor
+    starts = BatchEnv(arm, 200, changes={"u_max": 5.0}).reset(seed=0)[0][:, 0]
+    assert 0.28 < np.abs(starts).max() <= 0.3  # it begins beside its goal
 
 
 def same(theirs, ours):
