@@ -3,10 +3,9 @@ chattering, a region of attraction.
 """
 
 from smc_mujoco.analysis.chattering import chattering
-from smc_mujoco.analysis.harmonics import describing_function
 from smc_mujoco.analysis.region_of_attraction import basin
 from smc_mujoco.analysis.regulator import lqr
 from smc_mujoco.analysis.state_space import state_space
 from smc_mujoco.control.surface import surface_function
 
-__all__ = ["basin", "chattering", "describing_function", "lqr", "state_space", "surface_function"]
+__all__ = ["basin", "chattering", "lqr", "state_space", "surface_function"]

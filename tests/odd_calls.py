@@ -112,7 +112,7 @@ LINES = {  # command -> its shortest right lines, "?" for what is always odd
     "enter": ["?", "folder", "a.py", "pid --suite ?", "pid --against ?"],
     "claims": ["--papers", "?", "--paper ?", "--check ?", "1 --gains ?"],
     "certify": ["?", "--check ?", "duffing --gains ?", "duffing --law ?", "duffing --condition ?"],
-    "report": ["--paper ?", "--law ?"],
+    "report": ["--law ?"],
     "rig": ["?", "emps ?", "emps a.csv", "emps a.csv --fit", "duffing ? --fit"],
 }
 

@@ -14,17 +14,16 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
-from smc_mujoco.common.constraints import Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
-from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
@@ -34,8 +33,6 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
 DIFFERENCE_STEP = 1e-6  # SI units, of finite differences
-CHUNK_SAMPLES = 50_000  # samples for which a law is called at once
-MAX_SAMPLES = 10**9  # in a period, for a describing function
 MAX_SAMPLES_PER_PERIOD = 1000  # of an excitation: a law that would take more is called this often
 # times the largest number in a period: about as many samples has an excitation
 EXCITATION_SAMPLES = 3
@@ -55,7 +52,6 @@ LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (
     FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq")
 )
 Q, DQ, FQ, GQ = (FIELDS[name] for name in ("q", "dq", "fq", "gq"))
-FREE_MASS = 0.0, 1.0, 0.0, 0.0  # f and g at rest, and the derivatives of f with x and v
 
 
 @dataclasses.dataclass(frozen=True)
@@ -229,7 +225,7 @@ class Loop:
         """
         s = self.scenario.resolved
         fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model != "none"}
-        return self.controller(0, fixed, motion, self.nominal_models, self.controller.memories())
+        return self.controller(fixed, motion, self.nominal_models)
 
     def _gain(
         self, amplitude: float, omega: float, max_samples: float = MAX_SAMPLES_PER_PERIOD
@@ -399,20 +395,14 @@ class Controller:
         self.addresses = np.array([0 if one is None else one.address for one in functions])
         self.gains = [np.array([*(one.gains.values() if one else ()), 0.0]) for one in parts]
 
-    def memories(self) -> list[np.ndarray]:
-        """Return memories as they are at the start of a run."""
-        return [np.zeros(one.memory if one else 1) for one in self.parts]
-
     def __call__(
         self,
-        first: int,
         fixed: Mapping[int, float],
         motion: Sequence[np.ndarray],
         models: Sequence[tuple[float, ...]],
-        memories: list[np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s, each (K,), for samples of a motion that begins at sample `first`; the
-        memories change.
+        """Return u and s, each (K,), for the samples of a motion, with memories as at the start of
+        a run.
 
         `fixed` has fields of a measurement with their values in all samples; `motion` has x and v
         of the channel, then those of the joint that it moves, if any; `models` is as
@@ -429,11 +419,10 @@ class Controller:
             start[field] = value
         out = np.empty((len(x), 2))
         y = np.empty(len(FIELDS))
-        (g0, g1, g2), (m0, m1, m2) = self.gains, memories
+        g0, g1, g2 = self.gains
+        m0, m1, m2 = (np.zeros(one.memory if one else 1) for one in self.parts)
         model = np.array([models[0], joint_model])
-        done = _run(
-            self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out
-        )
+        done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, x, v, q, dq, model, y, out)
         if done < 0:
             raise ScenarioError(
                 "the law raised an exception in the harmonic balance: correct the law"
@@ -446,7 +435,7 @@ class Controller:
 
 
 def transition(
-    model: mujoco.MjModel, data: mujoco.MjData, actuator: Sequence[Actuator] = ()
+    model: mujoco.MjModel, data: mujoco.MjData, actuator: Sequence[Actuator]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return A (n, n) and B (n, nu) of a physics step at `data`, without any integrator's error."""
     from scipy.linalg import expm
@@ -474,45 +463,6 @@ def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.nda
         made[outputs, speeds] = -drive.constant / drive.delay
     made[outputs, outputs], made[outputs, len(block) + ids] = -1.0 / drive.delay, 1.0 / drive.delay
     return made
-
-
-@constrained
-def describing_function(
-    law: Component | Template | str,
-    amplitude: Positive,
-    omega: Positive,
-    samples: Annotated[int, Whole(low=2, high=MAX_SAMPLES)] = 4_000_000,
-) -> complex:
-    """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), in
-    continuous time.
-
-    The law has no model and no bound on u. The second of two periods counts.
-
-    Args:
-      law: a law or its name.
-      amplitude: a, rad or m.
-      omega: rad/s.
-      samples: of a period. The result converges as 1 / samples for laws that switch or integrate.
-
-    Returns:
-      N, complex, unit of u per rad or m. For a relay k sign(e): 4 k / (pi a).
-
-    Raises:
-      ScenarioError: a law that does not compile, or raises; an amplitude, omega or number of
-        samples that is not > 0.
-    """
-    h = math.tau / omega / samples
-    resolved = Scenario(plant="duffing", law=law, model="none").resolved
-    controller = Controller(resolved.velocity, None, resolved.law.of_channel(0))
-    memories = controller.memories()
-    total = 0j
-    for first in range(0, 2 * samples, CHUNK_SAMPLES):
-        at = np.arange(first, min(first + CHUNK_SAMPLES, 2 * samples))
-        turns = np.exp(1j * math.tau * (at + 0.5) / samples)
-        motion = [amplitude * turns.real, -amplitude * omega * turns.imag]  # pyright: ignore[reportAttributeAccessIssue] complex numbers have both
-        u, _ = controller(first, {DT: h, LIMIT: math.inf}, motion, [FREE_MASS], memories)
-        total += (u[at >= samples] / turns[at >= samples]).sum()
-    return complex(total) * 2.0 / samples / amplitude
 
 
 def play(amplitude: float, gap: float) -> complex:
@@ -562,7 +512,7 @@ def _window(count: int) -> np.ndarray:
 
 
 @cfunctions.cached
-def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out):
+def _run(addresses, g0, g1, g2, m0, m1, m2, start, x, v, q, dq, model, y, out):
     """Call estimator, surface and law for each sample.
 
     Stop where u is not finite; y is then the measurement there.
@@ -582,7 +532,7 @@ def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y,
     for k in range(len(x)):
         for i in range(len(start)):
             y[i] = start[i]
-        y[T], y[X], y[E] = start[DT] * (first + k), x[k], x[k]
+        y[T], y[X], y[E] = start[DT] * k, x[k], x[k]
         y[F], y[G] = model[0, 0] + model[0, 2] * x[k] + model[0, 3] * v[k], model[0, 1]
         if len(q):
             y[Q], y[DQ] = q[k], dq[k]

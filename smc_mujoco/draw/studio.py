@@ -17,7 +17,7 @@ import tempfile
 import time
 import types
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,6 @@ def view(
     laws: Sequence[Law | str] = (),
     port: int = 0,
     open_browser: bool = True,
-    watched: Callable[[Session], bool] = lambda session: True,
 ) -> tuple[Scenario, ...]:
     """Show a machine under one law or two in a browser tab until Ctrl-C; return its scenarios as
     they are then.
@@ -66,7 +65,6 @@ def view(
       laws: one or two; default the scenario's, or the first that suits the plant.
       port: of the page on this machine; 0 takes the first free one from 8080 on.
       open_browser: whether to open the tab.
-      watched: called after each frame; the view ends when it returns False.
 
     Raises:
       ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit
@@ -107,7 +105,7 @@ def view(
     with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
         put_page(Path(web_server.__file__).parent / "dist", Path(folder))
         with launch_web.launch(config, plugins=[shell, panel]) as page:
-            show(session, page, panel, watched)
+            show(session, page, panel)
     return session.scenarios
 
 
@@ -151,14 +149,14 @@ def runs_of(
     return runs
 
 
-def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], bool]) -> None:
+def show(session: Session, page: Any, panel: Any) -> None:
     """Show frame after frame: what was asked for, the push, a reset, the runs' next part."""
     model = session.screen()
     data = mujoco.MjData(model)
     page.set_model(model, data=data)
     before = time.perf_counter()
     pull = np.zeros((model.nbody, 3))
-    while page.is_running() and watched(session):
+    while page.is_running():
         now = time.perf_counter()
         while not panel.asked.empty():
             try:

@@ -24,7 +24,7 @@ from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.files import plain
-from smc_mujoco.design import chattering, describing_function
+from smc_mujoco.design import chattering
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -62,63 +62,6 @@ def measured(trace, part=0.4):
     for a, b in itertools.pairwise(up):
         ranges.append(np.ptp(s[a : b + 1]))
     return np.median(ranges) / 2, (len(at) - 1) / (at[-1] - at[0])
-
-
-# describing functions
-
-A = 0.03
-OMEGA = 7.0
-C = 2.5
-# s = v + c x, for e = A sin(omega t)
-S, TURN = A * abs(C + 1j * OMEGA), np.exp(1j * np.angle(C + 1j * OMEGA))
-
-
-def saturated(k, width, a):
-    """Of k sat(s / width)."""
-    share = min(width / a, 1.0)
-    return 2 * k / (math.pi * width) * (math.asin(share) + share * math.sqrt(1 - share**2))
-
-
-@smc.law_function(gains={"k": 2.0, "d": 0.1}, memory=1)
-def relay_with_hysteresis(y, gains, memory):
-    s = y.v + C * y.x
-    if abs(s) > gains.d:
-        memory[0] = math.copysign(1.0, s)
-    return -gains.k * memory[0], s
-
-
-@smc.law_function(gains={"k": 2.0, "d": 0.1})
-def relay_with_dead_zone(y, gains, memory):
-    s = y.v + C * y.x
-    return -gains.k * math.copysign(1.0, s) if abs(s) > gains.d else 0.0, s
-
-
-REACHED = math.sqrt(1 - (0.1 / S) ** 2)  # cosine of the angle at which s is 0.1
-CLOSED = {
-    "relay with hysteresis": (
-        relay_with_hysteresis(),
-        -8 / (math.pi * A) * complex(REACHED, -0.1 / S) * TURN,
-    ),
-    "relay with a dead zone": (relay_with_dead_zone(), -8 / (math.pi * A) * REACHED * TURN),
-    "sub-optimal": (
-        smc.law("suboptimal", r1=3.0, r2=2.0),
-        -2 / (math.pi * A) * complex(3.0 * math.sqrt(3.0), 3.0 + 2 * 2.0),
-    ),
-    "saturation": (
-        smc.law("boundary_layer", k=2.0, c=C, phi=0.1),
-        -saturated(2.0, 0.1, S) * S / A * TURN,
-    ),
-    "super-twisting": (
-        smc.law("super_twisting", k1=1.5, k2=1.1, c=C),
-        -(2 * 1.5 * HALF / math.sqrt(S) + 4 * 1.1 / (math.pi * S * 1j * OMEGA)) * S / A * TURN,
-    ),
-}
-
-
-@pytest.mark.parametrize("name", CLOSED)
-def test_the_describing_function_of_a_compiled_law_is_its_closed_form(name):
-    law, closed = CLOSED[name]
-    assert describing_function(law, A, OMEGA) == pytest.approx(closed, rel=1e-6)
 
 
 # the loop
@@ -475,6 +418,12 @@ class Formula:
             gain=self.gain(amplitude, omega),
             **nothing,
         )
+
+
+def saturated(k, width, a):
+    """Of k sat(s / width)."""
+    share = min(width / a, 1.0)
+    return 2 * k / (math.pi * width) * (math.asin(share) + share * math.sqrt(1 - share**2))
 
 
 def saturation(a):

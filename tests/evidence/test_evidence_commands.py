@@ -187,7 +187,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
     },
     "report": {
         "evidence.report.report": lambda *_, **__: Path("report.html"),
-        "evidence.report.paper.report": lambda *_, **__: Path("report.html"),
     },
     "rig": {
         "evidence.rigs.identify.identify": lambda of, many, *_, **__: identified(len(many)),
@@ -279,13 +278,12 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             ": 2 supported",
         ],
     ),
-    "report --paper gaber --quick --threads 2": (
-        0,
-        ["report('gaber', Path(report), True, 2, progress=True)", "wrote report.html (0.3 MB)"],
-    ),
     "report --quick --out there --seeds 2 --law pid,lqr": (
         0,
-        ["report(Path(there), True, 2, None, progress=True, laws=['pid', 'lqr'])"],
+        [
+            "report(Path(there), True, 2, None, progress=True, laws=['pid', 'lqr'])",
+            "wrote report.html (0.3 MB)",
+        ],
     ),
     (
         "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set "

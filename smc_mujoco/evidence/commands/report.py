@@ -22,13 +22,6 @@ def report(
         list[str] | None,
         typer.Option(autocompletion=options.LAWS, help="Further laws, as a,b, beside the study's."),
     ] = None,
-    paper: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FOLDER",
-            help="Instead of the study, audit a paper of `smc-mujoco claims --papers`.",
-        ),
-    ] = None,
     threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which
@@ -38,24 +31,12 @@ def report(
     OUT/report.html needs no network and no other file; the data are in the same folder. You can
     stop the command at any time, and continue by starting it again.
 
-    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html and
-    evidence.json.
-
     Example: smc-mujoco report --quick --out look
-
-    Example: smc-mujoco report --paper ./my_paper --out audit
     """
     with delay_ctrl_c():
-        from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.evidence.report import paper as of_paper
         from smc_mujoco.evidence.report import report as make
 
-    if paper and (seeds or law):
-        raise ScenarioError("--seeds and --law belong to the study: leave them out with --paper")
-    if paper:
-        path = of_paper.report(paper, out, quick, threads, progress=True)
-    else:
-        path = make(out, quick, seeds, threads, progress=True, laws=options.names(law))
+    path = make(out, quick, seeds, threads, progress=True, laws=options.names(law))
     print(
         f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser"
     )

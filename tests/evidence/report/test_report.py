@@ -20,7 +20,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import extras
 from smc_mujoco.common.tabular import Cell
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.report import page, paper, report, sections
+from smc_mujoco.evidence.report import page, report, sections
 from smc_mujoco.evidence.report.plan import QUICK
 from smc_mujoco.studies.table import Table
 
@@ -185,8 +185,6 @@ def test_a_report_needs_its_packages(tmp_path, monkeypatch):
     monkeypatch.setattr(extras, "missing", lambda *_: "install it")
     with pytest.raises(extras.MissingPackageError, match="install it"):
         report(tmp_path)
-    with pytest.raises(extras.MissingPackageError, match="install it"):
-        paper.report("gaber", tmp_path)
 
 
 def test_the_command_is_light_to_import():
