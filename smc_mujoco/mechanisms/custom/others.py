@@ -34,10 +34,16 @@ def target_of(actuator: mujoco.MjsActuator) -> str:
 
 
 def limp(spec: mujoco.MjSpec, seen: Iterable[str]) -> list[str]:
-    """Return the joints that are not seen as channels and have motors, which nothing commands."""
+    """Return the joints that are not seen as channels and have motors, which nothing commands. In a
+    file without actuators, as a URDF, these are the joints with a bound on the force of motors.
+    """
     mine = {"", *seen}
     served = {target_of(actuator) for actuator in spec.actuators if is_servo(actuator)}
     driven = dict.fromkeys(target_of(actuator) for actuator in spec.actuators)
+    if not spec.actuators:
+        follow = {equality.name1 for equality in spec.equalities}
+        bounded = [joint.name for joint in spec.joints if np.any(joint.actfrcrange)]
+        driven = dict.fromkeys(joint for joint in bounded if joint not in follow)
     return [joint for joint in driven if joint not in mine | served]
 
 

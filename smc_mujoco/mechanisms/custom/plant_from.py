@@ -211,8 +211,9 @@ def plant_from(
       tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many
         joints may read its Jacobian.
       others: what other joints do. "file": as the model says; servos hold the start, or the
-        keyframe's ctrl. "held": a joint with a motor is held there too, by a stiff PD. "locked":
-        all are welded there. Default: "file", with a warning if that leaves motors at 0.
+        keyframe's ctrl. "held": a joint with a motor (in a URDF, with an effort) is held there too,
+        by a stiff PD. "locked": all are welded there. Default: "file", with a warning if that
+        leaves motors at 0.
       measured: names of further joints that are measured but not driven, in the order of their
         channels, which come last. Laws of many joints read them, and they count in scores. A free
         joint, or "base" for the model's only one, gives six channels, base_x to base_rz: position,

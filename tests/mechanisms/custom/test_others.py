@@ -388,3 +388,20 @@ def test_a_link_of_a_urdf_may_touch_all_but_the_one_that_carries_it(tmp_path, pa
         moved.append(smc.run(smc.Scenario(plant=made, law=law, x0=0.3, u_max=5.0, duration=0.3)).x)
     assert np.ptp(moved[0]) > 0.1
     np.testing.assert_allclose(moved[0], moved[-1], atol=2e-4)
+
+
+@pytest.mark.parametrize("effort", [0, 80])
+def test_joints_of_a_urdf_have_motors_where_it_bounds_their_force(tmp_path, effort):
+    file = tmp_path / "block.urdf"
+    text = URDF.format(shape="", parent="mid").replace('<axis xyz="0 0 1"', '<axis xyz="0 1 0"')
+    bound = f'<joint name="i" type="continuous"><limit effort="{effort}"/>'
+    file.write_text(text.replace('<joint name="i" type="continuous">', bound))
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        smc.plant_from(file, {"j": smc.Channel(motor=True)})
+    told = [str(one.message) for one in seen if "that nothing commands" in str(one.message)]
+    assert len(told) == (effort > 0)
+    held = smc.plant_from(file, {"j": smc.Channel(motor=True)}, others="held")
+    trace = smc.run(smc.Scenario(plant=held, law="none", duration=0.5))
+    assert held.load().nu == 1 + (effort > 0)
+    assert (np.ptp(trace.x) < 1e-3) == (effort > 0)
