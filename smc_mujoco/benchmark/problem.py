@@ -224,8 +224,7 @@ class Problem:
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
         plant = trace.scenario.plant
-        if plant.pose:
-            bounds = mixer(plant)[:, -1]
+        if len(bounds := mixer(plant)[:, -1]):
             commands = trace.applied  # of the rotors
         else:
             bounds = np.array(trace.scenario.limits[: plant.driven])

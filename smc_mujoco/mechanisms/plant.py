@@ -23,6 +23,7 @@ from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, wh
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms import rotation
 
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 # unit of a force, from that of x, or of x' in a speed loop
@@ -259,6 +260,11 @@ class Plant:
         return hasattr(self.build, "argument")
 
     @property
+    def has_path(self) -> bool:
+        """Whether films show its path: an arm's tip, or a free body's."""
+        return bool(self.tip or self.pose)
+
+    @property
     def on_stage(self) -> bool:
         """Whether its MJCF is built on models/common/theme.xml: films put such machines on one
         floor, in one light.
@@ -278,6 +284,14 @@ class Plant:
         if self.rest and (self.is_user_model or self.pose):
             return self.rest
         return (0.0,) * self.n
+
+    def errors(self, x: np.ndarray, r: np.ndarray) -> np.ndarray:
+        """Return x - r, (..., n); of an attitude, the rotation vector from the reference's to the
+        body's, rad.
+        """
+        if self.pose and x.shape[1] == self.n:  # a group's x is r + e
+            return rotation.pose_errors(x, r)
+        return x - r
 
     def spec(self) -> mujoco.MjSpec:
         """Return the mechanism as an editable MjSpec, with default parameters."""

@@ -21,7 +21,6 @@ from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
-from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
@@ -394,7 +393,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
         others = [type(part).__name__ for part in chain if not part.drives]
         if len(others) > len(set(others)):
             raise ScenarioError(f"{name} has {joined(others)}: give one of a kind")
-        if len(drives) > 2 or (len(drives) == 2 and not isinstance(drives[0], Lag)):
+        if len(drives) > 2 or (len(drives) == 2 and not drives[0].leads):
             raise ScenarioError(
                 f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), "
                 "another)"

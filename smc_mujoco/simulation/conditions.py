@@ -52,7 +52,7 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
-from smc_mujoco.mechanisms.hardware.stepper import Stepper
+from smc_mujoco.mechanisms.hardware.stepper import of_rig
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
@@ -233,7 +233,7 @@ def parse(text: str) -> Condition:
     try:
         values = read_fields(fields)
     except SyntaxError:
-        cure = 'write it as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"'
+        cure = 'write it as "worn gear: friction=Coulomb(0.05), x0=0.3"'
         raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}") from None
     return condition(name.strip(), **values)
 
@@ -422,15 +422,9 @@ def _contact(plant: Plant, duration: float) -> Fields:
     )
 
 
-def _stepper(plant: Plant, duration: float) -> Fields:
-    """Return a stepper motor with the pulse generator of rig stepper_furuta."""
-    rate = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
-    motor = Stepper(
-        torque=30.0 * default_u_max(plant),
-        speed=15e3 * rate,
-        ramp=20e3 * rate,
-        stop_band=50.0 * rate,
-    )
+def _pulsed(plant: Plant, duration: float) -> Fields:
+    """Return a motor that steps."""
+    motor = of_rig(30.0 * default_u_max(plant))
     return {"actuator": motor, "u_max": motor.ramp}
 
 
@@ -493,7 +487,7 @@ REAL: dict[str, Recipe] = {
     "lugre": _rubbing(lambda level: LuGre(0.5 * level, level, stribeck=0.05)),
     "lag_20ms": {"actuator": Lag(0.02)},
     "dc_motor": {"actuator": DCMotor()},
-    "stepper": _stepper,
+    "stepper": _pulsed,
     "backlash": {"actuator": Backlash(0.01)},
     "encoder": {"sensor": Encoder(counts=4096)},
     "jitter": {"clock": Clock(jitter=0.5e-3)},

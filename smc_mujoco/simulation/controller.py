@@ -792,6 +792,10 @@ def _exert(address, sim, data, part):
     y.u = state.delayed
     y.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
     y.load += data.qfrc_constraint[joint] + pushed
+    if (
+        channel.shaft >= 0 and channel.shaft != joint
+    ):  # the stops of a play pass on the drive's force
+        y.load += data.qfrc_constraint[channel.shaft]
     y.motor = 0.0
     weight = 1.0
     if part.staged != 0:

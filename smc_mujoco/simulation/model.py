@@ -20,7 +20,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
-from smc_mujoco.mechanisms.hardware import encoder
+from smc_mujoco.mechanisms.hardware.encoder import remember
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL
 from smc_mujoco.mechanisms.hardware.part import (
     BASE,
@@ -258,8 +258,10 @@ def mixer(plant: Plant) -> np.ndarray:
     (actuators, 8).
 
     It is the pseudoinverse of what they nominally exert: exact for what they can exert together,
-    else nearest to it.
+    else nearest to it. (0, 8) of other plants.
     """
+    if not plant.pose:
+        return np.zeros((0, 8))
     model = plant.load()
     drives = drive_ids(model)
     forces = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
@@ -399,7 +401,7 @@ def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scen
     if scenario.plant.pose and model.nkey:  # thrust behind a lag
         data.act[:] = model.key_act[0]
     if model.nhistory:
-        encoder.remember(model, data)
+        remember(model, data)
 
 
 def check_start(shared: Mechanism, scenario: Scenario) -> None:

@@ -222,9 +222,8 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
         "nq": mechanism.model.nq,
         "nv": mechanism.model.nv,
     }
-    rows = np.zeros((0, 8))
-    if s.plant.pose:
-        rows = mixer(s.plant)
+    rows = mixer(s.plant)
+    if len(rows):
         values |= {"actuators": len(rows), "mixer": state.address(rows)}
     values["keeps_torques"] = keeps_torques(rows)
     values |= {"slots": state.address(mjcb.slots())}

@@ -29,11 +29,7 @@ from smc_mujoco.control.law import Law, joint_catalogue, suits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.written import StateFeedback
 from smc_mujoco.mechanisms.hardware.contact import Obstacle, kinds
-from smc_mujoco.mechanisms.hardware.drives import (
-    DriveStep,
-    Series,
-    drive_step,
-)
+from smc_mujoco.mechanisms.hardware.drives import in_series
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import DryFriction, LuGre
 from smc_mujoco.mechanisms.hardware.moments import Torque
@@ -411,11 +407,8 @@ class Scenario:
         "act", "force" or "stage_force", see hardware/moments.py.
         """
         drives: list[Part] = [Rotors()] if flies(self.plant) else []
-        series: dict[DriveStep, list[int]] = {}
-        for i, effect in enumerate(self.drive_steps):
-            if effect is not None:
-                series.setdefault(effect, []).append(i)
-        drives += [Series(effect, tuple(channels)) for effect, channels in series.items()]
+        s = self.resolved
+        drives += in_series(self.chains, s.physics_step, s.integrator == "RK4")
         acting = []
         for part in (*drives, *self.actuator):
             if part.act is not None:
@@ -582,16 +575,6 @@ class Scenario:
     def scales(self) -> list[float]:
         """The control of the actuator of each driven channel, per unit of u."""
         return [math.prod(part.scale for part in chain) for chain in self.chains]
-
-    @functools.cached_property
-    def drive_steps(self) -> list[DriveStep | None]:
-        """What the drives of each driven channel do in a physics step; None where the actuator gets
-        the command itself.
-        """
-        rk4 = self.resolved.integrator == "RK4"
-        step = self.resolved.physics_step
-        effects = {chain: drive_step(chain, step, rk4) for chain in dict.fromkeys(self.chains)}
-        return [effects[chain] for chain in self.chains]
 
     @property
     def work(self) -> int:

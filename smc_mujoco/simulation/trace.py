@@ -24,7 +24,6 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
-from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
@@ -100,13 +99,8 @@ class Trace:
 
     @property
     def e(self) -> np.ndarray:
-        """Errors x - r, (K + 1, n); of an attitude, the rotation vector from the reference's to the
-        body's, rad.
-        """
-        whole = self.x.shape[1] == self.scenario.plant.n  # a group's trace has x = r + e
-        if self.scenario.plant.pose and whole:
-            return rotation.pose_errors(self.x, self.r)
-        return self.x - self.r
+        """Errors, (K + 1, n), see `Plant.errors`."""
+        return self.scenario.plant.errors(self.x, self.r)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the arrays by name; `held` only if it is not None."""

@@ -15,7 +15,7 @@ import numpy as np
 from helpers.python_controller import Controller
 from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
-from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, rippled
+from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, drive_step, rippled
 from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.moments import torque
 from smc_mujoco.mechanisms.hardware.part import joint_names
@@ -133,7 +133,8 @@ class Loop:
         self.d = np.zeros(n)  # disturbances at the last stage
         # sums over a control period: of the drives, of friction and contacts
         self.forces = np.zeros((2, n))
-        self.drive_step = scenario.drive_steps[0]
+        step = scenario.resolved.physics_step
+        self.drive_step = drive_step(scenario.chains[0], step, scenario.stages > 1)
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         # the mean force in a step of RK4, and its rise to the last stage
@@ -457,6 +458,8 @@ class Loop:
                 motor = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             load += float(data.qfrc_constraint[dof] + d[i])
+            if (shaft := at["shaft"][i]) not in (-1, dof):
+                load += data.qfrc_constraint[shaft]
             friction, low, high = self.evaluate(i, v, motor, load)
             stuck = not math.isnan(self.stuck_at[i])
             before = self.speed[i]

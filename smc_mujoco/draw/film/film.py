@@ -294,7 +294,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     overlay = None
     below = None
     words = None
-    if scenario.plant.tip or scenario.plant.pose:
+    if scenario.plant.has_path:
         from smc_mujoco.draw.film import arm as overlay
     if overlay and scenario.plant.tip:
         below = overlay.room(traces)
@@ -390,7 +390,7 @@ def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> n
     track = stage.track
     stage.look(frame)
     stage.set_shape(time)
-    stage.pose(track.x[frame], track.ahead[frame], time)
+    stage.arrange(track.x[frame], track.ahead[frame], time)
     drawn = []
     if track.failed(time):
         stage.set_colour(style.FAILED)

@@ -90,7 +90,7 @@ def close_up(traces: Sequence[Trace], fps: float) -> Clock | None:
     """
     runs = [trace for trace in traces if trace.diverged_at is None]
     scenario = traces[0].scenario
-    if not runs or scenario.plant.pose or scenario.plant.tip:
+    if not runs or scenario.plant.has_path:
         return None
     sizes = visible_sizes(scenario)
     way = max(float((np.ptp(run.x, axis=0) / sizes).max()) for run in runs)

@@ -70,7 +70,7 @@ class Stage:
         self.colour = ""
         self.set_shape(0.0)
         self.set_colour(track.colour)
-        self.pose(track.trace.x[0, : puppet.shown])
+        self.arrange(track.trace.x[0, : puppet.shown])
         film = self.model.camera("film")
         self.camera = film.id
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], self.turn.ravel())
@@ -163,7 +163,7 @@ class Stage:
         if r is not None:
             self.goal.qpos[:] = self.puppet.qpos(r, rest=self.rest(time))
 
-    def pose(self, x: np.ndarray, ahead: np.ndarray | float = 0.0, time: float = 0.0) -> None:
+    def arrange(self, x: np.ndarray, ahead: np.ndarray | float = 0.0, time: float = 0.0) -> None:
         """Put the channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their
         joints.
 

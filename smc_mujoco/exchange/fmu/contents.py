@@ -100,7 +100,7 @@ class ExportedLaw:
     u_max: tuple[float, ...]  # bound on |u| of each joint; may be infinite
     modelled: bool  # whether the law reads the nominal model
     joints: int = 0  # of a law of many joints; 0 for a law of one channel
-    plant: Plant | None = None  # a free body, whose actuators it commands
+    plant: Plant | None = None  # if it is a free body, it commands its actuators
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -408,7 +408,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
             "    return SMC_NOT_FINITE;",
         ]
     )
-    if exported.plant:
+    if exported.actuators:
         yield f"smc_actuators(&y, out, value + {place('control[1]')});"
     yield "return 0;"
 

@@ -143,8 +143,7 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> dict[str, Any
         )
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
     if s.law.joint:
-        plant = s.plant if s.plant.pose else None
-        return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": plant}
+        return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": s.plant}
     return own | {"u_max": limits.pop(), "joints": None}
 
 

@@ -68,6 +68,7 @@ class Lag(Actuator):
     """
 
     in_callback: ClassVar[bool] = True
+    leads: ClassVar[bool] = True
     has_moment: ClassVar[bool] = True
 
     tau: Natural
@@ -412,6 +413,14 @@ class Series(Part):
                 data.ctrl[channel.ctrl] = state.middle + kept.rise
                 # what the actuators did in the stage before, with the mean force
                 state.force += data.actuator_force[channel.force]
+
+
+def in_series(chains: Sequence[tuple[Actuator, ...]], step: float, rk4: bool) -> Iterator[Series]:
+    """Yield the drives that the callback simulates, of the actuators of each driven channel."""
+    for chain in dict.fromkeys(chains):
+        effect = drive_step(chain, step, rk4)
+        if effect is not None:
+            yield Series(effect, tuple(i for i, other in enumerate(chains) if other == chain))
 
 
 def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveStep | None:

@@ -237,7 +237,7 @@ def test_a_machine_stays_in_its_tile_with_its_arrows(kind):
     red = (1.0, 0.0, 0.0, 1.0)
     with staged(trace, SIZE, strip=40.0) as stage:
         n = stage.puppet.shown
-        stage.pose(np.linspace(-0.3, 0.4, n), np.full(n, 0.1), 0.2)
+        stage.arrange(np.linspace(-0.3, 0.4, n), np.full(n, 0.1), 0.2)
         stage.aim(np.full(n, 0.1))
         before = stage.render()
         assert set(stage.links).isdisjoint(np.flatnonzero(stage.model.geom_group > 2))
@@ -245,7 +245,7 @@ def test_a_machine_stays_in_its_tile_with_its_arrows(kind):
             (0, arrows.Arrow(0.0, 0.8, red)),
             (0, arrows.Arrow(-0.7, 0.3, red, 1, 0.65, head=False)),
         ]
-        stage.pose(np.linspace(0.25, 0.3, n))
+        stage.arrange(np.linspace(0.25, 0.3, n))
         red_parts = []
         for picture in map(np.asarray, (before, stage.render(drawn))):
             red_parts.append(

@@ -324,6 +324,21 @@ def scenarios():
     )
 
 
+@pytest.mark.parametrize("friction", [smc.hardware.servo("mx64", "m4").friction, Curious(b=0.4)])
+def test_a_rigid_play_puts_no_load_of_its_own_on_a_gearbox(friction):
+    common = {
+        "plant": "pendulum_network",
+        "law": "pid",
+        "friction": friction,
+        "physics_step": 1.25e-4,
+        "integrator": "implicitfast",
+        "duration": 1.0,
+    }
+    rigid = smc.Backlash(gap=0.0, rotor_inertia=1e-6)
+    without, behind = smc.run([smc.Scenario(**common, actuator=part) for part in (None, rigid)])
+    np.testing.assert_allclose(behind.x, without.x, atol=1e-4)
+
+
 def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
     several = list(scenarios())
     for scenario, trace in zip(several, smc.run(several), strict=True):
