@@ -2,7 +2,7 @@
 
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,9 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
+Cell = tuple[str, str, str, str]  # metric, plant, condition, law
 MIN_SIZE = 1e-9  # smaller sizes are drawn at it
+RING: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": style.INK}  # around a winner
 LINE_HEIGHT = 0.18  # inches on a full page, height of a law's line
 
 
@@ -44,6 +46,7 @@ def plot(
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
+    winners: Collection[Cell] = (),
 ) -> Figure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by
     condition.
@@ -57,6 +60,8 @@ def plot(
       table: a study's runs, as `smc.Table.read` returns them.
       metrics: names of metrics, or "settles" for the share of runs that settle.
       path, title, size, format, fig: as in `figure`.
+      winners: (metric, plant, condition, law) of dots that get a ring; `compare`'s plot has those
+        of its verdicts.
 
     Raises:
       ScenarioError: no runs, an unknown metric, laws without runs in common, or as `figure`.
@@ -95,6 +100,8 @@ def plot(
     with style.page(width):
         least = min(interval.n for interval in intervals.values())
         key, shared = _key(table, looks, least)
+        if won := intervals.keys() & set(winners):
+            key.append(pages.entry("winner", style.INK, lw=0.0, **RING))
         rows = (len(laws) + 1) * np.array(list(map(len, conditions_of.values())))
         tall = 0.5 + LINE_HEIGHT * rows
         space = pages.head_height(width, key) + style.points(0.6)
@@ -104,11 +111,10 @@ def plot(
         text = style.points(pages.TEXT_SIZE)
         for plant, high, of_plant in zip(plants, tall, axes, strict=True):
             for ax, name in zip(of_plant, names, strict=True):
-                of_panel = {}
-                for cell, its in intervals.items():
-                    if cell[:2] == (name, plant):
-                        of_panel[cell[2:]] = its
-                _panel(ax, of_panel, conditions_of[plant], looks, name)
+                here = name, plant
+                of_panel = {cell[2:]: its for cell, its in intervals.items() if cell[:2] == here}
+                rings = [cell[2:] for cell in won if cell[:2] == here]
+                _panel(ax, of_panel, conditions_of[plant], looks, name, rings)
                 ax.set_xlabel(_label(name, units[plant]))
                 ax.tick_params(labelleft=ax is of_plant[0])
             words = style.plant_name(plant) if title or len(plants) > 1 else ""
@@ -121,7 +127,7 @@ def plot(
         return pages.write(page, paths)
 
 
-def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, str, str], Interval]:
+def _intervals(table: Columns, metrics: Sequence[str]) -> dict[Cell, Interval]:
     """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with
     its interval.
     """
@@ -168,9 +174,10 @@ def _panel(
     conditions: Sequence[str],
     looks: Mapping[str, Mapping[str, str]],
     metric: str,
+    rings: Collection[tuple[str, str]],
 ) -> None:
     """Draw a metric of one plant, (condition, law) -> its interval: a block of lines per condition,
-    a dot per law.
+    a dot per law, with a ring around those that win.
 
     Its axis is logarithmic where values differ much, but for the share of runs that settle.
     """
@@ -182,7 +189,10 @@ def _panel(
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(looks)):
         if (condition, law) in intervals:
-            _dot(ax, intervals[condition, law], j * height + k, looks[law])
+            interval = intervals[condition, law]
+            _dot(ax, interval, j * height + k, looks[law])
+            if (condition, law) in rings:
+                ax.plot(interval.median, j * height + k, ms=style.points(12), **RING)
     if not sizes.size:
         ax.set_xticks([])
     if any(not np.isfinite(interval.median) for interval in intervals.values()):

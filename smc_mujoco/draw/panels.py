@@ -596,7 +596,8 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     low, high = axis.transform(np.array(ax.get_ylim()))
     ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
     place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
-    look = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
+    look: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
+    look["bbox"] = {"fc": style.PAPER, "ec": "none", "pad": 0.1 * size}  # hides lines of times
     ax.annotate(fitting[0], (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
 
 

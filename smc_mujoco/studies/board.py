@@ -339,6 +339,16 @@ class Boards(Tables, list[Board]):
     failures: Sequence[str] = ()  # a sentence for each law with failed runs, below the last table
 
     @property
+    def winners(self) -> list[tuple[str, str, str, str]]:
+        """The metric, plant, condition and law of each win."""
+        won = []
+        for board in self:
+            for block in board.blocks:
+                if block.winner:
+                    won.append((board.metric, block.plant, block.condition, block.winner))
+        return won
+
+    @property
     def tables(self) -> list[Tabular]:
         """A table for each group of runs, with what each metric's board says below, and a key below
         the last.

@@ -195,7 +195,8 @@ class Compared(Tables):
         metrics: Sequence[str] = (),
         **options: Any,
     ) -> "Figure":
-        """Draw the medians with their intervals by condition, as `smc.plot` does with a table.
+        """Draw the medians with their intervals by condition, as `smc.plot` does with a table, and
+        a ring around each winner.
 
         Args:
           path, options: path, title, size, format and fig of `smc.figure`.
@@ -203,7 +204,8 @@ class Compared(Tables):
         """
         from smc_mujoco.draw import dot_plot
 
-        return dot_plot.plot(self.table, path, metrics or dot_plot.METRICS, **options)
+        names = metrics or dot_plot.METRICS
+        return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
 
 
 @constrained

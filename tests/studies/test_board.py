@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.tabular import TEX, plain
+from smc_mujoco.draw import dot_plot
 from smc_mujoco.studies.board import Board, Boards, Lead, size, spread
 from smc_mujoco.studies.leaderboard import leaderboard
 
@@ -192,6 +193,22 @@ def test_where_a_law_wins_no_cell_says_that_no_lead_is_seen(spread, never, condi
             r"wins.*: \d+ of 20 runs of (50|second).* have no value, ahead in", board.result
         )
     assert not re.search(r"\b0 of|\(0 to", board.result)
+
+
+def test_a_plot_has_a_ring_around_each_winner_and_no_other_dot():
+    table = made(conditions=("nominal", "noise"))
+    metrics = ["itae", "ultimate_bound"]
+    winners = leaderboard(table, metrics).winners
+    assert winners == [("itae", "duffing", name, "third") for name in ("nominal", "noise")]
+    drawn = dot_plot.plot(table, metrics=metrics, winners=winners)
+    rings = []
+    for ax in drawn.axes:
+        hollow = [line for line in ax.lines if line.get_markerfacecolor() == "none"]
+        rings.append([float(line.get_xdata()[0]) for line in hollow])
+    of_third = table.column("itae")[table.column("law") == "third"]
+    assert len(rings[0]) == 2
+    assert min(of_third) <= min(rings[0]) <= max(rings[0]) <= max(of_third)
+    assert rings[1] == []
 
 
 def test_half_a_step_that_moves_a_median_is_an_alarm():

@@ -113,12 +113,17 @@ class Charts:
         height = self.full.shape[0]
         self.frames = []
         self.paths = []
+        self.words = []  # boxes that the cursor does not cross
         for row in rows:
             box = Bbox.union([ax.get_window_extent() for ax, *_ in row])
             sides = (box.x0, height - box.y1, box.x1, height - box.y0)
             self.frames.append(tuple(map(round, sides)))
             paths = []
             for ax, part, _ in row:
+                for text in ax.texts:
+                    box = text.get_window_extent()
+                    sides = (box.x0, height - box.y1, box.x1, height - box.y0)
+                    self.words.append(tuple(map(round, sides)))
                 paths += [path(ax, trace, part.quantity, height) for trace in part.traces]
             self.paths.append(paths)
 
@@ -159,6 +164,9 @@ class Charts:
             past = slice(left - self.dot, now + 1)
             charts[rows, past] = self.full[rows, past]
             charts[top : bottom + 1, now] = style.rgb(style.MUTED)
+            for first, above, last, below in self.words:
+                if first <= now <= last:
+                    charts[above : below + 1, now] = self.faint[above : below + 1, now]
             lasting = []  # a run that failed has no place on the cursor
             for (t, y), colour in zip(paths, self.colours, strict=True):
                 if time <= t[-1] + 1e-9 and np.isfinite(y[0]):

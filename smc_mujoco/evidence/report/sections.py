@@ -189,9 +189,13 @@ def comparison(compared: Compared) -> Section:
     first = conditions[0]
     medians = picture(
         lambda path: dot_plot.plot(
-            compared.table.select(condition=first), path, METRICS, f"Medians, {first}"
+            compared.table.select(condition=first),
+            path,
+            METRICS,
+            f"Medians, {first}",
+            winners=compared.leaderboard.winners,
         ),
-        f"The median of each law in condition {first}, with its 95 % interval.",
+        f"The median of each law in condition {first}, with its 95 % interval; a ring: it wins.",
     )
     every = page.folded("All medians, intervals, verdicts and gains", tables(compared.tables))
     parts = [*tables(matrices), medians, every]

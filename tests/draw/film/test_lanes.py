@@ -65,3 +65,19 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
         heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))
     assert heights[0] <= 2
     assert heights[2] == pytest.approx(3.0 * heights[1], rel=0.25)
+
+
+def test_the_cursor_passes_behind_words():
+    runs = [made(smc.Scenario(plant="duffing", law=law, duration=1.0)) for law in LAWS[:2]]
+    same = charts.Charts(runs, LAWS[:2], ["#0072B2", "#D55E00"], SIZE, 1.0)
+    assert same.words
+    hidden = 0
+    for first, above, last, below in same.words:
+        for left, top, right, bottom in same.frames:
+            if not (left <= first and last <= right and top <= above and below <= bottom):
+                continue
+            now = (first + last) // 2
+            drawn = same.at(float(same.time((now - left) / (right - left))))
+            assert (drawn[above : below + 1, now] == same.full[above : below + 1, now]).all()
+            hidden += 1
+    assert hidden
