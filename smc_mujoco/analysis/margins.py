@@ -390,7 +390,9 @@ def margins_of(
         for kind in kinds:
             cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
     searches = [kind.search(base, resolution) for base, kind in cells]
-    runs = Runs({"rest_share": rest_share}, device, threads)
+    # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
+    work = 0.0 if resolution == COARSE else math.inf
+    runs = Runs({"rest_share": rest_share}, device, threads, work)
     done = 0
 
     def tolerated(tried: Sequence[tuple[int, float | None]], runner: Callable) -> list[bool]:
@@ -417,19 +419,13 @@ def margins_of(
     firsts = [(i, None) for i in range(0, len(cells), len(kinds))]
     held = tolerated(firsts, runs.by_mujoco)
     going = {i: search for i, search in enumerate(searches) if held[i // len(kinds)]}
-    # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
-    fast = resolution != COARSE or device != "cpu"
-    searching = runs.scored if fast else runs.by_mujoco
-    find_boundaries(going, lambda tried: tolerated(tried, searching))
+    find_boundaries(going, lambda tried: tolerated(tried, runs.scored))
     ends = []  # MuJoCo has the last word on them
     for i, search in going.items():
         base, kind = cells[i]
         for level in (search.low, search.high):
-            if (
-                fast
-                and kind.none < level < math.inf
-                and runs.covers(kind.scenarios(base, level)[0])
-            ):
+            inside = kind.none < level < math.inf
+            if inside and runs.covers(kind.scenarios(base, level)[0]):
                 ends.append((i, level))
     again = {}
     for (i, level), good in zip(ends, tolerated(ends, runs.by_mujoco), strict=True):

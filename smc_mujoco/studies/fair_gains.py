@@ -132,6 +132,7 @@ class Trial(NamedTuple):
     progress: bool
     seed: int = 0  # another one draws other instances, noise and starts
     brief: bool = False  # whether searches have BRIEF as objective
+    device: str = "cpu"  # on which the fast engine searches
 
     def seeds(self, count: int) -> range:
         """Return the seeds of that many runs, which are also the numbers of unseen instances."""
@@ -297,6 +298,7 @@ class Trial(NamedTuple):
                     self.progress,
                     searches=searches,
                     folder=folder / "searches",
+                    device=self.device,
                 )
 
         try:
@@ -362,7 +364,9 @@ class Trial(NamedTuple):
         from smc_mujoco.studies.worst_case import cached_worst_case
 
         file = self.folder / "worst" / f"{name}.json"
-        return cached_worst_case(file, scenario, within, budget, self.threads, self.progress)
+        return cached_worst_case(
+            file, scenario, within, budget, self.threads, self.progress, self.device
+        )
 
 
 def candidate_of(default: Component, tuned: "Tuned") -> Candidate:

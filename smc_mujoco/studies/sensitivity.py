@@ -26,7 +26,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
-from smc_mujoco.analysis.margins import tolerates
+from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.margins import TOLERATED_ERROR, rest_share
 from smc_mujoco.analysis.sensitivity import (
     CHANCE,
     Cut,
@@ -48,9 +50,8 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import by_group
-from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.trace import Trace, warn_of_broken
+from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,6 +60,7 @@ METRIC = "rms_error"
 # physics steps by default, for a plant of one channel: up to 20 s of a core
 DEFAULT_STEPS = 3_600_000
 MIN_POINTS, MAX_POINTS = 8, 4096  # of the default, powers of 2
+AT_ONCE = 4096  # scenarios in memory at once; chosen
 # with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
 ROUGH_POINTS = 32
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
@@ -79,6 +81,7 @@ class Sensitivity(Tables, SobolResult):
     within: Uncertainty
     improvement: Improvement | None  # None if no half of an axis is better
     runs: int  # number of all runs
+    checked: str  # how far the fast engine's scores are from MuJoCo's; "" if MuJoCo made all runs
 
     def __repr__(self) -> str:
         return f"Sensitivity({self})"
@@ -148,6 +151,8 @@ class Sensitivity(Tables, SobolResult):
         where = f"{self.scenario.law.name} on {self.scenario.plant.name}"
         title = f"{where}: shares of the variance of {self.label}, %"
         notes = [*self.sentences, KEY]
+        if self.checked:
+            notes.append(f"{self.checked}.")
         if len(self.values) < 2 * ROUGH_POINTS:
             notes.insert(0, f"Fewer than {ROUGH_POINTS} points: intervals are rough, give more.")
         return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
@@ -190,8 +195,11 @@ def sensitivity(
     seed: Seed = 0,
     threads: int | None = None,
     progress: bool = False,
+    device: Device = "cpu",
 ) -> Sensitivity:
     """Find which uncertainties explain a law's score, and where its runs fail.
+
+    MuJoCo makes the runs, or the fast engine if there are very many. MuJoCo then repeats 20.
 
     Args:
       scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
@@ -205,6 +213,7 @@ def sensitivity(
         takes 25 s. A result of fewer than 32 says so.
       seed: of the points.
       threads, progress: as in `run`. The result does not depend on threads.
+      device: of the fast engine, "cpu", or "cuda" for any number of runs.
 
     Raises:
       ScenarioError: a class that the plant cannot have, an unknown metric, points that are no power
@@ -234,21 +243,24 @@ def sensitivity(
     design = designs(points, k, seed)
     scores = np.empty(len(design))
     held = np.empty(len(design), bool)
-    broken = ""
+    work = len(design) * scenario.work
+    formulas = {metric: lambda trace: _score(trace, metric), "rest_share": _rest_share}
+    runs = Runs(formulas, device, threads, work, by_group=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
-    with bar(words, len(design) * scenario.work, shown=progress) as drawn:
-        for i, trace in stream((space.scenario_at(row) for row in design), threads, drawn.advance):
-            scores[i], held[i] = _score(trace, metric), tolerates(trace)
-            broken = broken or (trace.broken if trace.failure is not None else "")
-    if broken and np.isfinite(scores).any():
-        warn_of_broken({scenario.law.name: broken})
+    with bar(words, work, shown=progress) as drawn:
+        for first in range(0, len(design), AT_ONCE):
+            cases = [space.scenario_at(row) for row in design[first : first + AT_ONCE]]
+            for i, ((score, share), failed) in enumerate(runs.scored(cases, drawn.advance), first):
+                scores[i] = math.inf if failed is not None else score
+                held[i] = failed is None and share <= TOLERATED_ERROR
     if not (finite := np.isfinite(scores)).any():
-        if broken:
+        if broken := runs.broken.get(scenario.law.name, ""):
             cure = f"{broken}: correct the law"
         else:
             cure = "give longer runs, another metric or a narrower class"
         raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
     scores[~finite] = scores[finite].max()
+    checked = runs.checked()
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
     shares = design[halves]
     values = scores[halves]
@@ -269,6 +281,7 @@ def sensitivity(
         regions=found,
         improvement=improvement(space, shares, values, failed),
         runs=len(design),
+        checked=checked if runs.drawn else "",
     )
 
 
@@ -313,6 +326,10 @@ def _score(trace: Trace, metric: str) -> float:
     entry = CATALOGUE[metric]
     value = entry.worst(by_group(trace))
     return entry.absent if math.isnan(value) else value
+
+
+def _rest_share(trace: Trace) -> float:
+    return math.inf if trace.failure is not None else rest_share(trace)
 
 
 def _rate(rate: Interval) -> str:

@@ -15,6 +15,7 @@ from typing import Annotated
 
 import numpy as np
 
+from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES
@@ -135,6 +136,7 @@ def which(
     defaults: Boolean = False,
     relevant: Relevant = RELEVANT,
     seed: DrawSeed = 0,
+    device: Device = "cpu",
 ) -> Advice:
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
     how sure the answer is.
@@ -153,7 +155,7 @@ def which(
         model also a shorter objective, and by default the laws of the report's first page. There
         one search and six runs in each condition come first, and the best five laws go on.
       defaults: whether a law may win over rivals whose gains are their defaults.
-      starts, relevant, threads, progress, seed: as in `compare`.
+      starts, relevant, threads, progress, seed, device: as in `compare`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
@@ -181,7 +183,8 @@ def which(
     if conditions is None:
         conditions = applicable(DEFAULT_CONDITIONS, [machine], length)
     tested = [find_condition(name) for name in listed("conditions", conditions)]
-    trial = Trial([machine], tested, length, starts, Path(out), threads, progress, seed, brief)
+    folder = Path(out)
+    trial = Trial([machine], tested, length, starts, folder, threads, progress, seed, brief, device)
     trial.check({machine.name: chosen})
     if quick:
         searches, budget = QUICK_SEARCHES, QUICK_BUDGET

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.cache import cached
@@ -64,6 +66,7 @@ class WorstCase(Tables):
     # why the theorem of the law does not cover the class; "" if nothing is known against it
     outside: str
     seed: int  # of the search
+    checked: str = ""  # how far the fast engine's scores are from MuJoCo's
     sets: int = 1  # number of sets of the machine's parameters that the adversary chose from
 
     def __repr__(self) -> str:
@@ -107,6 +110,7 @@ class WorstCase(Tables):
     def about(self) -> dict[str, Any]:
         """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
+        names = *names, "checked"
         values = {name: getattr(self, name) for name in names}
         return values | {
             "within": dataclasses.asdict(self.within),
@@ -161,8 +165,8 @@ class WorstCases(Tables, list[WorstCase]):
             "The median is that of random members of the class. The true worst case may be worse."
         ]
         for case in self:
-            if case.outside:
-                notes.append(f"{case.nominal.law.name}: {case.outside}")
+            for words in filter(None, (case.outside, case.checked)):
+                notes.append(f"{case.nominal.law.name}: {words}")
         return notes
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure":
@@ -192,8 +196,12 @@ def worst_case(
     seed: Seed = 0,
     threads: int | None = None,
     progress: bool = False,
+    device: Device = "cpu",
 ) -> WorstCase:
     """Search for the worst run of a scenario within a class of uncertainty, and return it.
+
+    Where there are very many runs the fast engine makes most of them. The worst run that is
+    returned, and its value, are MuJoCo's.
 
     Args:
       scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
@@ -209,6 +217,7 @@ def worst_case(
         physics steps.
       seed: of the random members and of the search.
       threads, progress: as in `run`. The result does not depend on threads.
+      device: of the fast engine, "cpu", or "cuda" for any number of runs.
 
     Raises:
       ScenarioError: a class that the plant cannot have, an unknown metric, or one that the plant
@@ -237,13 +246,18 @@ def worst_case(
     with bar(
         f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress
     ) as drawn:
-        drawing, search = (Search(members, entry, budget, threads, drawn.advance) for _ in range(2))
+        formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
+        fast = Runs(formulas, device, threads, work, by_group=True)
+        drawing, search = (Search(members, entry, budget, fast, drawn.advance) for _ in range(2))
         drawing.draw(np.random.default_rng([seed, 0]))
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
         search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
+        drawing.confirm()
+        search.confirm()
     if broken := drawing.broken or search.broken:
         warn_of_broken({scenario.law.name: broken})
-    worst = max(search.worst, drawing.worst, key=lambda tried: tried.key)
+    known = [one for one in (*search.tried, *drawing.tried) if one.by_mujoco]
+    worst = max(known, key=lambda tried: tried.key)
     return WorstCase(
         value=float(worst.key[0]),
         median=float(np.median([tried.key[0] for tried in drawing.tried])),
@@ -256,6 +270,7 @@ def worst_case(
         metric=metric,
         outside=outside(scenario, within),
         seed=seed,
+        checked=fast.checked() if fast.drawn else "",
         sets=len(scenarios),
     )
 
@@ -267,6 +282,7 @@ def cached_worst_case(
     budget: int | None,
     threads: int | None = None,
     progress: bool = False,
+    device: str = "cpu",
 ) -> WorstCase:
     """Return the `worst_case` of a scenario, from the file of an earlier call if there is one."""
     if within is None:
@@ -286,7 +302,9 @@ def cached_worst_case(
     return cached(
         path,
         [run_key.key(scenario), dataclasses.asdict(within), budget],
-        lambda: worst_case(scenario, METRIC, within, budget, threads=threads, progress=progress),
+        lambda: worst_case(
+            scenario, METRIC, within, budget, threads=threads, progress=progress, device=device
+        ),
         save,
         load,
     )

@@ -10,6 +10,7 @@ from smc_mujoco.analysis.engine import cpu, group
 from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES
 from smc_mujoco.analysis.engine.scores import METRICS, RESTING
 from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.hardware import RateLimit, Sigmoid
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.signals import BandLimited, Held, MinimumJerk, OrnsteinUhlenbeck, Relay
 from smc_mujoco.simulation import state
@@ -33,6 +34,11 @@ APART = {
     "true model": {"model": "true", "disturbance": BandLimited(0.1, 1.0, 5.0)},
     "known errors": {"noise": smc.Noise(velocity_error=Held((0.0, 0.5), (0.0, 0.01)))},
     "surface": {"surface": "nonsingular_terminal"},
+    "coulomb": {"friction": (smc.Coulomb(0.2), smc.Viscous(0.1)), "disturbance": SINE},
+    "formula": {"friction": Sigmoid(0.4, 50.0), "disturbance": SINE, "model": "true"},
+    "encoder": {"sensor": smc.Encoder(2048, bias=1e-3, dropout=0.1), "noise": smc.Noise(1e-3)},
+    "lag": {"actuator": smc.Lag(0.01), "friction": smc.Coulomb(0.1), "input_delay": 3e-3},
+    "drives": {"actuator": (smc.Lag(0.01), RateLimit(50.0))},
 }
 
 

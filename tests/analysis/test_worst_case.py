@@ -12,6 +12,8 @@ import pytest
 from helpers import reference
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine import runs
+from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case import search as attack
 from smc_mujoco.analysis.worst_case.search import Search, recorded_force
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
@@ -163,7 +165,7 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
         Members([scenario(duration=0.1)], CLASSES[name]),
         CATALOGUE["rms_error"],
         9,
-        1,
+        Runs({}, work=0.0),
         lambda _: None,
     )
     searcher.search(np.random.default_rng(0), [])
@@ -349,7 +351,7 @@ def searching(tried: list[tuple[Any, float, int]], **members: Any) -> Search:
     """A search that has tried members of these values and origins; nothing is run."""
     made: Any = SimpleNamespace(**members)
     metric: Any = None
-    search = Search(made, metric, 10**6, None, lambda done: None)
+    search = Search(made, metric, 10**6, Runs({}, work=0.0), lambda done: None)
     search.tried = [attack.Tried(member, (value, 0.0), origin) for member, value, origin in tried]
     return search
 
@@ -369,3 +371,18 @@ def test_an_evolution_begins_with_the_worst_member_and_climbs():
         search.tried += [attack.Tried(point, (float(point.sum()), 0.0), 1) for point in points]
     assert set(start) == {"worst"}
     assert means[-1] > means[0] + 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bounds", [{"disturbance": 2.0}, {"position_noise": 1e-3, "hold": 0.01}])
+def test_with_many_runs_the_fast_engine_searches_and_the_worst_is_mujoco_s(monkeypatch, bounds):
+    case = scenario(duration=1.0)
+    within = smc.Uncertainty(**bounds, mass=(0.7, 1.3))
+    expected = smc.worst_case(case, within=within, budget=40)
+    monkeypatch.setattr(runs, "MIN_WORK", 0)
+    found = smc.worst_case(case, within=within, budget=40)
+    assert found.value == smc.score(smc.run(found.scenario))["rms_error"]
+    assert found.value == pytest.approx(expected.value, rel=1e-3)
+    assert found.median == pytest.approx(expected.median, rel=1e-3)
+    assert "MuJoCo repeated 20 runs: 0 failed" in str(found.tables[0].notes)
+    assert not expected.checked

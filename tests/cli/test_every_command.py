@@ -36,7 +36,7 @@ CALLS = {
     "--worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
     "--figure f "
-    "--latex t.tex --seed 5 --json c.json --threads 2": ["studies.compare.compare"],
+    "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [
@@ -51,7 +51,7 @@ CALLS = {
     "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
-    "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2": [
+    "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2 --device cuda": [
         "studies.which.which"
     ],
     "tune duffing pid": ["analysis.tuning.search.tune"],
@@ -66,13 +66,13 @@ CALLS = {
     "worst duffing --law pid --disturbance 2 "
     "--bound slope=3,position_noise=0.01,delay=0:0.01,mass=0.7:1.3,alpha=0.8:1.2 "
     "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
-    "--json w.json --threads 2": ["studies.worst_case.worst_case"],
+    "--json w.json --threads 2 --device cuda": ["studies.worst_case.worst_case"],
     "worst simple_pendulum_ak80": ["studies.worst_case.worst_case"],
     "sensitivity duffing": ["studies.sensitivity.sensitivity"],
     "sensitivity duffing --law pid --disturbance 2 --bound "
     "delay=0:0.01,encoder=256:4096,period=1:4 "
     "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --out s "
-    "--json s.json --threads 2": ["studies.sensitivity.sensitivity"],
+    "--json s.json --threads 2 --device cuda": ["studies.sensitivity.sensitivity"],
     "chatter duffing": ["simulation.grid.case"],
     "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
         "simulation.grid.case"

@@ -11,6 +11,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import sensitivity as module
+from smc_mujoco.analysis.engine import runs
 from smc_mujoco.analysis.worst_case.uncertainty import Members
 from smc_mujoco.studies.sensitivity import default_class, default_points
 
@@ -432,3 +433,16 @@ def test_what_cannot_be_answered_is_refused():
     ]:
         with pytest.raises(smc.ScenarioError, match=sentence):
             smc.sensitivity(given, **{"within": over} | fields)
+
+
+@pytest.mark.slow
+def test_with_many_runs_the_fast_engine_makes_them_and_mujoco_repeats_some(monkeypatch):
+    within = smc.Uncertainty(mass=(0.7, 1.3), friction=(0.0, 0.3), delay=(0.0, 0.01))
+    case = scenario(law=smc.law("boundary_layer"), duration=1.0)
+    expected = smc.sensitivity(case, within, points=8)
+    monkeypatch.setattr(runs, "MIN_WORK", 0)
+    found = smc.sensitivity(case, within, points=8)
+    assert found.values == pytest.approx(expected.values, rel=1e-9)
+    assert (found.failed == expected.failed).all()
+    assert "MuJoCo repeated 20 runs: 0 failed" in str(found.tables[0].notes)
+    assert not expected.checked

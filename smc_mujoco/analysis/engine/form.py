@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.control.joint_law import stored_dtype
 from smc_mujoco.control.measurement import Measurement
+from smc_mujoco.mechanisms.hardware.drives import DriveStep, Series
 
 LOGGED = ("x", "v", "u", "s", "d", "r")  # of a channel at a sample, in a log
 FAILURE, FAILED_STEP, SCORES = range(3)  # places in the scores of a run; metrics follow
@@ -13,7 +14,7 @@ SETTINGS = ("samples", "steps", "step", "period", "delay", "jump_step", "seed", 
 SETTINGS += ("sigma_x", "sigma_v", "jitter", "missed", "pause", "pause_samples", "pause_phase")
 SETTINGS += ("early", "late", "logging")
 ACTIVE, STREAM, PARAMETERS = range(3)  # places in the numbers of a signal
-STATE = ("x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "d")
+STATE = ("x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "rest", "d")
 MEASURED = ("seen_x", "seen_v", "seen_a")
 SAMPLED = ("sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r")
 
@@ -36,6 +37,9 @@ class Form(NamedTuple):
     nominal: Part
     estimator: Part
     surface: Part | None
+    frictions: tuple[Part, ...]
+    sensor: Part | None
+    drive: bool  # whether lags or rate limits stand between command and force
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
     disturbances: tuple[type, ...]
     feedforward: type | None
@@ -82,6 +86,14 @@ def row_places(form: Form) -> Places:
         places.take(f"law {i}", len(law.names) * (form.driven if form.joint else 1))
     places.take("estimator", len(form.estimator.names))
     places.take("surface", len(form.surface.names) if form.surface else 0)
+    places.take("drives", len(DriveStep._fields) * form.n if form.drive else 0)
+    for name in ("levels", "damping"):
+        places.take(name, form.n if form.frictions else 0)
+    for j, friction in enumerate(form.frictions):
+        places.take(f"friction {j}", (1 + len(friction.names)) * form.n)
+    if form.sensor:
+        places.take("hinges", form.n)
+        places.take("sensor", len(form.sensor.names))
     for name, kind in signals(form).items():
         places.take(name, PARAMETERS + len(parameters(kind)) + 2 * kind.series)
     places.take("reach", 4)
@@ -97,9 +109,18 @@ def work_places(form: Form) -> Places:
     places.take("buffer", form.slots * form.n)
     places.take("law", max(law.memory for law in form.laws) * form.n)
     if any(law.function is None for law in form.laws):
-        places.take("rest", form.n)  # velocities of 0
         places.take("commanded", 2 * form.n)
         places.take("measured", measured_places(form))
+    for name in ("mean", "motor"):  # forces of the drives
+        if form.drive:
+            places.take(name, form.n)
+        else:
+            places.at[name] = places.at["applied"]
+    places.take("drives", Series.memory * form.n if form.drive else 0)
+    places.take("reaction", form.n if form.frictions else 0)
+    for j, friction in enumerate(form.frictions):
+        places.take(f"friction {j}", friction.memory * form.n)
+    places.take("sensor", form.sensor.memory * form.n if form.sensor else 0)
     places.take("estimator", form.estimator.memory * form.n)
     places.take("surface", form.surface.memory * form.n if form.surface else 0)
     for name, kind in signals(form).items():

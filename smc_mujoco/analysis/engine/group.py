@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Hashable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from smc_mujoco.analysis.engine.form import (
 from smc_mujoco.analysis.engine.scores import METRICS, RESTING
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component, gain_at
+from smc_mujoco.mechanisms.hardware.drives import DriveStep, Lag, RateLimit
+from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.metrics.catalogue import TRANSIENT_SHARE
 from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND, groups
 from smc_mujoco.simulation.cfunctions import compile_component
@@ -42,9 +45,14 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         f"{plant.name} is more than one equation a joint": bool(
             plant.by_mujoco or plant.unmodelled or plant.direct or plant.measured
         ),
-        "it has friction, contacts or another mechanism": not s.plain_equation,
-        "it has an actuator": bool(s.actuator),
-        "it has a sensor": s.sensor is not None,
+        "it has friction of MuJoCo's, contacts or another mechanism": not (
+            s.plain_equation or (s.exact_friction and not plant.free)
+        ),
+        "it has an actuator other than lags and rate limits": not all(
+            isinstance(part, Lag | RateLimit) for part in s.actuator
+        ),
+        "its sensor reads at times of its own, or some joints": bool(s.readings)
+        or any(sensor.on for sensor in s.sensors),
         f"its integrator is {s.integrator}": s.integrator != "RK4",
         "a law of many joints, or in C, is for the processor": device == "cuda"
         and any(part.function is None for part in _laws(s)),
@@ -84,6 +92,8 @@ def _parts(s: Resolved) -> tuple:
         Part(s.plant.nominal, tuple(s.plant.parameters)),
         _part(s.velocity),
         None if s.surface is None else _part(s.surface),
+        tuple(Part(part.stage_force, part.names, part.memory) for part in s.exact_parts),
+        next((Part(sensor.read, sensor.names, sensor.memory) for sensor in s.sensors), None),
     )
 
 
@@ -92,6 +102,7 @@ def _fixed(s: Resolved) -> tuple:
         s.plant.n,
         s.plant.driven,
         s.law.joint,
+        any(s.drive_steps),
         tuple(map(type, references(s))),
         None if s.feedforward is None else type(s.feedforward),
         tuple(None if error is None else type(error) for error in s.noise.errors),
@@ -113,8 +124,8 @@ class Group:
     ):
         resolved = [scenario.resolved for scenario in scenarios]
         first = resolved[0]
-        laws, nominal, estimator, surface = _parts(first)
-        n, driven, joint, kinds, feedforward, errors, true_model = _fixed(first)
+        laws, nominal, estimator, surface, frictions, sensor = _parts(first)
+        n, driven, joint, drive, kinds, feedforward, errors, true_model = _fixed(first)
         clock = not all(s.clock.regular for s in resolved)
         delay = max(s.delay_steps // s.steps for s in resolved)
         slots = 1
@@ -131,6 +142,9 @@ class Group:
             nominal=nominal,
             estimator=estimator,
             surface=surface,
+            frictions=frictions,
+            sensor=sensor,
+            drive=drive,
             references=kinds,
             disturbances=tuple(kinds_of_all.elements()),
             feedforward=feedforward,
@@ -175,7 +189,7 @@ class Group:
 
     def _put(self, row: np.ndarray, name: str, values: Any) -> None:
         first = self.places.at[name]
-        row[first : first + np.size(values)] = values
+        row[first : first + np.size(values)] = np.ravel(values)
 
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
         pause, pause_samples = s.clock.pauses(s.control_period, s.physics_step)
@@ -209,10 +223,30 @@ class Group:
         for name, step in (("before", 0), ("after", max(s.jump_step, 0))):
             values = vars(s.plant.values(s.factors(step)))
             settings[name] = [values[parameter] for parameter in s.plant.parameters]
+        if self.form.drive:
+            settings["drives"] = [effect or DriveStep() for effect in s.drive_steps]
+        if self.form.sensor:
+            settings["hinges"] = [unit == "rad" for unit in s.plant.units]
+            settings["sensor"] = s.sensors[0].numbers(cast(Any, None))
         for name, values in settings.items():
             self._put(row, name, values)
+        self._fill_frictions(row, s)
         self._fill_gains(row, s.law)
         self._fill_signals(row, s)
+
+    def _fill_frictions(self, row: np.ndarray, s: Resolved) -> None:
+        for name, kind, value in (("levels", Coulomb, "level"), ("damping", Viscous, "b")):
+            for part in s.friction:
+                if isinstance(part, kind):
+                    places = self.places.at[name] + np.array(part.channels(s.plant))
+                    row[places] += getattr(part, value)
+        for j, part in enumerate(s.exact_parts):
+            first = self.places.at[f"friction {j}"]
+            size = 1 + len(part.names)
+            for place, i in enumerate(part.channels(s.plant)):
+                numbers = part.parameters(place) if isinstance(part, Sliding) else ()
+                row[first + size * i] = 1.0
+                row[first + size * i + 1 : first + size * i + 1 + len(numbers)] = numbers
 
     def _fill_gains(self, row: np.ndarray, law: Component) -> None:
         for i, part in enumerate(law.of_channels(self.form.driven)):

@@ -23,6 +23,7 @@ from smc_mujoco.analysis.engine.form import (
     PARAMETERS,
     STREAM,
     Form,
+    Part,
     measured_places,
     parameters,
     row_places,
@@ -34,6 +35,8 @@ from smc_mujoco.common.numba_internals import cgutils
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import head_at, measurement_at
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.hardware.drives import advanced, factors_at, kept_at
+from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
 from smc_mujoco.simulation.signals import after_pauses
@@ -52,13 +55,12 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
     disturb = _disturbing(form, compile_user)
     sample = _sampling(form, compile_user)
     advance = _advancing(form, disturb, compile_user)
+    keep = _keeping(form)
     record = _recording(form)
     n = form.n
     clock = form.clock
     size = work_at.size
-    X, V, D, SAMPLE_X, SAMPLE_V, SAMPLE_D = work_at.of(
-        "x", "v", "d", "sample_x", "sample_v", "sample_d"
-    )
+    X, V = work_at.of("x", "v")
     SAMPLES, STEPS, STEP, PERIOD, X0, V0 = row_places(form).of(
         "samples", "steps", "step", "period", "x0", "v0"
     )
@@ -88,10 +90,7 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
                 seen = k if within == 0 else -1
                 disturb(row, tables, work, k * row[PERIOD] + within * row[STEP], seen)
                 if within == 0:
-                    for i in range(n):
-                        work[SAMPLE_X + i] = work[X + i]
-                        work[SAMPLE_V + i] = work[V + i]
-                        work[SAMPLE_D + i] = work[D + i]
+                    keep(work)
                     if not clock or k == samples:
                         record(row, work, scores, log, k)
                 if k == samples:
@@ -298,6 +297,7 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
         else:
             errors.append(_signal(form, f"errors {i}", kind, compile_user))
     position_error, velocity_error = errors
+    read = _reading(form, compile_user)
     estimate = compile_user(form.estimator.function)
     gains = reader(form.estimator.names)
     memory = form.estimator.memory
@@ -317,6 +317,7 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
                 z = philox.normals(row[SEED], i, philox.MEASUREMENT, k)
                 x += row[SIGMA_X] * z[0]
                 v += row[SIGMA_V] * z[1]
+            x, v = read(row, work, i, k, x, v)
             state = view(work, MEMORY + i * memory, memory)
             found = _pair(estimate(Reading(row[PERIOD], x, v), gains(row, GAINS), state))
             work[SEEN_X + i] = x
@@ -324,6 +325,26 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
             work[SEEN_A + i] = found[1]
 
     return measure
+
+
+def _reading(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, work, i, k, x, v) -> what the sensor of channel i gives."""
+    sensor = form.sensor
+    if sensor is None:
+        return own(lambda row, work, i, k, x, v: (x, v))
+    read = compile_user(sensor.function)
+    numbers = reader(sensor.names)
+    memory = sensor.memory
+    HINGES, NUMBERS, SEED = row_places(form).of("hinges", "sensor", "seed")
+    MEMORY = work_places(form).at["sensor"]
+
+    @own
+    def reading(row, work, i, k, x, v):
+        chance = philox.uniform(row[SEED], i, philox.DROPOUT, k)
+        sight = Sight(x, v, float(k), row[HINGES + i], chance)
+        return read(sight, numbers(row, NUMBERS), view(work, MEMORY + i * memory, memory))
+
+    return reading
 
 
 def _law(form: Form, i: int, compile_user: Compiler) -> Any:
@@ -435,10 +456,13 @@ def _asking(form: Form, compile_user: Compiler) -> Any:
     with_partner = _replacing(("q", "dq", "fq", "gq"))
     nominal = compile_user(form.nominal.function)
     values = reader(form.nominal.names)
-    KNOWN, LIMITS, PERIOD, USES_MODEL = row_places(form).of(
-        "known", "limits", "period", "uses_model"
+    KNOWN, LIMITS, PERIOD, STEPS, USES_MODEL = row_places(form).of(
+        "known", "limits", "period", "steps", "uses_model"
     )
-    SEEN_X, SEEN_V, SEEN_A, D = work_places(form).of("seen_x", "seen_v", "seen_a", "d")
+    SEEN_X, SEEN_V, SEEN_A, D, REACTION = work_places(form).of(
+        "seen_x", "seen_v", "seen_a", "d", "reaction"
+    )
+    rubs = bool(form.frictions)
 
     @own
     def ask(row, tables, work, t, i):
@@ -448,7 +472,10 @@ def _asking(form: Form, compile_user: Compiler) -> Any:
         r, dr, ddr = refer(row, tables, work, t, i)
         f, g = nominal(xs, vs, i, known)
         if true_model:
-            f += work[D + i] * g
+            others = work[D + i]
+            if rubs:
+                others += work[REACTION + i] / row[STEPS]
+            f += others * g
         a = work[SEEN_A + i]
         if math.isnan(a):
             a = ddr
@@ -638,18 +665,104 @@ def _adding(form: Form, name: str, kind: Any, others: Any, compile_user: Compile
     return add
 
 
+def _driving(form: Form) -> Any:
+    """Return a compiled function (row, work, i, stage): the force of the drive of channel i, and
+    its mean over the step.
+    """
+    FACTORS = row_places(form).at["drives"]
+    V, APPLIED, MEAN, MOTOR, KEPT = work_places(form).of("v", "applied", "mean", "motor", "drives")
+
+    @own
+    def move(row, work, i, stage):
+        kept = kept_at(place(work) + 8 * KEPT, i)
+        if stage == 0:
+            factors = factors_at(place(row) + 8 * FACTORS, i)
+            work[MEAN + i] = advanced(factors, kept, work[APPLIED + i], work[V + i])
+        work[MOTOR + i] = work[MEAN + i]
+        if stage == 0:
+            work[MOTOR + i] -= kept.rise
+        elif stage == 3:
+            work[MOTOR + i] += kept.rise
+
+    return move
+
+
+def _rubbing(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, work, i, stage, step, f, at_rest, g) -> friction on channel
+    i, of f at its speed and at rest.
+    """
+    rub = own(lambda row, work, y, i: 0.0)
+    for j, part in reversed(list(enumerate(form.frictions))):
+        rub = _and_friction(form, j, part, rub, compile_user)
+    H, LEVELS, DAMPING = row_places(form).of("step", "levels", "damping")
+    X, V, APPLIED, MEAN, MOTOR, D, REACTION = work_places(form).of(
+        "x", "v", "applied", "mean", "motor", "d", "reaction"
+    )
+
+    @own
+    def friction(row, work, i, stage, step, f, at_rest, g):
+        drag = row[DAMPING + i] * work[V + i]
+        pushed = work[D + i]
+        y = JointState(
+            t=step * row[H],
+            h=row[H],
+            x=work[X + i],
+            v=work[V + i],
+            u=work[APPLIED + i],
+            motor=work[MOTOR + i],
+            load=at_rest / g + pushed,
+            stage=float(stage),
+            others=f / g - drag + pushed,
+            mean=work[MEAN + i],
+            level=row[LEVELS + i],
+            mobility=g,
+        )
+        force = rub(row, work, y, i)
+        work[REACTION + i] += force / (6.0 if stage % 3 == 0 else 3.0)
+        return force - drag
+
+    return friction
+
+
+def _and_friction(form: Form, j: int, part: Part, others: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, work, y, i) -> the force of friction j on channel i, and of
+    the others.
+    """
+    force = compile_user(part.function)
+    numbers = reader(part.names)
+    size = 1 + len(part.names)
+    memory = part.memory
+    FIRST = row_places(form).at[f"friction {j}"]
+    MEMORY = work_places(form).at[f"friction {j}"]
+
+    @own
+    def rub(row, work, y, i):
+        total = others(row, work, y, i)
+        at = FIRST + size * i
+        if row[at] != 0.0:
+            state = view(work, MEMORY + i * memory, memory)
+            total += force(y, numbers(row, at + 1), state)[0]
+        return total
+
+    return rub
+
+
 def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
     """Return a compiled function (row, tables, work, k, within, step): a physics step of RK4."""
     n = form.n
     driven = form.driven
     jump = form.jump
+    drive = form.drive
+    rubs = bool(form.frictions)
     disturbed = bool(form.disturbances)
     # a signal without memory is the same at the second stage and at the third
     remembers = any(kind.memory for kind in form.disturbances)
+    move = _driving(form)
+    friction = _rubbing(form, compile_user)
     nominal = compile_user(form.nominal.function)
     values = reader(form.nominal.names)
-    X, V, A, X0, V0, SUM_V, SUM_A, APPLIED, D = work_places(form).of(
-        "x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "d"
+    X, V, A, X0, V0, SUM_V, SUM_A, MOTOR, REST, D = work_places(form).of(
+        "x", "v", "a", "x0", "v0", "sum_v", "sum_a", "motor", "rest", "d"
     )
     STEP, PERIOD, JUMP_STEP, BEFORE, AFTER = row_places(form).of(
         "step", "period", "jump_step", "before", "after"
@@ -672,12 +785,19 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
             if disturbed and stage > 0 and (stage != 2 or remembers):
                 fraction = LAST_STAGE if stage == 3 else 0.5
                 disturb(row, tables, work, k * row[PERIOD] + (within + fraction) * h, -1)
+            if drive:
+                for i in range(driven):
+                    move(row, work, i, stage)
             for i in range(n):
                 f, g = nominal(xs, vs, i, p)
                 actuator = i
                 if i >= driven:  # it has none, and moves with that of this channel
                     actuator -= driven
-                work[A + i] = f + g * (work[APPLIED + actuator] + work[D + actuator])
+                force = work[MOTOR + actuator] + work[D + actuator]
+                if rubs:
+                    at_rest = nominal(xs, view(work, REST, n), i, p)[0]
+                    force += friction(row, work, i, stage, step, f, at_rest, g)
+                work[A + i] = f + g * force
             weight = 1.0 if stage % 3 == 0 else 2.0
             reach = h if stage == 2 else 0.5 * h
             for i in range(n):
@@ -692,6 +812,26 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
             vs[i] = work[V0 + i] + h / 6.0 * work[SUM_A + i]
 
     return advance
+
+
+def _keeping(form: Form) -> Any:
+    """Return a compiled function (work): keep the state of all channels at a sample."""
+    n = form.n
+    rubs = bool(form.frictions)
+    X, V, D, REACTION, SAMPLE_X, SAMPLE_V, SAMPLE_D = work_places(form).of(
+        "x", "v", "d", "reaction", "sample_x", "sample_v", "sample_d"
+    )
+
+    @own
+    def keep(work):
+        for i in range(n):
+            work[SAMPLE_X + i] = work[X + i]
+            work[SAMPLE_V + i] = work[V + i]
+            work[SAMPLE_D + i] = work[D + i]
+            if rubs:
+                work[REACTION + i] = 0.0
+
+    return keep
 
 
 def _recording(form: Form) -> Any:

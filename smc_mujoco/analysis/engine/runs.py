@@ -10,6 +10,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from smc_mujoco.analysis.engine import CHECKED
+from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.simulation import prepare
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
@@ -18,8 +19,9 @@ from smc_mujoco.simulation.trace import Trace, warn_of_broken
 if TYPE_CHECKING:
     from smc_mujoco.analysis.engine.form import Form
 
+MIN_WORK = 20_000_000  # physics steps times channels, about a minute of MuJoCo's: chosen
 Scored = tuple[list[float], float | None]  # metrics, and the time of a failure, s
-Report = Callable[[float], None]  # called with the physics steps since its last call
+Report = Callable[[int], None]  # called with the physics steps since its last call
 
 
 class Runs:
@@ -29,6 +31,10 @@ class Runs:
       formulas: name of a metric -> its value for a trace of MuJoCo's.
       device: of the fast engine.
       threads: as in `run`.
+      work: of all runs, physics steps times channels. With less than MIN_WORK on the processor all
+        are MuJoCo's, because compiling a law takes longer.
+      by_group: whether a formula is the worst of the groups of channels. With several groups all
+        runs are MuJoCo's.
     """
 
     def __init__(
@@ -36,12 +42,17 @@ class Runs:
         formulas: Mapping[str, Callable[[Trace], float]],
         device: str = "cpu",
         threads: int | None = None,
+        work: float = math.inf,
+        by_group: bool = False,
     ):
         self.formulas = formulas
         self.device = device
+        self.worth = device != "cpu" or work >= MIN_WORK
+        self.by_group = by_group
         self.threads = threads
         self.broken: dict[str, str] = {}  # law -> how it failed first, in a sentence
         self.forms: dict[Hashable, Form] = {}
+        self.compiles: dict[Hashable, bool] = {}
         self.random = random.Random(0)
         self.count = 0
         self.drawn: list[tuple[Scenario, Scored]] = []
@@ -59,7 +70,7 @@ class Runs:
             members.setdefault(group, []).append(i)
         for group, indices in members.items():
             some = [cases[i] for i in indices]
-            if group is None or prepare.why_not(some[0]):
+            if group is None:
                 scored = self.by_mujoco(some, report)
             else:
                 made = Group(some, tuple(self.formulas), self.forms.get(group))
@@ -73,9 +84,16 @@ class Runs:
 
     def covers(self, case: Scenario) -> bool:
         """Return whether the fast engine can run a scenario."""
-        from smc_mujoco.analysis.engine.group import why_not
+        from smc_mujoco.analysis.engine.group import key, why_not
 
-        return not why_not(case, tuple(self.formulas), self.device)
+        if not self.worth or (self.by_group and len(groups(case)) > 1):
+            return False
+        if why_not(case, tuple(self.formulas), self.device):
+            return False
+        functions = key(case), *map(type, case.resolved.disturbance)
+        if functions not in self.compiles:
+            self.compiles[functions] = not prepare.why_not(case)
+        return self.compiles[functions]
 
     def by_mujoco(
         self, cases: Sequence[Scenario], report: Report = lambda steps: None

@@ -30,10 +30,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
 from smc_mujoco.metrics.catalogue import CATALOGUE, arrived
 from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.simulation.trace import Trace
 
@@ -46,6 +48,7 @@ KNOT_DEVIATION = 0.5  # first standard deviation of a knot, over the bound; chos
 GENERATIONS = 4  # of an evolution, before the next one begins with the worst member so far; chosen
 FAILED_KEY = math.inf, math.inf
 SIGNS = 1.0, -1.0
+CONFIRMED = 8  # of the worst members, which MuJoCo runs after the fast engine; chosen
 # strategy -> signal that a relay sees
 RELAY_SIGNALS = {"sign of s": "s", "sign of e": "error", "sign of e'": "rate"}
 PHASE_LEADS = (-1.2, -0.6, 0.6, 1.2)  # rad, of weighted sums of e' and e before e'; chosen
@@ -71,6 +74,7 @@ class Tried(NamedTuple):
     member: Member
     key: tuple[float, float]  # its metric, then its rms error, which decides between equal metrics
     origin: int  # as in `Case`; a new member is its own origin
+    by_mujoco: bool = True
 
 
 class Search:
@@ -81,13 +85,14 @@ class Search:
         members: Members,
         metric: Metric,
         budget: int,
-        threads: int | None,
+        fast: Runs,
         report: Callable[[int], None],
     ):
         self.members = members
+        self.fast = fast
         self.metric = metric
         self.budget = budget
-        self.threads = threads
+        self.threads = fast.threads
         self.report = report
         self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
@@ -130,7 +135,13 @@ class Search:
         scenarios = []
         for case in cases:
             scenarios.append(self.members.scenario_of(case.member, case.relay))
-        for i, trace in stream(scenarios, self.threads, self.report):
+        scored = self._scored(cases, scenarios)
+        traced = [i for i in range(len(cases)) if i not in scored]
+        for i, key in scored.items():
+            member, _, origin = cases[i]
+            tried[i] = Tried(member, key, origin if origin >= 0 else first + i, False)
+        for k, trace in stream([scenarios[i] for i in traced], self.threads, self.report):
+            i = traced[k]
             member, relay, origin = cases[i]
             if relay:
                 swings = relay.rate > 0.0
@@ -155,18 +166,44 @@ class Search:
             return done + self.run(replays)
         return done
 
+    def _scored(
+        self, cases: Sequence[Case], scenarios: Sequence[Scenario]
+    ) -> dict[int, tuple[float, float]]:
+        """Return index -> key of the cases that the fast engine runs: whose trace nobody needs."""
+        found = {}
+        for i, case in enumerate(cases):
+            seen = case.relay or self.metric.command or not (self.members.forced or self.swing)
+            if not seen and self.fast.covers(scenarios[i]):
+                found[i] = FAILED_KEY
+        scores = self.fast.scored([scenarios[i] for i in found], self.report)
+        for i, (values, failed) in zip(found, scores, strict=True):
+            if failed is None:
+                found[i] = self._value(values[0]), values[-1]
+        return found
+
     def _key(self, trace: Trace) -> tuple[float, float]:
         if trace.failure is not None:
             self.broken = self.broken or trace.broken
             return FAILED_KEY
         groups = by_group(trace)
-        value = self.metric.worst(groups)
+        value = self._value(self.metric.worst(groups))
         error = CATALOGUE["rms_error"].worst(groups)
         if self.metric.command and not arrived(trace):
             value = math.inf
-        elif math.isnan(value):
-            value = self.metric.absent
         return value, error
+
+    def _value(self, value: float) -> float:
+        return self.metric.absent if math.isnan(value) else value
+
+    def confirm(self) -> None:
+        """Have MuJoCo run those of the worst members that it did not run."""
+        tried = self.tried
+        worst = sorted(range(len(tried)), key=lambda i: tried[i].key, reverse=True)[:CONFIRMED]
+        again = [i for i in worst if not tried[i].by_mujoco]
+        scenarios = [self.members.scenario_of(tried[i].member) for i in again]
+        for k, trace in stream(scenarios, self.threads):
+            i = again[k]
+            tried[i] = tried[i]._replace(key=self._key(trace), by_mujoco=True)
 
     def _simple(self) -> Iterator[list[Case]]:
         """Yield constant forces and relays, with the constants of the class in the middle of their

@@ -32,7 +32,6 @@ Bound = Annotated[
 Metric = Annotated[
     str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")
 ]
-Device = Annotated[str, typer.Option(help="Of the fast engine: cpu, or cuda for an NVIDIA card.")]
 QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
     "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
@@ -64,7 +63,7 @@ def tune(
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
-    device: Device = "cpu",
+    device: options.Device = "cpu",
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
@@ -128,7 +127,7 @@ def margins(
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
-    device: Device = "cpu",
+    device: options.Device = "cpu",
 ) -> None:
     """Find how much a law tolerates: the largest level at which the error still ends below 5 % of
     its start.
@@ -205,6 +204,7 @@ def worst(
     out: Annotated[Path | None, options.picture("the worst runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
+    device: options.Device = "cpu",
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of
     random seeds.
@@ -235,7 +235,8 @@ def worst(
     options.check_files(None, *files(out))
     cases = _attacked_cases(plant, law, condition, duration, gains)
     results = WorstCases(
-        worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases
+        worst_case(runs, metric, within, budget, seed, threads, progress=True, device=device)
+        for runs in cases
     )
     terminal.print(results)
     sources = {case.nominal.law.name: [case.nominal.law.source] for case in results}
@@ -266,6 +267,7 @@ def sensitivity(
     out: Annotated[Path | None, options.picture("the indices and the runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
+    device: options.Device = "cpu",
 ) -> None:
     """Find what breaks a law: how much of a score each uncertainty explains, and where runs fail.
 
@@ -292,7 +294,7 @@ def sensitivity(
     options.check_files(None, *files(out))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
-    found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
+    found = sensitivity(scenario, over, metric, points, seed, threads, True, device)
     terminal.print(found)
     runs = f"{found.runs} runs, {len(found.values)} of them independent"
     terminal.note(f"{runs}, gains: {scenario.law.source}", "dim", wrap=True)

@@ -50,6 +50,7 @@ def which(
     seed: Seed = 0,
     json: options.Json = None,
     threads: options.Threads = None,
+    device: options.Device = "cpu",
 ) -> None:
     """Recommend a law for a plant: which to use, with which gains, the second best, and how sure
     that is.
@@ -82,6 +83,7 @@ def which(
         defaults=defaults,
         relevant=relevant,
         seed=seed,
+        device=device,
     )
     terminal.print(advice)
     _finish(advice.table, out, terminal)
@@ -128,6 +130,7 @@ def compare(
     seed: Seed = 0,
     json: options.Json = None,
     threads: options.Threads = None,
+    device: options.Device = "cpu",
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is
     better, and how sure that is.
@@ -193,6 +196,7 @@ def compare(
         relevant=relevant,
         threads=threads,
         seed=seed,
+        device=device,
     )
     terminal.print(comparison)
     if latex:

@@ -85,7 +85,7 @@ class Encoder(OnJoints):
             x += p.bias
         if p.counts != 0.0:
             quantum = (2.0 * math.pi if y.hinge != 0.0 else 1.0) / p.counts
-            x = quantum * np.floor(x / quantum + 0.5)
+            x = quantum * math.floor(x / quantum + 0.5)
         if p.dropout != 0.0 and y.j > 0.0 and y.chance < p.dropout:
             return memory[0], memory[1]
         memory[0], memory[1] = x, y.v

@@ -323,12 +323,12 @@ def joint_ids(model: mujoco.MjModel) -> np.ndarray:
     return np.array(joints, int)
 
 
-@functools.lru_cache(maxsize=32)
 def driven_names(plant: Plant) -> tuple[str, ...]:
     """Return the names of the joints that have an actuator, (driven,)."""
     return joint_names(plant)[: plant.driven]
 
 
+@functools.lru_cache(maxsize=32)
 def joint_names(plant: Plant) -> tuple[str, ...]:
     """Return the name of each channel's joint, (n,)."""
     model = compiled(plant.spec())
