@@ -167,6 +167,8 @@ def _lock(
             at.qpos[joint.qposadr[0]] = model.qpos0[joint.qposadr[0]]
     mujoco.mj_kinematics(model, at)
     bodies = list(spec.bodies)  # in the order of the model; their ids are -1 before compilation
+    for i, body in enumerate(bodies):
+        body.name = body.name or f"body:{i}"
     _exclude(spec, model, bodies)
     for i, body in enumerate(bodies):
         loose = [joint for joint in body.joints if joint.name not in joints]
@@ -201,8 +203,6 @@ def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.Mjs
     """
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT.value:
         return
-    for i, body in enumerate(bodies):
-        body.name = body.name or f"body:{i}"
     known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
     weld = model.body_weldid
     above = weld[model.body_parentid[weld]]
@@ -215,7 +215,7 @@ def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.Mjs
 
 
 def _delete_orphans(spec: mujoco.MjSpec) -> None:
-    """Delete all keyframes, and what names a joint that is gone."""
+    """Delete all keyframes, what names a joint that is gone, and what ties bodies that are one."""
     left = {"", *(joint.name for joint in spec.joints)}
     kinds = mujoco.mjtEq
     orphans = [*spec.keys]
@@ -231,9 +231,25 @@ def _delete_orphans(spec: mujoco.MjSpec) -> None:
             orphans.append(actuator)
     for equality in spec.equalities:
         names = {equality.name1, equality.name2}
-        if (equality.type == kinds.mjEQ_JOINT and not names <= left) or (
-            equality.type == kinds.mjEQ_TENDON and names & gone
+        if (
+            (equality.type == kinds.mjEQ_JOINT and not names <= left)
+            or (equality.type == kinds.mjEQ_TENDON and names & gone)
+            or (equality.type in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and _tie_one(spec, equality))
         ):
             orphans.append(equality)
     for orphan in reversed(orphans):  # a tendon after what names it
         spec.delete(orphan)
+
+
+def _tie_one(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> bool:
+    """Return whether an equality ties two bodies that the same joints carry, or none."""
+    carriers = set()
+    for name in (equality.name1, equality.name2):
+        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
+            body = spec.site(name).parent
+        else:
+            body = spec.body(name or "world")
+        while body.name != "world" and not body.joints:
+            body = body.parent
+        carriers.add(body.name)
+    return len(carriers) == 1

@@ -255,6 +255,11 @@ def plant_from(
             f"{joined(map(repr, names))}: give others='held' (+held after the joints in a text), "
             "'locked', or 'file' if they should move freely"
         )
+    if others == "locked" and len(pairs) == 1 and made.load().neq:
+        doubts.append(
+            f"equality constraints of {source.label} tie joint {pairs[0][0]!r} to what is locked: "
+            "it moves only as they give way, so give others='held', or take them out of the file"
+        )
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return made

@@ -405,3 +405,29 @@ def test_joints_of_a_urdf_have_motors_where_it_bounds_their_force(tmp_path, effo
     trace = smc.run(smc.Scenario(plant=held, law="none", duration=0.5))
     assert held.load().nu == 1 + (effort > 0)
     assert (np.ptp(trace.x) < 1e-3) == (effort > 0)
+
+
+ROD = """<body pos="{x} 0 1"><joint name="{name}" axis="0 1 0"/><geom type="capsule" size=".02"
+ fromto="0 0 0 0 0 -.3" contype="0"/><body name="{name}" pos="0 0 -.3"><geom size=".03"/>
+<site name="{name}"/></body></body>"""
+RODS = [ROD.format(name=name, x=x) for x, name in enumerate("abc")]
+TIES = {
+    "bodies": '<connect body1="a" body2="b" anchor="0 0 0"/>',
+    "sites": '<connect site1="a" site2="b"/>',
+    "weld": '<weld body1="a" body2="b"/>',
+}
+
+
+@pytest.mark.parametrize("tie", TIES)
+def test_a_tie_of_what_is_locked_goes_and_one_to_it_is_told_with_a_cure(tie):
+    text = (
+        f"<mujoco><worldbody>{''.join(RODS)}</worldbody><equality>{TIES[tie]}</equality></mujoco>"
+    )
+    motor = smc.Channel(motor=True, u_max=5.0)
+    apart = smc.plant_from(text, {"c": motor}, others="locked")
+    assert apart.load().neq == 0
+    assert apart.unmodelled == ""
+    with pytest.warns(ScenarioWarning, match="tie joint 'a' to what is locked.*others='held'"):
+        tied = smc.plant_from(text, {"a": motor}, others="locked")
+    assert tied.load().neq == 1
+    smc.plant_from(text, {"a": motor}, others="held")
