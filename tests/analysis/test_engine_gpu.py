@@ -35,7 +35,10 @@ FULL = {
     "disturbance": (smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.1, 0.1)),
     "clock": smc.Clock(missed=0.1),
     "jump": smc.Jump(0.5, {"mass": 2.0}),
+    "actuator": smc.Lag(0.01),
+    "sensor": smc.Encoder(4096, dropout=0.1),
 }
+ALONE = ("duffing", "inverted_pendulum", "pendulum_network")  # whose joints move alone
 
 
 def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
@@ -54,7 +57,15 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
 @pytest.mark.slow
 @pytest.mark.parametrize(("plant", "law"), PLANTS)
 def test_every_plant_compiles_for_a_device_with_all_parts(monkeypatch, plant, law):
-    assert ".entry" in code(monkeypatch, plant, law, tuple(METRICS), **FULL)
+    friction = (smc.Coulomb(0.1), smc.Viscous(0.1)) if plant in ALONE else ()
+    assert ".entry" in code(monkeypatch, plant, law, tuple(METRICS), **FULL, friction=friction)
+
+
+@with_cuda
+@pytest.mark.slow
+def test_friction_by_a_formula_compiles_for_a_device(monkeypatch):
+    friction = smc.hardware.Sigmoid(0.4, 50.0)
+    assert ".entry" in code(monkeypatch, "duffing", "pid", **FULL, friction=friction)
 
 
 @with_cuda

@@ -23,7 +23,7 @@ from smc_mujoco.analysis.engine.form import (
 from smc_mujoco.analysis.engine.scores import METRICS, RESTING
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component, gain_at
-from smc_mujoco.mechanisms.hardware.drives import DriveStep, Lag, RateLimit
+from smc_mujoco.mechanisms.hardware.drives import DriveStep, Lag, RateLimit, Series
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.metrics.catalogue import TRANSIENT_SHARE
@@ -97,12 +97,21 @@ def _parts(s: Resolved) -> tuple:
     )
 
 
+def _drives(s: Resolved) -> np.ndarray:
+    """Return the DriveStep of every channel, (n, fields); 0 where the force is the command."""
+    factors = np.zeros((s.plant.n, len(DriveStep._fields)))
+    for part, _ in s.acting:
+        if isinstance(part, Series):
+            factors[list(part.of)] = part.effect
+    return factors
+
+
 def _fixed(s: Resolved) -> tuple:
     return (
         s.plant.n,
         s.plant.driven,
         s.law.joint,
-        any(s.drive_steps),
+        bool(_drives(s).any()),
         tuple(map(type, references(s))),
         None if s.feedforward is None else type(s.feedforward),
         tuple(None if error is None else type(error) for error in s.noise.errors),
@@ -224,7 +233,7 @@ class Group:
             values = vars(s.plant.values(s.factors(step)))
             settings[name] = [values[parameter] for parameter in s.plant.parameters]
         if self.form.drive:
-            settings["drives"] = [effect or DriveStep() for effect in s.drive_steps]
+            settings["drives"] = _drives(s)
         if self.form.sensor:
             settings["hinges"] = [unit == "rad" for unit in s.plant.units]
             settings["sensor"] = s.sensors[0].numbers(cast(Any, None))
