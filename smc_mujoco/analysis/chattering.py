@@ -19,13 +19,13 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.errors import ScenarioError, whole
+from smc_mujoco.common.kinds import Fields, Names, Pair
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
@@ -97,13 +97,13 @@ class Chattering:
     threshold_x: float = 0.0
     # of s over its first; if large, the prediction is rough; NaN for two samples
     third_harmonic: float = math.nan
-    amplitude_range: tuple[float, float] = (math.nan, math.nan)
-    frequency_range: tuple[float, float] = (math.nan, math.nan)  # Hz
+    amplitude_range: Pair = (math.nan, math.nan)
+    frequency_range: Pair = (math.nan, math.nan)  # Hz
     # amplitude of another driven channel's x over amplitude_x; if large, prediction fails
     coupling: float = math.nan
     gain: complex = complex(math.nan)  # N at the cycle
     response: complex = complex(math.nan)  # L at the cycle
-    assumptions: tuple[str, ...] = ()  # what was left out or is doubtful
+    assumptions: Names = ()  # what was left out or is doubtful
 
     def __bool__(self) -> bool:
         return not math.isnan(self.frequency)
@@ -191,7 +191,7 @@ def switches(loop: Loop) -> bool:
     return smaller > MIN_GAIN_GROWTH * small
 
 
-def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
+def _locked_ranges(loop: Loop, assumptions: Names) -> Chattering:
     """Return the ranges of a cycle of a law that switches, locked to the samples.
 
     It then switches at most half a control period later than on average: the cycle with that delay
@@ -440,7 +440,7 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
 
 
 def _prediction(
-    loop: Loop, balance: Balance, threshold: float, assumptions: tuple[str, ...], ranges: bool
+    loop: Loop, balance: Balance, threshold: float, assumptions: Names, ranges: bool
 ) -> Chattering:
     """Return a limit cycle with its numbers; `balance` is the cycle in which e is a sine."""
     sine = loop.wave(*balance)
@@ -506,9 +506,9 @@ def _assumptions(loop: Loop) -> Iterator[str]:
 def rows(
     scenarios: Sequence[Scenario],
     cycles: Sequence[Chattering],
-    measured: Sequence[tuple[float, float]],
+    measured: Sequence[Pair],
     changes: Sequence[StepChange],
-) -> list[dict[str, Any]]:
+) -> list[Fields]:
     """Return predicted cycles of scenarios, measured amplitudes of s and frequencies, and their
     changes, as JSON data.
     """

@@ -22,6 +22,7 @@ import numpy as np
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
+from smc_mujoco.common.kinds import ArrayPair, Floats, Pair
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
@@ -164,7 +165,7 @@ class Loop:
             self.nv = model.nv
             self.gap = self._joint_gap(gear, model, data) if gear else 0.0
 
-    def _nominal_model(self, joint: int) -> tuple[float, ...]:
+    def _nominal_model(self, joint: int) -> Floats:
         """Return nominal f and g of a joint at rest, and the derivatives of f with its x and v."""
         plant = self.scenario.resolved.plant
         zeros = np.zeros(plant.n)
@@ -219,7 +220,7 @@ class Loop:
         _, sliding = self._controlled(s.control_period, [x, np.zeros(len(x))])
         return float(np.abs(sliding).max())
 
-    def _controlled(self, h: float, motion: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _controlled(self, h: float, motion: list[np.ndarray]) -> ArrayPair:
         """Return u and s for x and v of the channel, and of the joint that it moves, every h
         seconds.
         """
@@ -238,7 +239,7 @@ class Loop:
             _first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega
         )
 
-    def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
+    def phases(self, amplitude: float, omega: float) -> Pair:
         """Return the lowest and highest phase of a locked cycle's gain relative to `gain`, rad: one
         <= 0, one >= 0.
 
@@ -399,8 +400,8 @@ class Controller:
         self,
         fixed: Mapping[int, float],
         motion: Sequence[np.ndarray],
-        models: Sequence[tuple[float, ...]],
-    ) -> tuple[np.ndarray, np.ndarray]:
+        models: Sequence[Floats],
+    ) -> ArrayPair:
         """Return u and s, each (K,), for the samples of a motion, with memories as at the start of
         a run.
 
@@ -436,7 +437,7 @@ class Controller:
 
 def transition(
     model: mujoco.MjModel, data: mujoco.MjData, actuator: Sequence[Actuator]
-) -> tuple[np.ndarray, np.ndarray]:
+) -> ArrayPair:
     """Return A (n, n) and B (n, nu) of a physics step at `data`, without any integrator's error."""
     from scipy.linalg import expm
 

@@ -31,6 +31,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Finite, Natural, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import ArrayPair, Pair
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
@@ -105,7 +106,7 @@ def linear(plant: Plant) -> Linear:
     )
 
 
-def linear_gains(law: Law) -> tuple[float, float] | None:
+def linear_gains(law: Law) -> Pair | None:
     """Return lam and k1 of u = -lam (e' + k1 e), the law near s = 0; None if it is not linear
     there.
     """
@@ -116,7 +117,7 @@ def linear_gains(law: Law) -> tuple[float, float] | None:
 
 
 @functools.lru_cache(maxsize=1024)
-def sampled_mode(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
+def sampled_mode(at: Linear, stiffness: float, h: float) -> ArrayPair:
     """Return E (2, 2) and Gamma (2,) of a mode sampled with period h: z+ = z + E z + Gamma u, z =
     (x, x').
 

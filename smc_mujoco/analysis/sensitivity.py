@@ -17,6 +17,7 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import LEVEL, Interval, share_interval
 from smc_mujoco.analysis.worst_case.uncertainty import Constant, Member, Members, Uncertainty
 from smc_mujoco.common.constraints import MAX_SEED
+from smc_mujoco.common.kinds import ArrayPair, Pair
 from smc_mujoco.simulation.scenario import Scenario
 
 RESAMPLES = 499  # of a bootstrap: chosen
@@ -174,9 +175,7 @@ def designs(points: int, k: int, seed: int) -> np.ndarray:
     return np.concatenate([a, b, *mixed])
 
 
-def estimates(
-    f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:  # scipy's
+def estimates(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> ArrayPair:  # scipy's
     """Return the first-order and total indices of outputs, (s, k) each; (s, n) at A and at B, (k,
     s, n) mixed.
 
@@ -357,7 +356,7 @@ def improvement(
         if name != CHANCE:
             halves += [Cut(i, high=0.5), Cut(i, low=0.5), Cut(i, 0.25, 0.75)]
 
-    def rank(cut: Cut) -> tuple[float, float]:
+    def rank(cut: Cut) -> Pair:
         inside = _within([cut], shares[:half])
         return float(failed[:half][inside].mean()), float(np.median(values[:half][inside]))
 

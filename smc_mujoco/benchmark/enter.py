@@ -14,9 +14,9 @@ import hashlib
 import os
 import platform
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from smc_mujoco.benchmark import entry as entries
 from smc_mujoco.benchmark import runs, suite
@@ -26,6 +26,7 @@ from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
+from smc_mujoco.common.kinds import AnyPath, Data, Fields
 from smc_mujoco.common.version import versions
 
 START_TIME = 120.0  # s, for imports and compilation; chosen
@@ -38,10 +39,10 @@ PARTS = "parts"
 
 @constrained
 def enter(
-    folder: str | os.PathLike[str],
+    folder: AnyPath,
     name: str = "smc-30@1",
     seed: int = 0,
-    out: Annotated[str | os.PathLike[str], FilePath()] = "results",
+    out: Annotated[AnyPath, FilePath()] = "results",
     instances: int | None = None,
     verify: bool = False,
 ) -> Path:
@@ -108,13 +109,13 @@ def made_under(problems: Sequence[str]) -> dict[str, str]:
 
 
 def _isolated(
-    folder: str | os.PathLike[str],
+    folder: AnyPath,
     problems: Sequence[Problem],
     instances: int,
     seed: int,
     table: Path,
     parts: Path,
-) -> dict[str, Any]:
+) -> Fields:
     """Run an entry in another process, which keeps the runs of each problem, and writes the table
     at the end; return its report.
     """
@@ -138,7 +139,7 @@ def _isolated(
         ) from failed
 
 
-def worker(job: Mapping[str, Any], report: Callable[[str], None]) -> dict[str, Any]:
+def worker(job: Data, report: Callable[[str], None]) -> Fields:
     """Run an entry in this process as a job says, and write its rows.
 
     Return how runs failed, and the law's time a sample, see `law_time`.

@@ -24,10 +24,10 @@ import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
+from smc_mujoco.common.kinds import AnyPath, Data, Fields, Names, Numbers
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.from_text import law as law_of
 from smc_mujoco.control.law import Law, known_laws
@@ -60,11 +60,11 @@ class Entry:
     """
 
     name: str
-    authors: tuple[str, ...]
+    authors: Names
     source: str
     licence: str
     division: str
-    gains: Mapping[str, Mapping[str, float]]
+    gains: Mapping[str, Numbers]
     file: Path | None
     digest: str
 
@@ -79,14 +79,14 @@ class Entry:
         return law_of(str(self.file), **gains).named(self.name)
 
     @property
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Fields:
         """The entry as plain data, for its result."""
         fields = dataclasses.asdict(self)
         del fields["file"]
         return fields
 
 
-def read(folder: str | os.PathLike[str]) -> Entry:
+def read(folder: AnyPath) -> Entry:
     """Return the entry in a folder, without running its code; or that of a law of the library.
 
     Raises:
@@ -135,11 +135,11 @@ def _of_library(name: str) -> Entry:
     )
 
 
-def _fields(about: Mapping[str, Any]) -> dict[str, Any]:
+def _fields(about: Data) -> Fields:
     """Return the fields of an Entry that a file about it gives."""
     for name in about:
         find("line of entry.toml", name, dict.fromkeys((*TEXTS, "authors", "gains")))
-    fields: dict[str, Any] = {name: _text(name, about.get(name)) for name in TEXTS}
+    fields: Fields = {name: _text(name, about.get(name)) for name in TEXTS}
     find("division", fields["division"], DIVISIONS)
     authors = about.get("authors")
     if not isinstance(authors, list) or not authors:
@@ -156,7 +156,7 @@ def _text(name: str, value: object) -> str:
     return value.strip()
 
 
-def _gains(sets: object, division: str) -> Mapping[str, Mapping[str, float]]:
+def _gains(sets: object, division: str) -> Mapping[str, Numbers]:
     """Return plant -> gain -> value, as a division allows them."""
     if division == "one set":
         known = (EVERYWHERE,)

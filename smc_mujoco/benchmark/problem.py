@@ -15,13 +15,14 @@ import hashlib
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
+from smc_mujoco.common.kinds import Data, Floats, Names, Numbers
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law, known_laws
@@ -72,7 +73,7 @@ class Problem:
     rules: str
 
     @functools.cached_property
-    def _values(self) -> Mapping[str, Any]:
+    def _values(self) -> Data:
         """The rules' values for the plant and the condition."""
         of = rules(self.version)
         of_plant = of["more"].get(self.plant, {}) | of.get("special", {}).get(self.plant, {})
@@ -84,7 +85,7 @@ class Problem:
         return self.condition in _attacks(self.version)
 
     @functools.cached_property
-    def _frozen(self) -> Mapping[str, Any]:
+    def _frozen(self) -> Data:
         """The levels of each measure, and the oracle's numbers; {} before they are frozen."""
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
 
@@ -109,7 +110,7 @@ class Problem:
         return self._values["budget"] if self._attacked else 1
 
     @property
-    def targets(self) -> dict[str, tuple[float, ...]]:
+    def targets(self) -> dict[str, Floats]:
         """Measure -> the levels that laws are to reach, the hardest first."""
         return {name: tuple(self._frozen[name]) for name in MEASURES if self._frozen}
 
@@ -241,9 +242,7 @@ class Problem:
         }
         return values | self._times(trace, worst, values)
 
-    def _times(
-        self, trace: Trace, worst: np.ndarray, values: Mapping[str, float]
-    ) -> dict[str, float]:
+    def _times(self, trace: Trace, worst: np.ndarray, values: Numbers) -> dict[str, float]:
         """Return the time of each target, by name."""
         reached = [_kept(trace, worst, level) for level in self.targets.get("accuracy", ())]
         times = dict(zip(self._names(), map(_or_never, reached), strict=False))
@@ -318,12 +317,12 @@ def cells(version: int) -> list[str]:
     return listed
 
 
-def _attacks(version: int) -> Mapping[str, Any]:
+def _attacks(version: int) -> Data:
     """Return the conditions in which an adversary chooses the runs of each law."""
     return rules(version).get("worst", {}).get("conditions", {})
 
 
-def versions() -> tuple[str, ...]:
+def versions() -> Names:
     """List the versions of the rules."""
     return tuple(sorted((path.stem for path in RULES.glob("*.toml")), key=int))
 
@@ -334,7 +333,7 @@ def _text(version: int) -> str:
 
 
 @functools.cache
-def rules(version: int) -> Mapping[str, Any]:
+def rules(version: int) -> Data:
     """Return the rules of a version."""
     return tomllib.loads(_text(version))
 

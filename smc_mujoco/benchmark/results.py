@@ -28,6 +28,7 @@ from smc_mujoco.benchmark.enter import RESULT, TABLE
 from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
+from smc_mujoco.common.kinds import AnyPath, ArrayPair, Data, Fields, Names, Numbers
 
 MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 TITLES = {
@@ -69,7 +70,7 @@ OF_ENTRY = {
 HASHES = {"table": str, "rules": str, "suite": str}
 
 
-def _check(values: Any, fields: Mapping[str, Any]) -> None:
+def _check(values: Any, fields: Data) -> None:
     """Raise ScenarioError unless values are a mapping with fields of these types."""
     if not isinstance(values, dict):
         raise ScenarioError(f"it has {shown(values)} where names and values are")
@@ -96,7 +97,7 @@ class Board:
     """A question and the entries' places."""
 
     question: str
-    problems: tuple[str, ...]
+    problems: Names
     standings: tuple[Standing, ...]
 
     def __str__(self) -> str:
@@ -119,7 +120,7 @@ class Result:
         self.folder = folder
         self.table = folder / TABLE
         with reading(folder / RESULT, "result", CURE) as file:
-            self.about: dict[str, Any] = read_json(file)
+            self.about: Fields = read_json(file)
             _check(self.about, ABOUT)
             _check(self.about["entry"], OF_ENTRY)
             _check(self.about["hashes"], HASHES)
@@ -245,7 +246,7 @@ class Results:
         return standings
 
     @functools.cache  # noqa: B019 (results live as long as their process)
-    def curve(self, entry: str, question: str) -> tuple[np.ndarray, np.ndarray]:
+    def curve(self, entry: str, question: str) -> ArrayPair:
         """Return times, s, and the share of a board's targets that are reached by then and kept,
         (MOMENTS,) each.
         """
@@ -289,7 +290,7 @@ class Change:
 
     entry: str
     question: str
-    ratios: Mapping[str, float]
+    ratios: Numbers
 
     @property
     def worse(self) -> list[str]:
@@ -325,7 +326,7 @@ class Changes:
         return "\n".join(map(str, self.changes)) or "no entry is in both"
 
 
-def results(source: str | os.PathLike[str] = "smc-30@1", seed: int = 0) -> Results:
+def results(source: AnyPath = "smc-30@1", seed: int = 0) -> Results:
     """Return the results on a suite.
 
     Args:

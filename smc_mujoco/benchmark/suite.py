@@ -9,17 +9,18 @@ from pathlib import Path
 
 from smc_mujoco.benchmark.problem import problem, rules
 from smc_mujoco.common.errors import find
+from smc_mujoco.common.kinds import Names
 
 SUITES = Path(__file__).parent / "suites"
 PERIOD = 5  # of the pattern
 
 
-def suites() -> tuple[str, ...]:
+def suites() -> Names:
     """List the names of the suites."""
     return tuple(sorted(path.stem for path in SUITES.glob("*.txt")))
 
 
-def suite(name: str) -> tuple[str, ...]:
+def suite(name: str) -> Names:
     """Return the IDs of a suite's problems. Raise ScenarioError for an unknown name."""
     find("suite", name, dict.fromkeys(suites()))
     lines = (SUITES / f"{name}.txt").read_text(encoding="utf-8").splitlines()
@@ -31,7 +32,7 @@ def folder(name: str, seed: int) -> str:
     return f"{name}-seed-{seed}" if seed else name
 
 
-def boards(name: str) -> tuple[str, ...]:
+def boards(name: str) -> Names:
     """Return the questions that a problem informs, of "forces", "sensors", "speed" and "calm"."""
     one = problem(name)
     informed = []
@@ -41,7 +42,7 @@ def boards(name: str) -> tuple[str, ...]:
     return tuple(informed)
 
 
-def pattern(version: int, share: int) -> tuple[str, ...]:
+def pattern(version: int, share: int) -> Names:
     """Return the IDs that the pattern of a version chooses, `share` of 5 of its plants and
     conditions.
     """

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.kinds import AnyPath
 
 MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
@@ -71,7 +72,7 @@ def as_path(path: object, what: str = "the path") -> Path:
     return named
 
 
-def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
+def with_ending(path: AnyPath, *endings: str) -> Path:
     """Return the path if its name ends in one of `endings`, such as ".json"; raise ScenarioError
     otherwise.
     """
@@ -81,7 +82,7 @@ def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
     return path
 
 
-def writable(*paths: str | os.PathLike[str] | None) -> None:
+def writable(*paths: AnyPath | None) -> None:
     """Raise ScenarioError for a file that cannot be written.
 
     Call it before a computation that takes minutes.
@@ -139,7 +140,7 @@ def scratch() -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path]:
+def reading(path: AnyPath, kind: str, cure: str) -> Iterator[Path]:
     """Turn an exception in the with block, which reads a file, into one sentence.
 
     Yield the path.
@@ -180,7 +181,7 @@ def _bounded(file: Path) -> None:
         )
 
 
-def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
+def csv_rows(path: AnyPath) -> list[tuple[int, list[str]]]:
     """Return line number and cells of each row.
 
     If semicolons separate the cells, a comma is a decimal point.

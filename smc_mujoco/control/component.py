@@ -22,6 +22,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Each, Number, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data, Names, Pair
 from smc_mujoco.control.outer_law import on_computed_torque
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
@@ -38,7 +39,7 @@ class Rest(NamedTuple):
     """The linear part of a law that is linear near s = 0."""
 
     # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
-    linear: Callable[[SimpleNamespace], tuple[float, float]]
+    linear: Callable[[SimpleNamespace], Pair]
     force: Callable  # (gains, errors at rest, (k,)) -> the force towards 0 at each, (k,)
 
 
@@ -80,15 +81,15 @@ class Component:
 
     kind: str
     name: str
-    gains: Mapping[str, Any]  # name -> GainValue
+    gains: Data  # name -> GainValue
     memory: int  # floats per channel
     # None if a loaded trace names one that is not available, and if there is `each`
     function: Callable | None
     relative_degree: int = 1
-    plants: tuple[str, ...] = ()
+    plants: Names = ()
     requires_model: bool = False
     joint: bool = False  # whether it is a law of many joints
-    shared: tuple[str, ...] = ()  # gains that are one number for all joints in a law of many joints
+    shared: Names = ()  # gains that are one number for all joints in a law of many joints
     each: "tuple[Component, ...]" = ()  # the laws of the driven channels if they are different laws
     # None if not available
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
@@ -246,7 +247,7 @@ class Template:
     relative_degree: int = 1  # of the sliding variable that a law needs, or that a surface gives
     conditions: GainConditions = dataclasses.field(default_factory=dict)
     advice: GainConditions = dataclasses.field(default_factory=dict)
-    plants: tuple[str, ...] = ()  # empty for all plants
+    plants: Names = ()  # empty for all plants
     requires_model: bool = False
     label: str = ""  # this and the next two: "" means automatic, see `smc_mujoco.draw.style`
     short: str = ""

@@ -20,11 +20,12 @@ import functools
 import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
+from smc_mujoco.common.kinds import Data, Floats, Names, Numbers
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
@@ -109,7 +110,7 @@ def law(
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
-def general() -> tuple[str, ...]:
+def general() -> Names:
     """List every law that can be compared on some plant: those of COMPARED, then all others by
     name.
     """
@@ -150,9 +151,9 @@ def in_set(plant: Plant, name: str, gains: str) -> bool:
 class TunedGains:
     """The gains of a law on a plant, and the searches that found them."""
 
-    sets: tuple[Mapping[str, float], ...]  # each name -> value; of each search, in order
+    sets: tuple[Numbers, ...]  # each name -> value; of each search, in order
     # J of each, s^2, see `analysis.tuning.objective`; each search has its own runs
-    objectives: tuple[float, ...]
+    objectives: Floats
     evaluations: int  # number of sets of gains that the searches evaluated
     seed: int
     rule: str  # the search, in words
@@ -163,7 +164,7 @@ class TunedGains:
         return min(self.objectives)
 
     @property
-    def best(self) -> Mapping[str, float]:
+    def best(self) -> Numbers:
         """The gains with the least J."""
         return self.sets[self.objectives.index(self.objective)]
 
@@ -236,7 +237,7 @@ def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     }
 
 
-def _from_record(record: Mapping[str, Any], rule: str) -> TunedGains:
+def _from_record(record: Data, rule: str) -> TunedGains:
     """Return the gains that `Tuned.record` described."""
     return TunedGains(
         sets=tuple(dict(zip(record["gains"], values, strict=True)) for values in record["sets"]),

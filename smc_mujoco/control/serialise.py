@@ -1,11 +1,10 @@
 """A component as JSON data and back."""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
 
 from smc_mujoco.common import annexes
 from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.kinds import Data, Fields
 from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws
@@ -13,7 +12,7 @@ from smc_mujoco.control.law import known_laws
 ANNEXES = ("evidence", "benchmark")  # with laws that are not in the catalogue, as those of rigs
 
 
-def describe(c: Component) -> dict[str, Any]:
+def describe(c: Component) -> Fields:
     """Return a component as plain data that JSON represents without loss."""
     if c.each:
         return {"name": c.name, "each": [describe(law) for law in c.each]}
@@ -26,7 +25,7 @@ def describe(c: Component) -> dict[str, Any]:
     }
 
 
-def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
+def law(data: Data, source: Data | None) -> Component:
     """Return the law that `describe` wrote, with the source of its gains: the user, if none is
     given.
     """
@@ -40,7 +39,7 @@ def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
     return dataclasses.replace(made, source=restored)
 
 
-def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> Component:
+def restore(data: Data, kind: str, known: Catalogue[Template]) -> Component:
     """Return the component that `describe` wrote, without its function if that is not among the
     known ones.
     """

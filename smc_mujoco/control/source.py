@@ -10,10 +10,10 @@ A source belongs to one set of gains. A law whose gains are replaced has the sou
 import dataclasses
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data, Fields
 from smc_mujoco.common.text import joined
 
 NONE = "none"
@@ -72,7 +72,7 @@ class Source:
     """Where a set of gains comes from."""
 
     kind: str = NONE  # one of KINDS
-    gains: Mapping[str, Any] = dataclasses.field(default=frozen({}), repr=False)  # the set
+    gains: Data = dataclasses.field(default=frozen({}), repr=False)  # the set
     search: Search | None = None  # the search that the gains are the result of
     outside: bool = False  # whether the gains miss a condition of their law's theorem
 
@@ -91,16 +91,16 @@ class Source:
             return self.kind + MARK
         return self.kind
 
-    def with_gains(self, gains: Mapping[str, Any]) -> "Source":
+    def with_gains(self, gains: Data) -> "Source":
         """Return this source for another set of gains."""
         return dataclasses.replace(self, gains=gains, outside=False)
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Fields:
         """Return it as plain data. The gains are with the law."""
         return {"kind": self.words, "search": self.search and dataclasses.asdict(self.search)}
 
 
-def restore(data: Mapping[str, Any]) -> Source:
+def restore(data: Data) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
     kind = data["kind"].removesuffix(MARK)
     search = data["search"] and Search(**data["search"])

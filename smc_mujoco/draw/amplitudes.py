@@ -9,9 +9,7 @@ the dot is hollow.
 """
 
 import math
-import os
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,6 +18,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
+from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.limit_cycle import channel_cycle
@@ -51,7 +50,7 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
 
 def amplitudes(
     traces: Mapping[str, Mapping[str, Trace]],
-    path: str | os.PathLike[str] | None = None,
+    path: AnyPath | None = None,
     title: str = "Chattering",
 ) -> Figure:
     """Draw the amplitude of s of the first channel over the actuator's lag, predicted and run.
@@ -90,7 +89,7 @@ def amplitudes(
             predicted.append((lags, sizes))
             ax.plot(lags, sizes, color=colour, lw=style.points(2.0))
             for at, size, change in zip(lags, swings, step_halving(its, 0), strict=True):
-                look: dict[str, Any] = {"color": colour, "mec": style.PAPER}
+                look: Fields = {"color": colour, "mec": style.PAPER}
                 if change.marked:
                     look = {"color": style.PAPER, "mec": colour}
                 ax.plot(at, size, "o", ms=style.points(7.0), **look)

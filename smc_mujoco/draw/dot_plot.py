@@ -1,9 +1,7 @@
 """Dot plots of a study: the median of each law with its interval, by condition."""
 
 import itertools
-import os
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +22,7 @@ from smc_mujoco.analysis.paired_runs import (
 )
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
+from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -34,13 +33,13 @@ from smc_mujoco.simulation.trace import Trace
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
 Cell = tuple[str, str, str, str]  # metric, plant, condition, law
 MIN_SIZE = 1e-9  # smaller sizes are drawn at it
-RING: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": style.INK}  # around a winner
+RING: Fields = {"marker": "o", "mfc": "none", "mec": style.INK}  # around a winner
 LINE_HEIGHT = 0.18  # inches on a full page, height of a law's line
 
 
 def plot(
     table: Columns,
-    path: str | os.PathLike[str] | None = None,
+    path: AnyPath | None = None,
     metrics: Sequence[str] = METRICS,
     title: str | None = None,
     size: Size = None,
@@ -157,7 +156,7 @@ def _key(
     """
     known = sources(table)
     key: list[Handle] = []
-    line: dict[str, Any] = {"lw": style.points(1.5)}
+    line: Fields = {"lw": style.points(1.5)}
     gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])
     for (law, look), source in zip(looks.items(), gains, strict=True):
         label = style.law_name(law) + source
@@ -211,7 +210,7 @@ def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> No
     """Draw a median with its interval. An infinite median is at the right edge."""
     median, low, high = interval[:3]
     color = look["color"]
-    mark: dict[str, Any] = {**look, "ms": style.points(6)}
+    mark: Fields = {**look, "ms": style.points(6)}
     if median == MIN_SIZE:
         mark["marker"] = "<"
     if np.isfinite(median):

@@ -1,6 +1,5 @@
 """Figures: x, u and s of several runs over time with their phase portrait."""
 
-import os
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.errors import ScenarioError, find, items_of
+from smc_mujoco.common.kinds import AnyPath, Pair
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -53,12 +53,12 @@ class Runs(NamedTuple):
     names: Sequence[str]
     colours: Sequence[str]
     changes: Mapping[float, str]
-    span: tuple[float, float]
+    span: Pair
 
 
 def figure(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike[str] | None = None,
+    path: AnyPath | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     panels: Sequence[str] | None = None,

@@ -10,7 +10,7 @@ pixels.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from smc_mujoco.common.kinds import ArrayPair, Data, Fields, Pair
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
@@ -348,7 +349,7 @@ def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
     return words
 
 
-def curve(trace: Trace, y: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+def curve(trace: Trace, y: np.ndarray, name: str) -> ArrayPair:
     """Return the line of a quantity y (K+1,): times in s, and values.
 
     A short trace is not smoothed.
@@ -477,7 +478,7 @@ def over_time(
         end = trace.t[-1] + trace.scenario.control_period
         if trace.diverged_at is not None and end > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
-            ending: dict[str, Any] = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
+            ending: Fields = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
             artists += ax.plot(trace.t[-1], last, "X", **ending)
     if names and (name in SINGLE or len(panel.group.channels) == 1):
         lines = [(trace.t, y) for trace, y in zip(traces, means, strict=True)]
@@ -490,9 +491,7 @@ def steps(trace: Trace, name: str) -> str:
     return "steps-post" if name == "u" and not smoothed(trace) else "default"
 
 
-def channels(
-    ax: Axes, trace: Trace, y: np.ndarray, name: str, look: Mapping[str, Any]
-) -> list[Artist]:
+def channels(ax: Axes, trace: Trace, y: np.ndarray, name: str, look: Data) -> list[Artist]:
     """Draw the channels of y, (K+1, n), one by one, the slowest x thick."""
     artists: list[Artist] = []
     slowest = -1
@@ -513,7 +512,7 @@ def set_numbers(axis: Axis, panel: Panel) -> None:
         )
 
 
-def cross() -> dict[str, Any]:
+def cross() -> Fields:
     """Return the look of the mark at the end of a failed run."""
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
 
@@ -522,9 +521,7 @@ Line = tuple[np.ndarray, np.ndarray]  # times and values
 Agreement = tuple[list[int], float]  # of these lines, until a time, s; inf where they never part
 
 
-def agreements(
-    lines: Sequence[Line], limits: tuple[float, float], logarithmic: bool = False
-) -> list[Agreement]:
+def agreements(lines: Sequence[Line], limits: Pair, logarithmic: bool = False) -> list[Agreement]:
     """Return until when all lines agree in a panel of these limits, and which of them never
     part.
     """
@@ -546,7 +543,7 @@ def agreements(
     return found
 
 
-def _parting(one: Line, other: Line, limits: tuple[float, float], logarithmic: bool) -> float:
+def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     """Return until when, s, two lines coincide in a panel, but for a small share of their points,
     and have equal peaks, upwards and downwards.
     """
@@ -596,7 +593,7 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     low, high = axis.transform(np.array(ax.get_ylim()))
     ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
     place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
-    look: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
+    look: Fields = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
     look["bbox"] = {"fc": style.PAPER, "ec": "none", "pad": 0.1 * size}  # hides lines of times
     ax.annotate(fitting[0], (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
 
@@ -806,13 +803,13 @@ def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:
     return [y for y in values if np.isfinite(y).all()]
 
 
-def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
+def span(traces: Sequence[Trace], name: str) -> Pair:
     """Return the least and largest value of the runs that last."""
     values = np.concatenate([np.ravel(y) for y in lasting(traces, name)] or [np.zeros(1)])
     return float(values.min()), float(values.max())
 
 
-def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
+def limits(traces: Sequence[Trace], name: str) -> Pair:
     """Return the vertical range for a quantity: its span with the reference (zero for an error),
     and a margin.
     """

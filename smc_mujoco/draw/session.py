@@ -11,12 +11,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from pprint import pformat
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import Fields
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.gain_sets import law as law_with_gains
 from smc_mujoco.control.law import Law, laws
@@ -53,7 +54,7 @@ class Slider(NamedTuple):
     value: float
     low: float
     high: float
-    fields: Callable[[Scenario, float], dict[str, Any]]  # what a scenario with another value has
+    fields: Callable[[Scenario, float], Fields]  # what a scenario with another value has
 
     def changed(self, scenario: Scenario, value: float) -> Scenario:
         """Return the scenario with another number."""
@@ -243,7 +244,7 @@ def gain_sliders(law: Law) -> dict[str, Slider]:
     for 0.
     """
 
-    def fields(name: str) -> Callable[[Scenario, float], dict[str, Any]]:
+    def fields(name: str) -> Callable[[Scenario, float], Fields]:
         return lambda s, gain: {
             "law": dataclasses.replace(s.law, gains={**s.law.gains, name: gain})
         }

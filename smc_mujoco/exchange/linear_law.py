@@ -21,6 +21,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.kinds import Floats, Names
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.control.written import Matrix, WrittenLaw, state_feedback
@@ -53,9 +54,9 @@ class LinearLaw(WrittenLaw):
 
     a: Matrix  # in real Schur form if the controller is of continuous time
     b: Matrix
-    c: tuple[float, ...]
-    d: tuple[float, ...]
-    inputs: tuple[str, ...]  # keys of INPUTS
+    c: Floats
+    d: Floats
+    inputs: Names  # keys of INPUTS
     name: str  # of the law
     discrete: bool  # whether the matrices give the step of one control period
     control_period: float | None  # s, of the run for which that step is; None for any

@@ -22,6 +22,7 @@ from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Floats, Names, Numbers, Pair
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms import rotation
 
@@ -51,7 +52,7 @@ class Field(NamedTuple):
 def geom_fields(
     model: mujoco.MjModel,
     name: str,
-    pos: tuple[float, ...] = (),
+    pos: Floats = (),
     size: tuple[int, float] | None = None,
 ) -> Iterator[Field]:
     """Yield the fields of a geom, its place and one of its sizes (index, value); none in a run that
@@ -83,7 +84,7 @@ class Native(NamedTuple):
     """A nominal model as a C function."""
 
     address: int
-    values: tuple[float, ...]
+    values: Floats
     kept: tuple  # the objects whose addresses are among the values
 
 
@@ -104,11 +105,11 @@ class Plant:
 
     name: str  # as in `smc.plants()`
     # name -> value, SI units; the nominal ones, which laws may know
-    parameters: Mapping[str, float]
+    parameters: Numbers
     mass: str  # parameter that is meant by "mass" in a mismatch or a jump
     unit: str  # of x, "rad" or "m"; that of the first channel if they differ
-    x0: tuple[float, ...]  # default initial positions, those of the paper study, (n,)
-    rest: tuple[float, ...] = ()  # positions that the default reference holds, (n,); empty: 0
+    x0: Floats  # default initial positions, those of the paper study, (n,)
+    rest: Floats = ()  # positions that the default reference holds, (n,); empty: 0
     n: int = 1  # number of channels
     sizes: tuple[int, int] = (1, 1)  # smallest and largest n that `smc.plant(name, n=...)` takes
     build: Callable[[int], mujoco.MjSpec]  # n -> the ideal mechanism with the default parameters
@@ -124,14 +125,14 @@ class Plant:
     # Name -> another mechanism, which realises the equation, or a part of it, by other means
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
     # units of all channels if they differ, (n,); `units` has them in both cases
-    mixed: tuple[str, ...] = ()
+    mixed: Names = ()
     underactuated: bool = False  # whether each driven channel has a partner without an actuator
     measured: int = 0  # number of further channels without an actuator, which come last
     base: int = -1  # first of the six channels of a measured free base, its pose; -1: it has none
     # where its free joints should come to rest, (free,), rad or m; empty: at 0
-    goal: tuple[float, ...] = ()
+    goal: Floats = ()
     # Parameter -> the only value that fits the geometry of the contacts
-    placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    placed: Numbers = dataclasses.field(default_factory=dict)
     # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch
     # or a jump adds its number to such a parameter, in this unit, instead of multiplying it
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -149,29 +150,29 @@ class Plant:
     rubs: bool = False
     # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user
     # may meet. `smc.worst_case` varies these parameters if it is given no class
-    uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(
+    uncertain: Mapping[str, Pair] = dataclasses.field(
         default_factory=dict, compare=False, repr=False
     )
     # parameters that are dry friction. A plant with one that is not 0 is not smooth
-    dry: tuple[str, ...] = ()
+    dry: Names = ()
     unmodelled: str = ""  # why there is no nominal model; "" if there is one
     # hardware.part.Friction of its joints according to its source, for a scenario; or None
     friction: Any = None
     # N m or N, largest force of each driven channel's motor; empty: no limits
-    limits: tuple[float, ...] = ()
-    reach: Callable[[Values], tuple[float, ...]] | None = (
+    limits: Floats = ()
+    reach: Callable[[Values], Floats] | None = (
         None  # `limits` of other parameters, if they depend on them
     )
     # name -> parameters, a published set
-    sets: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    sets: Mapping[str, Numbers] = dataclasses.field(default_factory=dict)
     # parameters that must be greater than 0, beside masses and lengths
-    above_zero: tuple[str, ...] = ()
+    above_zero: Names = ()
     ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
     scenery: str = ""  # what a film shows beside the machine, such as "rail: a mark each 0.5 m"
     # "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size
-    jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    jumps: Mapping[str, Numbers] = dataclasses.field(default_factory=dict)
     tip: str = ""  # site that the mechanism moves: where an arm's tool is
     # "law", "u_max" or "reference" -> what each driven channel suggests to a scenario that leaves
     # it out
@@ -238,12 +239,12 @@ class Plant:
         return tuple(i for i in range(self.n) if i not in uncounted)
 
     @property
-    def units(self) -> tuple[str, ...]:
+    def units(self) -> Names:
         """Unit of x of each channel, (n,)."""
         return self.mixed or (self.unit,) * self.n
 
     @property
-    def efforts(self) -> tuple[str, ...]:
+    def efforts(self) -> Names:
         """Unit of the force on each channel, (n,)."""
         return tuple(EFFORT[unit] for unit in self.units)
 
@@ -277,7 +278,7 @@ class Plant:
         return getattr(self.build, "argument", self.name)
 
     @property
-    def origin(self) -> tuple[float, ...]:
+    def origin(self) -> Floats:
         """Positions from which starts are measured, (n,): the default goal of a user's model or of
         a free body, else 0.
         """
@@ -299,7 +300,7 @@ class Plant:
 
     def load(
         self,
-        factors: Mapping[str, float] | None = None,
+        factors: Numbers | None = None,
         nuserdata: int = 0,
         spec: mujoco.MjSpec | None = None,
     ) -> mujoco.MjModel:
@@ -313,7 +314,7 @@ class Plant:
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
-    def change(self, factors: Mapping[str, float]) -> str:
+    def change(self, factors: Numbers) -> str:
         """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those
         of `values`.
         """
@@ -324,7 +325,7 @@ class Plant:
             for name, factor in factors.items()
         )
 
-    def values(self, factors: Mapping[str, float]) -> Values:
+    def values(self, factors: Numbers) -> Values:
         """Return the parameters, each times its factor, or with it added; `mass` stands for the
         plant's mass.
         """

@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from smc_mujoco.common.kinds import Pair
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 
@@ -51,7 +52,7 @@ MAX_CHANGE = 0.5  # of the amplitude, relative, from the first to the second hal
 NO_CYCLE = (math.nan, math.nan)
 
 
-def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
+def limit_cycle(t: np.ndarray, s: np.ndarray) -> Pair:
     """Return amplitude, in the unit of s, and frequency, Hz, of the limit cycle in samples; NaN,
     NaN without one.
 
@@ -87,7 +88,7 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
     return float(np.median(ranges)) / 2.0, frequency
 
 
-def channel_cycle(trace: Trace, channel: int = 0) -> tuple[float, float]:
+def channel_cycle(trace: Trace, channel: int = 0) -> Pair:
     """Return amplitude and frequency of the limit cycle in the last part of a run; NaN, NaN without
     one.
     """
@@ -96,7 +97,7 @@ def channel_cycle(trace: Trace, channel: int = 0) -> tuple[float, float]:
 
 
 @once_per_trace
-def largest_cycle(trace: Trace) -> tuple[float, float]:
+def largest_cycle(trace: Trace) -> Pair:
     """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where
     none has one.
     """

@@ -14,7 +14,6 @@ spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
@@ -22,6 +21,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import ArrayPair, Numbers
 from smc_mujoco.mechanisms.hardware.part import OWN, drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
@@ -48,7 +48,7 @@ class Contacts(NamedTuple):
     push: np.ndarray  # sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3)
 
 
-def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = None) -> np.ndarray:
+def tip_path(plant: Plant, x: np.ndarray, factors: Numbers | None = None) -> np.ndarray:
     """Return the tip's positions in space, m, (K, 3), at the channels' positions x, (K, n).
 
     Args:
@@ -75,7 +75,7 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
 
 
 @once_per_trace
-def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+def tip_paths(trace: Trace) -> ArrayPair:
     """Return the actual path of the tip (true plant) and the wanted one (nominal plant), m, (K + 1,
     3), read-only.
     """

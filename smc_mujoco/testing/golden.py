@@ -10,12 +10,13 @@ import contextlib
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.files import plain, read_json, replacing
+from smc_mujoco.common.kinds import Fields, Numbers
 from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 
@@ -26,7 +27,7 @@ UPDATE = "run pytest --smc-update"
 MIN_TOLERANCE = 1e-9  # in the metric's unit: above rounding errors of a value that is 0
 
 
-def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
+def record(file: Path, key: str, response: StepResponse, tolerances: Numbers) -> None:
     """Write a response's metrics and their tolerances into the file, under `key`.
 
     Arguments are those of `compare`.
@@ -52,7 +53,7 @@ def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str
         ) from None
 
 
-def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
+def compare(file: Path, key: str, response: StepResponse, tolerances: Numbers) -> None:
     """Compare a response with the metrics recorded under `key`.
 
     With `tolerances`, in the metrics' units, only these metrics count; without, all with the
@@ -82,7 +83,7 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
-def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, float]:
+def _checked(response: object, tolerances: Numbers) -> dict[str, float]:
     """Return tolerances as numbers; raise ScenarioError for others, and for anything but a response
     that has them.
     """
@@ -94,7 +95,7 @@ def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, flo
     }
 
 
-def read(file: Path) -> dict[str, dict[str, dict[str, Any]]]:
+def read(file: Path) -> dict[str, dict[str, Fields]]:
     """Return the content of a golden file, test -> metric -> value, tolerance and unit; {} if there
     is no file.
     """

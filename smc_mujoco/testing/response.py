@@ -9,6 +9,7 @@ from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import slug
+from smc_mujoco.common.kinds import Numbers, Pair
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.named import as_plant
@@ -58,17 +59,17 @@ class StepResponse:
         return self.trace.failure
 
     @functools.cached_property
-    def metrics(self) -> Mapping[str, float]:
+    def metrics(self) -> Numbers:
         """Every metric by name. Raises ScenarioError if the run failed."""
         return score(self.trace)
 
     @functools.cached_property
-    def scores(self) -> Mapping[str, Mapping[str, float]]:
+    def scores(self) -> Mapping[str, Numbers]:
         """Group of channels -> metric -> value. Raises as `metrics`."""
         return scores(self.trace)
 
     @functools.cached_property
-    def values(self) -> Mapping[str, float]:
+    def values(self) -> Numbers:
         """`metrics`, and those of each group of channels if there are several, with names such as
         "free peak".
         """
@@ -138,7 +139,7 @@ class StepResponse:
                 raise self._no_metric(name)
 
     @without_frames
-    def check(self, **limits: float | tuple[float, float]) -> None:
+    def check(self, **limits: float | Pair) -> None:
         """Assert several limits on metrics:
 
         `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.

@@ -24,6 +24,7 @@ from smc_mujoco.common import constraints
 from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesting
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Pair
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
@@ -92,13 +93,13 @@ class Uncertainty:
     hold: Positive = 0.05
     delay: Range = (0.0, 0.0)
     jitter: Natural = 0.0
-    mass: Annotated[tuple[float, float], constraints.Range(above=0.0)] = (1.0, 1.0)
-    parameters: Mapping[str, tuple[float, float]] = frozen({})
+    mass: Annotated[Pair, constraints.Range(above=0.0)] = (1.0, 1.0)
+    parameters: Mapping[str, Pair] = frozen({})
     friction: Range = (0.0, 0.0)
     friction_scale: Range = (1.0, 1.0)
-    encoder: Annotated[tuple[float, float], constraints.Range(low=2.0)] | None = None
-    bound: Annotated[tuple[float, float], constraints.Range(above=0.0)] = (1.0, 1.0)
-    period: Annotated[tuple[float, float], constraints.Range(above=0.0)] = (1.0, 1.0)
+    encoder: Annotated[Pair, constraints.Range(low=2.0)] | None = None
+    bound: Annotated[Pair, constraints.Range(above=0.0)] = (1.0, 1.0)
+    period: Annotated[Pair, constraints.Range(above=0.0)] = (1.0, 1.0)
     x0: Natural = 0.0
 
     def __post_init__(self):
@@ -408,7 +409,7 @@ class Constant:
     """Something that is constant in a run and may differ from member to member."""
 
     name: str
-    bounds: tuple[float, float]
+    bounds: Pair
     put: Callable[[Scenario, float], Scenario]  # the scenario with a value
     # of a value; "" for a factor, "added" for what is added to a parameter, "%" for a relative
     # change
@@ -494,7 +495,7 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
         yield Constant("period", bounds, _with_period)
 
 
-def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:
+def _multiples(name: str, bounds: Pair, step: float) -> Pair:
     """Return the lowest and the highest multiple of a step within bounds; refuse a range with one,
     or only 0.
     """

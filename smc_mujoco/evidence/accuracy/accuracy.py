@@ -25,6 +25,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
+from smc_mujoco.common.kinds import Floats
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
@@ -195,7 +196,7 @@ def accuracy(
     return ordered
 
 
-def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
+def _longest_first(periods: Sequence[float]) -> Floats:
     """Return the control periods in descending order; refuse fewer than two, equal ones, and what
     is no period.
     """
@@ -242,7 +243,7 @@ class Setup(NamedTuple):
     """A law on a plant in a condition."""
 
     scenarios: list[Scenario]  # for each start one for each period
-    periods: tuple[float, ...]  # s, longest first
+    periods: Floats  # s, longest first
     starts: int  # their number
 
 
@@ -250,7 +251,7 @@ def _setup(
     plant: Plant,
     condition: Condition,
     law: str | Law | Template,
-    periods: tuple[float, ...],
+    periods: Floats,
     seeds: Sequence[int],
     gains: str,
     duration: float,

@@ -16,6 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smc_mujoco.common.kinds import Floats
+
 # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
 TREND = 1.5
 ORDER_BAND = 0.2  # difference of two orders up to which they agree
@@ -30,10 +32,8 @@ class Scaling:
     interval.
     """
 
-    errors: tuple[
-        tuple[float, ...], ...
-    ]  # of each run: for each start, for each period; inf if it failed
-    used: tuple[float, ...]  # the periods in the fit, s
+    errors: tuple[Floats, ...]  # of each run: for each start, for each period; inf if it failed
+    used: Floats  # the periods in the fit, s
     order: float  # exponent of the period; NaN with fewer than two periods
     low: float  # with `high` its interval; NaN with fewer than three periods
     high: float
@@ -44,7 +44,7 @@ class Scaling:
     why: str
 
     @property
-    def largest(self) -> tuple[float, ...]:
+    def largest(self) -> Floats:
         """The largest error over the starts, for each period."""
         return tuple(np.max(self.errors, axis=0).tolist())
 
@@ -65,7 +65,7 @@ class Accuracy:
     law: str
     gains: str  # the kinds of sources of the law's gains, see `control.source`, such as "shipped"
     unit: str  # of e; that of s depends on the law, for s = de + c e it is this unit per second
-    periods: tuple[float, ...]  # control periods, s, longest first
+    periods: Floats  # control periods, s, longest first
     e: Scaling  # of the tracking error
     s: Scaling  # of the law's sliding variable
     runs: int
@@ -73,7 +73,7 @@ class Accuracy:
     floor: float  # errors up to this size are rounding
 
     @property
-    def place(self) -> tuple[float, ...]:
+    def place(self) -> Floats:
         """What sorts laws: the number of failed runs, then the largest |e| at each period, from the
         shortest on.
         """

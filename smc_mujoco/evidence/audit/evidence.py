@@ -19,6 +19,7 @@ from typing import Any
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, to_json
+from smc_mujoco.common.kinds import Data, Fields
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import TEXT_FIELDS, Paper
 from smc_mujoco.evidence.audit.verdict import totals
@@ -32,12 +33,12 @@ CLAIM_FIELDS += ("measured", "holds_if", "quantifier", "over")
 HASHED_SUFFIXES = (".py", ".toml", ".xml")  # of a paper's files that are hashed
 
 
-def document(audit: Any) -> dict[str, Any]:
+def document(audit: Any) -> Fields:
     """Return the evidence of an audit as plain data, with its seal."""
     if not audit.sealable:
         raise ScenarioError("evidence is of runs that the audit made itself: leave out the table")
     names: dict[str, str] = {}  # key of a run -> its name in the file
-    runs: dict[str, Any] = {}
+    runs: Fields = {}
     for by_set in audit.used.values():
         for used in by_set.values():
             for key, run in used.items():
@@ -73,7 +74,7 @@ def document(audit: Any) -> dict[str, Any]:
     return data | {"seal": seal(data)}
 
 
-def seal(data: Mapping[str, Any]) -> str:
+def seal(data: Data) -> str:
     """Return the hash of all but the seal, 64 hex digits."""
     rest = {}
     for name, value in data.items():
@@ -82,7 +83,7 @@ def seal(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(to_json(rest, sort_keys=True).encode()).hexdigest()
 
 
-def check(path: str | Path) -> dict[str, Any]:
+def check(path: str | Path) -> Fields:
     """Return the evidence in a file, or raise ScenarioError if its seal is broken."""
     with reading(
         path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote"
@@ -108,7 +109,7 @@ def files(paper: Paper) -> dict[str, str]:
     return hashes
 
 
-def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
+def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> Fields:
     """Return the part of a claim that is sealed."""
     entry = audit.paper.claims[claim.id]
     sealed = {name: getattr(claim, name) for name in CLAIM_FIELDS}
@@ -125,7 +126,7 @@ def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
     return sealed | {"runs": runs} | judged
 
 
-def _run(scenario: Scenario) -> dict[str, Any]:
+def _run(scenario: Scenario) -> Fields:
     """Return a short description of a run. Its name is a hash of the whole scenario."""
     plant = scenario.plant
     suite = plants().get(scenario.plant.name)

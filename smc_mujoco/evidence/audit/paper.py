@@ -29,6 +29,7 @@ from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import reading, replacing
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data, Fields, Names, Numbers, Pair
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
@@ -52,7 +53,7 @@ from smc_mujoco.simulation.scenario import Scenario
 PAPER_FILE = "paper.toml"
 CODE_FILE = "claims.py"
 KINDS_OF_CLAIM = {"paper": "of its sentences", "derived": "derived", "ours": "beside it"}
-NO_FIELDS: Mapping[str, Any] = frozen({})
+NO_FIELDS: Data = frozen({})
 # How much of a paper was read.
 READ_PARTS: dict[str, None] = dict.fromkeys(
     ("full text", "abstract", "textbook", "second hand", "nothing")
@@ -68,13 +69,13 @@ CURES: dict[Any, str] = {
     dict | str: 'a table, as { "settling time, s" = "< 2" }',
 }
 FIELDS_CURE = 'fields of a scenario, as "duration=5.0"'
-PAPER_FIELDS: dict[str, Any] = {  # field of a paper -> its type
+PAPER_FIELDS: Fields = {  # field of a paper -> its type
     **dict.fromkeys((*TEXT_FIELDS, "runs"), str),
     **dict.fromkeys(("claim", "sets", "quick_sets"), list),
     **dict.fromkeys(("plants", "conditions", "gains", "allowed"), dict),
 }
 REQUIRED_OF_CLAIM = ("id", "text", "whose", "where", "function", "holds_if")
-CLAIM_FIELDS: dict[str, Any] = {  # the same of a claim
+CLAIM_FIELDS: Fields = {  # the same of a claim
     **dict.fromkeys((*REQUIRED_OF_CLAIM, "how", "over", "searched", "rivals", "runs"), str),
     **dict.fromkeys(("read", "words", "measured", "note", "instead", "shown_by"), str),
     **dict.fromkeys(("quantifier", "quick", "varies", "immune", "limit"), str),
@@ -89,10 +90,8 @@ REQUIRED_OF_PAPER = ("title", "authors", "source", "read", "claim")
 class Allowed(NamedTuple):
     """The gains of a law that a paper allows, within the bounds of the search."""
 
-    bounds: Mapping[str, tuple[float, float]]  # gain -> lowest and highest value, both positive
-    margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = (
-        None  # gains -> {condition: margin}
-    )
+    bounds: Mapping[str, Pair]  # gain -> lowest and highest value, both positive
+    margins: Callable[[Numbers], Numbers] | None = None  # gains -> {condition: margin}
     spread: int = SPREAD_SETS  # sets of gains that a search tries over the whole bounds
     near: int = NEAR_SETS  # and around the best of them
 
@@ -112,11 +111,11 @@ class Entry(Statement):
         ""  # why its numbers, such as timings, differ from audit to audit; they are not sealed
     )
     immune: str = ""  # why no mutant of the law loses the claim, if none can
-    plants: tuple[str, ...] = ()
-    laws: tuple[str, ...] = ()  # the first is the one that mutants replace
-    conditions: tuple[str, ...] = ()
-    fields: Mapping[str, Any] = NO_FIELDS  # of the scenarios of its runs
-    values: Mapping[str, Any] = NO_FIELDS  # its numbers, such as the levels of a sweep
+    plants: Names = ()
+    laws: Names = ()  # the first is the one that mutants replace
+    conditions: Names = ()
+    fields: Data = NO_FIELDS  # of the scenarios of its runs
+    values: Data = NO_FIELDS  # its numbers, such as the levels of a sweep
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -132,13 +131,13 @@ class Paper:
     access: str = ""  # where it was read, and what could not be read
     note: str = ""  # what a reader of the audit should know
     sets: Mapping[
-        str, Mapping[str, Mapping[str, Mapping[str, float]]] | None
+        str, Mapping[str, Mapping[str, Numbers]] | None
     ]  # plant ("" for all) -> law -> gains
-    quick_sets: tuple[str, ...]
+    quick_sets: Names
     plants: Mapping[str, Plant]  # its own, like the conditions and laws below
     conditions: Mapping[str, Condition]
     laws: Mapping[str, Template | Component]
-    fields: Mapping[str, Any]  # of the scenarios of all its runs
+    fields: Data  # of the scenarios of all its runs
     allowed: Mapping[str, Allowed]  # law -> gains, for claims about all or some of them
     claims: Mapping[str, Entry]  # in the order of the file
 
@@ -195,7 +194,7 @@ class Paper:
             )
         return made
 
-    def bound(self, law: str, gains: Mapping[str, float]) -> Component:
+    def bound(self, law: str, gains: Numbers) -> Component:
         """Return a law with these gains, and its defaults for the rest."""
         base = find("law", law, laws_known() | self.laws)
         defaults = {}
@@ -360,7 +359,7 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
     return ScenarioError(f"{_place(error, paper.folder)}: {called} raised {words(error)}")
 
 
-def _values(data: Mapping[str, Any], fields: Mapping[str, Any], required: tuple[str, ...]) -> dict:
+def _values(data: Data, fields: Data, required: Names) -> dict:
     """Return the values of a table, texts with single spaces; refuse unknown fields, wrong types
     and missing fields.
     """
@@ -384,7 +383,7 @@ def _typed(field: str, value: Any, kind: Any, cure: str = "") -> Any:
     return value
 
 
-def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
+def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
     """Return the paper in a file's data."""
     values = _values(data, PAPER_FIELDS, REQUIRED_OF_PAPER)
     find("part in read", values["read"], READ_PARTS)
@@ -430,9 +429,9 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     return dataclasses.replace(paper, claims=entries)
 
 
-def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Paper) -> Entry:
+def _entry(data: Data, functions: Mapping[str, Callable], paper: Paper) -> Entry:
     """Return a claim from its table."""
-    values: dict[str, Any] = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_OF_CLAIM)
+    values: Fields = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_OF_CLAIM)
     function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
     asked = values.pop("holds_if")
     if isinstance(asked, str):
@@ -514,7 +513,7 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
     )
 
 
-def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:
+def _thresholds(conditions: Data) -> Iterator[Threshold]:
     """Yield the thresholds in a table: measure -> text, or {asked, sentence}."""
     for measure, threshold in conditions.items():
         if isinstance(threshold, dict):
@@ -530,19 +529,19 @@ def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:
         yield Threshold.read(measure, parts.get("asked"), str(parts.get("sentence", "")))
 
 
-def _sets(tables: Mapping[str, Any], listed: list[str]) -> dict[str, Any]:
+def _sets(tables: Data, listed: list[str]) -> Fields:
     """Return set of gains -> plant -> law -> gains; None for a set of the suite."""
     for key in tables:
         if key in gain_sets.KNOWN_SETS:
             raise ScenarioError(
                 f"gains.{key} is a set of the suite: give yours another name, such as gains.paper"
             )
-    sets: dict[str, Any] = {}
+    sets: Fields = {}
     for key in listed or list(tables) or ["default"]:
         sets[key] = find("set of gains in sets", key, {**tables, **gain_sets.KNOWN_SETS})
         if sets[key] is None:
             continue
-        of_set: dict[str, dict[str, Any]] = {}
+        of_set: dict[str, Fields] = {}
         for law_or_plant, values in _typed(f"gains.{key}", sets[key], dict).items():
             table = _typed(f"gains.{key}.{law_or_plant}", values, dict)
             if table and all(isinstance(value, dict) for value in table.values()):
@@ -562,7 +561,7 @@ def _plant(what: str, data: object, folder: Path) -> Plant:
         return from_text(base, folder, **values)
 
 
-def _fields(what: str, text: object) -> dict[str, Any]:
+def _fields(what: str, text: object) -> Fields:
     """Return fields of a scenario from a text, such as "duration=5.0, control_period=1e-4"."""
     words = _typed(what, text, str, FIELDS_CURE)
     with _about(what):

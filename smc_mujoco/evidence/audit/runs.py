@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data, Fields, Names, Numbers
 from smc_mujoco.control.component import Component
 from smc_mujoco.evidence.audit.paper import Entry, Paper
 from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
@@ -48,11 +49,11 @@ class Result(NamedTuple):
     """What is kept of a run: its law's name, gains and scores, which are inf if the run failed."""
 
     law: str
-    gains: Mapping[str, float]
+    gains: Numbers
     scores: Scores
 
     @classmethod
-    def of(cls, law: str, gains: Mapping[str, float], outcome: Mapping[str, Any]) -> "Result":
+    def of(cls, law: str, gains: Numbers, outcome: Data) -> "Result":
         """Return what is kept of an outcome, or of a row of a study's table."""
         scores = {}
         for metric in metrics():
@@ -96,13 +97,13 @@ class Runs:
     scored: dict[str, Result] = dataclasses.field(
         default_factory=dict
     )  # key -> run whose scores any claim has used
-    plants: tuple[str, ...] = ()  # names of the claim's plants; below, of its laws and conditions
-    laws: tuple[str, ...] = ()
-    conditions: tuple[str, ...] = ("nominal",)
+    plants: Names = ()  # names of the claim's plants; below, of its laws and conditions
+    laws: Names = ()
+    conditions: Names = ("nominal",)
     values: Mapping[str, Any] = frozen({})  # the claim's numbers, such as the levels of a sweep
     thresholds: Mapping[str, Threshold] = frozen({})  # of the claim, by measure
     fields: Mapping[str, Any] = frozen({})  # of the claim's scenarios
-    searched: Mapping[str, Mapping[str, float]] = frozen({})  # law -> gains in place of the set's
+    searched: Mapping[str, Numbers] = frozen({})  # law -> gains in place of the set's
 
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
@@ -116,7 +117,7 @@ class Runs:
         runs.thresholds = {threshold.measure: threshold for threshold in entry.thresholds}
         return runs
 
-    def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
+    def at(self, law: str, gains: Numbers, quick: bool) -> "Runs":
         """Return the claim's runs with some gains of a law in place of the set's; they count as
         used by the claim.
         """
@@ -188,7 +189,7 @@ class Runs:
         its = self.fields
         machine = paper.plant(plant)
         duration = {"duration": DURATION, **paper.fields, **its, **changes}["duration"]
-        fields: dict[str, Any] = {"plant": machine, **paper.fields}
+        fields: Fields = {"plant": machine, **paper.fields}
         fields |= {**paper.condition(condition).on(machine, duration), **its}
         if "law" not in changes:
             fields["law"] = self.law(plant, law_name)

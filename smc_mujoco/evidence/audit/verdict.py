@@ -23,11 +23,12 @@ import operator
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Fields, Names, Numbers
 
 SUPPORTED = "supported"
 PARTLY = "partly supported"
@@ -35,7 +36,7 @@ REFUTED = "refuted"
 NOT_SHOWN = "not shown"
 NOT_AS_MEASURED = "not as measured"
 NOT_TESTABLE = "not testable"
-VERDICTS: tuple[str, ...] = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_AS_MEASURED, NOT_TESTABLE)
+VERDICTS: Names = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_AS_MEASURED, NOT_TESTABLE)
 ANSWERS: dict[str, str] = {
     SUPPORTED: "yes",
     PARTLY: "in part",
@@ -202,7 +203,7 @@ class Threshold(NamedTuple):
             return math.nan
         return max(self.low - value, value - self.high, 0.0)
 
-    def evidence(self, values: Mapping[str, float]) -> Iterator[Check | Beside]:
+    def evidence(self, values: Numbers) -> Iterator[Check | Beside]:
         """Yield a check for each case -> number; "" for a number without a case.
 
         For a range the check is of the distance from it, and the number stands beside.
@@ -254,7 +255,7 @@ class Statement:
     # itself
     rivals: str = ""
     # plant -> gains of the law with which the claim holds there, which a search tries first
-    examples: Mapping[str, Mapping[str, float]] = frozen({})
+    examples: Mapping[str, Numbers] = frozen({})
     # what the author may claim instead, where it does not hold: a theorem or a measured bound
     instead: str = ""
     shown_by: str = ""  # the command that shows that
@@ -272,9 +273,7 @@ class Claim(Statement):
     """A claim and its verdict."""
 
     verdict: str  # over all sets of gains, one of VERDICTS; of a question one of ANSWERS
-    numbers: dict[
-        str, dict[str, dict[str, Any]]
-    ]  # set of gains -> what was measured -> fields of a Check
+    numbers: dict[str, dict[str, Fields]]  # set of gains -> what was measured -> fields of a Check
     beside: dict[
         str, dict[str, float]
     ]  # set of gains -> what else was measured -> its value, which decides nothing
@@ -434,7 +433,7 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     if statement.whose == OURS:
         overall = ANSWERS[overall]
         verdicts = {name: ANSWERS[kind] for name, kind in verdicts.items()}
-    numbers: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in evidence}
+    numbers: dict[str, dict[str, Fields]] = {name: {} for name in evidence}
     beside: dict[str, dict[str, float]] = {name: {} for name in evidence}
     for name, some in evidence.items():
         for one in some:

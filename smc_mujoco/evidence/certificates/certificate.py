@@ -6,8 +6,6 @@ import copy
 import dataclasses
 import json
 import math
-import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +14,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import reading, with_ending, write_json
+from smc_mujoco.common.kinds import AnyPath, Data, Names
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
 
@@ -70,7 +69,7 @@ class Certificate:
         conditions and what proves them (polynomials, boxes, numbers), and a seal.
     """
 
-    data: Mapping[str, Any]
+    data: Data
 
     def __repr__(self) -> str:
         return printable(f"<Certificate of {self.law} on {self.plant}: {self.sentences[0]}>")
@@ -86,7 +85,7 @@ class Certificate:
         return self.data["law"]["name"]
 
     @property
-    def theorems(self) -> tuple[str, ...]:
+    def theorems(self) -> Names:
         """The theorems that were tried."""
         return tuple(part["theorem"] for part in self.data["parts"])
 
@@ -158,7 +157,7 @@ class Certificate:
         return tuple(found)
 
     @property
-    def sentences(self) -> tuple[str, ...]:
+    def sentences(self) -> Names:
         """What each theorem proves, or which of its conditions fail, and what none is about."""
         sentences = []
         for part in self.data["parts"]:
@@ -183,7 +182,7 @@ class Certificate:
             sentences.append(f"{what} {under}")
         return *sentences, NOT_ABOUT
 
-    def _widest(self, part: Mapping[str, Any]) -> float:
+    def _widest(self, part: Data) -> float:
         """Return the largest x up to which all states at rest lie in the level sets."""
         x = np.linspace(0.0, part["x"][-1], 2001)
         outside = np.flatnonzero(self.level(x, np.zeros_like(x)) > part["outer"])
@@ -232,7 +231,7 @@ class Certificate:
         """The slope c of the law's surface s = v + c x, 1/s."""
         return loops.loop_of(self.data)[0].c
 
-    def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
+    def _part(self, theorem: str, holding: bool = False) -> Data | None:
         for part in self.data["parts"]:
             if part["theorem"] == theorem and (part["holds"] or not holding):
                 return part
@@ -254,12 +253,12 @@ class Certificate:
         except checker.Refused as why:
             raise ScenarioError(f"the certificate is refused: not proven is {why}") from None
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: AnyPath) -> Path:
         """Write a .json file that `Certificate.load` and the checker read."""
         return write_json(with_ending(path, ".json"), self.data, indent=None)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> "Certificate":
+    def load(cls, path: AnyPath) -> "Certificate":
         """Read a file of `save`. It is not checked: call `check`.
 
         Raises:

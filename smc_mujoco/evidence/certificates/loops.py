@@ -5,15 +5,17 @@ M x'' = A sin x + B x + C x^3 - (E + F x^2) x' - sigma(s) + d
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.kinds import Data, Floats, Pair
+
 Function = Callable[[np.ndarray], np.ndarray]
 # The plant's parameters -> M, and A, B, C, E, F of phi = A sin x + B x + C x^3 and D = E + F x^2.
-ONE_JOINT_TERMS: dict[str, Callable[[Any], tuple[float, ...]]] = {
+ONE_JOINT_TERMS: dict[str, Callable[[Any], Floats]] = {
     "inverted_pendulum": lambda p: (p.m * p.l**2, p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
     "pendulum_network": lambda p: (p.m * p.l**2, -p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
     "inverted_pendulum_network": lambda p: (p.m * p.l**2, p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
@@ -50,7 +52,7 @@ class Loop:
         return (force - law) / self.M
 
 
-def loop_of(data: Mapping[str, Any]) -> tuple[Loop, list[float], SimpleNamespace]:
+def loop_of(data: Data) -> tuple[Loop, list[float], SimpleNamespace]:
     """Return the loop of a certificate's data, A, B, C, E, F of its plant, and the law's name and
     gains.
     """
@@ -102,7 +104,7 @@ def _loop(
     )
 
 
-def linear_gains(law: SimpleNamespace) -> tuple[float, float]:
+def linear_gains(law: SimpleNamespace) -> Pair:
     """Return kp and kd of a law that is -(kp x + kd x') within its bound."""
     if law.name == "boundary_layer":
         return law.k * law.c / law.phi, law.k / law.phi

@@ -23,6 +23,7 @@ import numpy as np
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
+from smc_mujoco.common.kinds import Fields, Pair
 from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of
@@ -76,7 +77,7 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     if within is not None:
         d0 += _class(within)
     values = vars(plant.values(scenario.mismatch))
-    document: dict[str, Any] = {
+    document: Fields = {
         "format": checker.FORMAT,
         "plant": {
             "name": plant.name,
@@ -167,7 +168,7 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     e = checker.equation(document["plant"])
     f = checker.feedback(document["law"], document["u_max"])
 
-    def judge(theorem: str, data: dict) -> dict[str, Any] | None:
+    def judge(theorem: str, data: dict) -> Fields | None:
         """Return the margins of a theorem's conditions, or None if the checker refuses the data."""
         try:
             derived = checker.THEOREMS[theorem](document, data, e, f)
@@ -205,7 +206,7 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     return parts
 
 
-def _part(theorem: str, margins: dict[str, Any], **data: Any) -> dict:
+def _part(theorem: str, margins: Fields, **data: Any) -> dict:
     """Return a theorem as data, with the margins of its conditions by name."""
     conditions = []
     for name, value in margins.items():
@@ -307,9 +308,7 @@ def _reaching(lean: float, reach: float, judge: Judge) -> dict:
     return _judged("reaching", {"X": X, "S": lean * X}, judge)
 
 
-def _levels(
-    room: float, levels: search.Levels, at: tuple[float, float], start: tuple[float, float]
-) -> dict:
+def _levels(room: float, levels: search.Levels, at: Pair, start: Pair) -> dict:
     """Return the levels of W as data; `at`, `start`: x and v, and x and s, at the start."""
     margins = {"actuator": room, "start": levels.outer - _cell(levels, *start)}
     data = {"x": levels.x.tolist(), "s": levels.s.tolist(), "W": levels.W.tolist()}

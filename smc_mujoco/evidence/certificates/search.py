@@ -21,6 +21,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 from scipy.optimize import brentq
 
+from smc_mujoco.common.kinds import ArrayPair, Pair
 from smc_mujoco.evidence.certificates.loops import Loop
 from smc_mujoco.simulation.cfunctions import cached
 
@@ -146,10 +147,10 @@ class Levels:
 def levels(
     loop: Loop,
     reach: float,
-    start: tuple[float, float],
+    start: Pair,
     proven: Proven,
     attracts: Attracts,
-    target: tuple[float, float] | None = None,
+    target: Pair | None = None,
 ) -> Levels | None:
     """Return the levels with the smallest bound, or the largest region without disturbance; None if
     the search fails.
@@ -192,7 +193,7 @@ def levels(
     return None
 
 
-def _inner(window: tuple[float, float]) -> float:
+def _inner(window: Pair) -> float:
     """Return the inner level of a range of levels."""
     return float(f"{window[0] + 2e-6:.6f}")
 
@@ -225,7 +226,7 @@ class _Grid:
             hit = beyond[:-1, :-1] | beyond[1:, :-1] | beyond[:-1, 1:] | beyond[1:, 1:]
             self.limit = float(self.low[hit].min())
 
-    def window(self) -> tuple[float, float] | None:
+    def window(self) -> Pair | None:
         """Return the widest range of levels that no cell spoils, or None."""
         spans = sorted(
             [*zip(self.low[self.bad], self.high[self.bad], strict=True), (self.border, 2.0)]
@@ -240,16 +241,14 @@ class _Grid:
             return widest
         return None
 
-    def bound(self, window: tuple[float, float] | None) -> float:
+    def bound(self, window: Pair | None) -> float:
         """Return the largest |x| of the cells that reach the inner level."""
         if window is None:
             return np.inf
         ends = np.broadcast_to(self.x[1:, None], self.low.shape)
         return float(ends[self.low <= _inner(window)].max(initial=0.0))
 
-    def worth(
-        self, window: tuple[float, float] | None, start: tuple[float, float]
-    ) -> tuple[bool, float]:
+    def worth(self, window: Pair | None, start: Pair) -> tuple[bool, float]:
         """Return a key that is smaller for better levels."""
         if window is None or not self.bound(window):
             return True, np.inf
@@ -263,9 +262,9 @@ class _Grid:
         areas = np.diff(self.x)[:, None] * np.diff(self.s)
         return not within, -float(areas[self.high < window[1]].sum())
 
-    def surely(self, window: tuple[float, float], proven: Proven) -> tuple[float, float] | None:
+    def surely(self, window: Pair, proven: Proven) -> Pair | None:
         """Return a range of levels between which W surely falls in each cell, or None."""
-        interval: tuple[float, float] | None = window
+        interval: Pair | None = window
         while interval is not None:
             inside = (self.high >= interval[0]) & (self.low <= interval[1]) & ~self.sure & ~self.bad
             for i, j in zip(*np.nonzero(inside), strict=True):
@@ -367,9 +366,7 @@ def _sweep(W, open_, cells, shares, decay):
     return change
 
 
-def falls(
-    loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def falls(loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray) -> ArrayPair:
     """Return the least and the largest W' at samples of each cell under the worst d, two arrays of
     (n, 2 n).
     """

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from smc_mujoco.common.cache import cached
+from smc_mujoco.common.kinds import Names
 from smc_mujoco.common.progress import Report, bar
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.study import FULL as GRID
@@ -24,9 +25,9 @@ class Plan:
     quick: bool  # whether margins and claims are quick
     grid: Extent  # of the comparison
     worst: bool  # whether each law's worst case is searched too
-    claims: tuple[str, ...] | None = None  # ids of the claims to judge; None for all
-    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")  # of margins
-    scenes: tuple[str, ...] = scenarios.PLANTS  # plants whose runs are shown
+    claims: Names | None = None  # ids of the claims to judge; None for all
+    kinds: Names = ("delay", "disturbance", "friction", "mass", "noise")  # of margins
+    scenes: Names = scenarios.PLANTS  # plants whose runs are shown
     filmed: int = len(scenarios.PLANTS)  # how many of these are filmed
     scene: float = 5.0  # duration of traces and films, s
 

@@ -9,7 +9,6 @@ parameter set.
 
 import dataclasses
 import math
-import os
 import warnings
 from collections import Counter
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from typing import Any
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
+from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs.rig import Rig, Values
 from smc_mujoco.simulation import coerce
@@ -72,7 +72,7 @@ def objective(rig: Rig, starts: Starts | None = None) -> Objective:
     """
     machines = _machines(rig)
     around = _starts(rig, starts)
-    fields: dict[str, Any] = machines["set 1"] | {"law": "none", "x0": around.x0}
+    fields: Fields = machines["set 1"] | {"law": "none", "x0": around.x0}
     if fields["u_max"] == math.inf:  # firmware bounds its own command: take the drive's bound
         fields["u_max"] = None
     first = Scenario(**fields)
@@ -92,7 +92,7 @@ def tuned(
     searches: int = SEARCHES,
     budget: int = BUDGET,
     starts: Starts | None = None,
-    folder: str | os.PathLike[str] | None = None,
+    folder: AnyPath | None = None,
     threads: int | None = None,
     progress: bool = False,
 ) -> list[Candidate]:
@@ -147,11 +147,11 @@ def _starts(rig: Rig, starts: Starts | None) -> Starts:
     return Starts(x0=rig.x0) if starts is None else starts
 
 
-def _machines(rig: Rig) -> dict[str, dict[str, Any]]:
+def _machines(rig: Rig) -> dict[str, Fields]:
     """Return set -> the fields of a Scenario that a rig's machine has, without where runs begin."""
     found = {}
     for name, member in rig.members().items():
-        fields: dict[str, Any] = {"u_max": None, "physics_step": None}
+        fields: Fields = {"u_max": None, "physics_step": None}
         fields |= member.machine(Values(**member.values))
         for start in BY_STARTS:
             fields.pop(start, None)

@@ -12,7 +12,7 @@ encoders and delays, and needs ten more packages.
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,6 +21,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
+from smc_mujoco.common.kinds import Data, Fields, Numbers
 from smc_mujoco.common.progress import bar
 from smc_mujoco.evidence.rigs import search
 from smc_mujoco.evidence.rigs.records import Columns, Record
@@ -72,11 +73,11 @@ class Identified:
 
     rig: Rig  # with the values found
     before: Rig  # with the values before
-    values: Mapping[str, float]  # quantity -> value found
-    errors: Mapping[str, float]  # quantity -> its standard error
+    values: Numbers  # quantity -> value found
+    errors: Numbers  # quantity -> its standard error
     correlations: np.ndarray  # of the errors, (p, p), in the order of `values`
-    fits: tuple[Mapping[str, float], ...]  # of each record
-    fits_before: tuple[Mapping[str, float], ...]
+    fits: tuple[Numbers, ...]  # of each record
+    fits_before: tuple[Numbers, ...]
     predictions: tuple[
         tuple[Record, Record, np.ndarray], ...
     ]  # predicted columns, measured ones, and their times
@@ -132,7 +133,7 @@ class Identified:
             values.append(f"{name} = {value:.4g} ± {self.errors[name]:.1g}")
         return f"identified({self.rig.name!r}, {', '.join(values)})"
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Fields:
         """Return values, errors, correlations and fits as JSON data."""
         quantities = {}
         for name, value in self.values.items():
@@ -179,7 +180,7 @@ def identify(
     records: Source | Sequence[Source],
     quantities: Sequence[str] | None = None,
     *,
-    start: Mapping[str, float] | None = None,
+    start: Numbers | None = None,
     starts: Count = 4,
     seed: Seed = 0,
     most: int = 30,
@@ -257,7 +258,7 @@ def _checked_names(twin: Rig, quantities: Sequence[str] | None) -> list[str]:
 def _solved(
     twin: Rig,
     names: list[str],
-    data: Sequence[Mapping[str, Any]],
+    data: Sequence[Data],
     starts: int,
     seed: int,
     most: int,
@@ -281,7 +282,7 @@ def _solved(
 
 
 def _starting_states(
-    fitted: Rig, data: Sequence[Mapping[str, Any]], replays: Replays, point: Point
+    fitted: Rig, data: Sequence[Data], replays: Replays, point: Point
 ) -> list[np.ndarray | None]:
     """Return the state from which each record is repeated as a whole, (2n,); None for the measured
     one.
@@ -311,7 +312,7 @@ def _starting_states(
     return [repeats.state(candidates[best[i]], i) for i in range(len(data))]
 
 
-def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
+def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Data]]:
     """Return the rig to identify, and its records as columns."""
     if isinstance(given, str):
         given = find_rig(given)

@@ -6,7 +6,6 @@ rig.
 
 import dataclasses
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
+from smc_mujoco.common.kinds import AnyPath, ArrayPair, Data, Floats, Names
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.python_functions import evaluate
@@ -40,19 +40,19 @@ class Columns:
 
     time: str = "t"  # s
     # position of each channel, rad or m; or of each joint that has a torque
-    x: tuple[str, ...] = ("x",)
+    x: Names = ("x",)
     u: str = "u"  # command, in the unit of the rig's u
     reference: str = "reference"  # of the driven joint, if the loop is closed
     feedforward: str = "feedforward"  # what is added to the controller's u; records may lack it
-    others: tuple[str, ...] = ()  # references of the other joints; records may lack them
+    others: Names = ()  # references of the other joints; records may lack them
     # positions, then velocities, without noise and offset; only simulated runs have them
-    state: tuple[str, ...] = ()
+    state: Names = ()
     # what is subtracted from each channel's column to get the plant's x; empty for 0
-    offset: tuple[float, ...] = ()
+    offset: Floats = ()
     # of each joint, for records whose torques are predicted from the motion
-    torque: tuple[str, ...] = ()
+    torque: Names = ()
 
-    def needed(self, closed: bool) -> tuple[str, ...]:
+    def needed(self, closed: bool) -> Names:
         """Return the columns that a record must have; for a closed loop also the reference."""
         command = self.torque or (self.u,)
         if closed and not self.torque:
@@ -60,13 +60,13 @@ class Columns:
         return self.time, *self.x, *command
 
     @property
-    def known(self) -> tuple[str, ...]:
+    def known(self) -> Names:
         """All columns that a replay may read."""
         more = self.reference, *self.others, self.feedforward, *self.state
         return tuple(dict.fromkeys((*self.needed(True), *more)))
 
 
-def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -> Record | Trace:
+def load(path: AnyPath, names: Mapping[str, str] | None = None) -> Record | Trace:
     """Return the columns of a CSV or npz file, or a saved trace.
 
     `names`: the rig's name of a column -> the file's.
@@ -149,7 +149,7 @@ def of_trace(trace: Trace, columns: Columns) -> Record:
     return record | {columns.feedforward: added}
 
 
-def checked(record: Mapping[str, Any], columns: Columns, period: float | None, rig: str) -> Record:
+def checked(record: Data, columns: Columns, period: float | None, rig: str) -> Record:
     """Return the record's known columns as float arrays, (K,) each. `rig`: its name, for errors.
 
     `period`: s, of the rig's controller, at which a closed loop must be recorded. None for an open
@@ -254,7 +254,7 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
     return array
 
 
-def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.ndarray, np.ndarray]:
+def state(data: Record, columns: Columns, period: float, at: int) -> ArrayPair:
     """Return positions and velocities at a sample, (n,) each.
 
     They come from the columns `state`; if there are none, from a cubic through the samples about

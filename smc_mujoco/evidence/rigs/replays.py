@@ -19,12 +19,13 @@ import functools
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioWarning
+from smc_mujoco.common.kinds import Data, Fields, Numbers
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Record
 from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
@@ -53,7 +54,7 @@ class Piece:
     part: Part | None  # what its replay takes from the record; None if torques are predicted
     skipped: int  # samples at its start that are not compared
     measured: Record  # the columns compared, (N,) each
-    spread: Mapping[str, float]  # norm of each whole column about its mean: the unit of residuals
+    spread: Numbers  # norm of each whole column about its mean: the unit of residuals
     scales: np.ndarray  # units of the free states, (s,)
 
 
@@ -134,7 +135,7 @@ class Replays:
         self,
         twin: Rig,
         names: list[str],
-        data: Sequence[Mapping[str, Any]],
+        data: Sequence[Data],
         closed: bool,
         report: Callable[[int], None] = lambda count: None,
         whole: bool = False,
@@ -164,7 +165,7 @@ class Replays:
             self.free = np.zeros(0, int)
         self.evaluations = 0
         # integrator and step of replays; none for the scenario's own
-        self.steps: dict[str, Any] = {}
+        self.steps: Fields = {}
         self.corrections: list[Record] | None = None  # of each piece; None for none
         self.pieces: list[Piece] = []
         for i in range(len(data)):
@@ -261,7 +262,7 @@ class Replays:
         return True
 
     @property
-    def short_steps(self) -> dict[str, Any]:
+    def short_steps(self) -> Fields:
         """Integrator and step of exact replays without corrections; none for the scenario's own."""
         if not self.corrections:
             return {}
@@ -275,7 +276,7 @@ class Replays:
         return dataclasses.replace(sharp, residuals=slopes.residuals)
 
     def _replayed(
-        self, rigs: Sequence[Rig], points: Sequence[Point], fields: dict[str, Any]
+        self, rigs: Sequence[Rig], points: Sequence[Point], fields: Fields
     ) -> list[list[Record]]:
         """Return what `predicted` returns, without corrections; `fields` replace those of the
         replays' scenarios.
@@ -386,7 +387,7 @@ def _norm(values: np.ndarray) -> float:
     return float(np.linalg.norm(values - values.mean())) or 1.0
 
 
-def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
+def _steps(scenario: Scenario, halvings: int) -> Fields:
     """Return integrator and step of a corrected replay.
 
     RK4 has errors of first order only where dry friction changes its direction. It cannot integrate

@@ -21,6 +21,7 @@ import numpy as np
 from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data, Fields, Floats, Names, Numbers
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Columns, Record
@@ -72,10 +73,10 @@ class Fall(float):
 class Part:
     """What a replay takes from a record, whatever the quantities of the rig."""
 
-    fields: Mapping[str, Any]  # of the replay's Scenario: law, duration, signals
+    fields: Data  # of the replay's Scenario: law, duration, signals
     state: np.ndarray  # measured positions and velocities at the start, (2n,)
     largest_u: float  # of the recorded command, in the unit of u
-    zero: Mapping[str, float]  # quantities that the record determines, see `Rig.zero`
+    zero: Numbers  # quantities that the record determines, see `Rig.zero`
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -115,7 +116,7 @@ class Rig:
     name: str
     label: str
     quantities: Mapping[str, Quantity]
-    machine: Callable[[Values], dict[str, Any]]
+    machine: Callable[[Values], Fields]
     controller: Law | None = None
     columns: Columns = dataclasses.field(default_factory=Columns)
     commands: Callable[[Record, int], np.ndarray] | None = None
@@ -123,13 +124,13 @@ class Rig:
     start: float = 0.0
     score_from: float = 0.0
     dynamics: Callable[[Values], Plant] | None = None
-    identified_from: tuple[str, ...] = ()
-    free: tuple[str, ...] = ()
+    identified_from: Names = ()
+    free: Names = ()
     window: float = 1.0
-    published: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
-    ensemble: tuple[Mapping[str, float], ...] = ()
+    published: Mapping[str, Data] = dataclasses.field(default_factory=dict)
+    ensemble: tuple[Numbers, ...] = ()
     laws: tuple[Law, ...] = ()
-    x0: tuple[float, ...] | None = None
+    x0: Floats | None = None
     about: str = ""
 
     def __post_init__(self) -> None:
@@ -144,7 +145,7 @@ class Rig:
         """Quantity -> its value."""
         return {name: quantity.value for name, quantity in self.quantities.items()}
 
-    def with_values(self, values: Mapping[str, float], source: str = "given") -> "Rig":
+    def with_values(self, values: Numbers, source: str = "given") -> "Rig":
         """Return the rig with other values of some quantities, SI units, from a source."""
         changed = dict(self.quantities)
         for name, value in frozen(values).items():
@@ -175,11 +176,11 @@ class Rig:
         """
         if law is None and self.controller is None:
             raise ScenarioError(f"the controller of {self.name} is not known: give a law")
-        controlled: dict[str, Any] = {"law": law or self.controller}
+        controlled: Fields = {"law": law or self.controller}
         return Scenario(**self.machine(Values(**self.values)) | controlled | fields)
 
     def replay(
-        self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None
+        self, record: Data, start: float | None = None, duration: float | None = None
     ) -> Scenario:
         """Return the scenario that repeats a record from its measured state on.
 
@@ -201,7 +202,7 @@ class Rig:
 
     def part(
         self,
-        record: Mapping[str, Any],
+        record: Data,
         start: float | None = None,
         duration: float | None = None,
         closed: bool = True,
@@ -229,7 +230,7 @@ class Rig:
         def signal(values: np.ndarray) -> TimeSeries:
             return TimeSeries(times, values[: len(times)].tolist())
 
-        fields: dict[str, Any] = {"duration": times[-1]}
+        fields: Fields = {"duration": times[-1]}
         if self.controller is not None and closed:
             if self.commands is not None:
                 fed = self.commands(data, first)
@@ -289,7 +290,7 @@ class Rig:
         )
 
     def measured(
-        self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None
+        self, record: Data, start: float | None = None, duration: float | None = None
     ) -> Trace:
         """Return a record as a trace of the machine, for figures and films beside those of twins;
         see `replay`.
@@ -313,16 +314,16 @@ class Rig:
         u[:, 0] = data[names.u][part]
         if names.reference in data:
             r[:, 0] = data[names.reference][part]
-        zero: dict[str, Any] = dict.fromkeys(("s", "d", "force", "reaction"), nothing)
+        zero: Fields = dict.fromkeys(("s", "d", "force", "reaction"), nothing)
         t = period * np.arange(count)
         return Trace(t=t, x=x, v=v, u=u, applied=u.copy(), r=r, **zero, scenario=scenario)
 
     @property
-    def needed(self) -> tuple[str, ...]:
+    def needed(self) -> Names:
         """The columns that a record must have."""
         return self.columns.needed(self.controller is not None)
 
-    def checked(self, record: Mapping[str, Any]) -> Record:
+    def checked(self, record: Data) -> Record:
         """Return the columns of a record that a replay reads, (K,) each. Raises as `fit`."""
         return records.checked(record, self.columns, self.period, self.name)
 
@@ -350,7 +351,7 @@ class Rig:
         """
         return self.period or records.step_of(data[self.columns.time])
 
-    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
+    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Data]]:
         """Return the rig that repeats records, and these as columns.
 
         It repeats a trace by its law, from its start.
@@ -409,7 +410,7 @@ class Rig:
 
     def fits(
         self,
-        many: Sequence[Mapping[str, Any]],
+        many: Sequence[Data],
         states: Sequence[np.ndarray | None] | None = None,
         **changes: Any,
     ) -> list[dict[str, float]]:
@@ -430,7 +431,7 @@ class Rig:
 
     def predictions(
         self,
-        many: Sequence[Mapping[str, Any]],
+        many: Sequence[Data],
         states: Sequence[np.ndarray | None] | None = None,
         **changes: Any,
     ) -> list[tuple[Record, Record, np.ndarray]]:

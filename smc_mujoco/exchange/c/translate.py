@@ -32,6 +32,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Fields, Names
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
@@ -145,7 +146,7 @@ class Kind(NamedTuple):
 
     of: str  # y, gains, memory, or one of WIDTHS
     shape: tuple[int, ...] = ()  # of an array or a tuple
-    fields: tuple[str, ...] | None = None  # of a tuple: their names, if it has some
+    fields: Names | None = None  # of a tuple: their names, if it has some
     stride: str = "1"  # of a vector: from one number to the next
 
     @property
@@ -1238,7 +1239,7 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     return written, tree
 
 
-def around(written: FunctionType) -> dict[str, Any]:
+def around(written: FunctionType) -> Fields:
     """Return the names outside of a function that it can read, with their values."""
     cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
     return written.__globals__ | {name: cell.cell_contents for name, cell in cells}
@@ -1299,7 +1300,7 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
 # writing C
 
 
-def gathered(items: Sequence[Value], fields: tuple[str, ...] = ()) -> Value:
+def gathered(items: Sequence[Value], fields: Names = ()) -> Value:
     """Return a tuple of values."""
     of = functools.reduce(widest, [item.kind.of for item in items], "bool")
     return Value("", Kind(of, (len(items),), fields), items=tuple(items))

@@ -9,7 +9,6 @@ precision it gives the bits of `smc.run`.
 
 import hashlib
 import math
-import os
 import platform
 import re
 import sys
@@ -24,6 +23,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Each, Number, OneOf, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import no_room, replacing, scratch, with_ending
+from smc_mujoco.common.kinds import AnyPath, Data, Fields, Floats
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -55,7 +55,7 @@ MACHINES = {
 @constrained
 def law_to_fmu(
     law: Law | Template | str | Scenario,
-    path: str | os.PathLike[str] | None = None,
+    path: AnyPath | None = None,
     *,
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
@@ -122,7 +122,7 @@ def law_to_fmu(
     return target
 
 
-def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> dict[str, Any]:
+def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
     """Return a scenario's arguments of `_exported`. `chosen`: those that the user gives."""
     if given := [name for name, value in chosen.items() if value is not None]:
         raise ScenarioError(
@@ -186,7 +186,7 @@ def _exported(
     )
 
 
-def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
+def _bounds(u_max: float | Sequence[float], joints: int) -> Floats:
     """Return the bound on |u| of each joint, from one for all or one for each."""
     if not (joints and isinstance(u_max, Sequence | np.ndarray)):
         return (BOUND("u_max", u_max),) * max(1, joints)

@@ -15,7 +15,6 @@ import hashlib
 import itertools
 import keyword
 import math
-import os
 import re
 import weakref
 import zipfile
@@ -32,6 +31,7 @@ from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
 from smc_mujoco.common.guard import Failed, run_isolated
 from smc_mujoco.common.jit import Uncompiled
+from smc_mujoco.common.kinds import AnyPath, Data, Names, Numbers, Pair
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
@@ -71,11 +71,11 @@ class FmuLaw(Uncompiled):
     digest: str  # of its bytes
     name: str  # of the law
     inputs: tuple[tuple[str, str], ...]  # our name and the FMU's
-    outputs: tuple[str, ...]  # the FMU's name of u, and of s if it has s
+    outputs: Names  # the FMU's name of u, and of s if it has s
     constants: tuple[
         tuple[str, float], ...
     ]  # the FMU's name and the value of inputs that do not change
-    parameters: tuple[str, ...]  # the FMU's names of its gains
+    parameters: Names  # the FMU's names of its gains
     period: float | None  # of its steps, s; None for the control period
 
     why = "is an FMU, called from Python: several times slower than a law that compiles"
@@ -85,9 +85,7 @@ class FmuLaw(Uncompiled):
         """The law's name."""
         return self.name
 
-    def __call__(
-        self, y: Measurement, gains: Sequence[float], memory: np.ndarray
-    ) -> tuple[float, float]:
+    def __call__(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> Pair:
         """Return u and s. The memory holds the number of the instance, 0 before the first sample.
 
         The FMU's own time counts its steps: it has none for a sample that is missed, and a late one
@@ -170,10 +168,10 @@ def extracted(path: str, digest: str) -> Path:
 
 @constrained
 def law_from_fmu(
-    path: str | os.PathLike[str],
+    path: AnyPath,
     *,
     variables: Mapping[str, str] | None = None,
-    constants: Mapping[str, float] | None = None,
+    constants: Numbers | None = None,
     period: Positive | None = None,
     name: str | None = None,
     isolate: bool = True,
@@ -260,7 +258,7 @@ def _description(file: Path, digest: str) -> Any:
 
 
 def _meanings(
-    file: str, known: Mapping[str, Any], chosen: Mapping[str, str], constants: Mapping[str, float]
+    file: str, known: Data, chosen: Mapping[str, str], constants: Numbers
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Return our name -> the FMU's, for its inputs and for its outputs, of the `known` variables by
     name.

@@ -24,6 +24,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from smc_mujoco.common.kinds import ArrayPair
 from smc_mujoco.mechanisms.plant import Plant
 
 GRID_POINTS = 201  # of a grid along each axis: odd, so that it has the origin
@@ -53,7 +54,7 @@ def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> n
     return s * (1.0 + lam / g * (1.0 - bend**2)) * (f - lam * g * bend + k1 * v)
 
 
-def plane(plant: Plant, k1: float, points: int = GRID_POINTS) -> tuple[np.ndarray, np.ndarray]:
+def plane(plant: Plant, k1: float, points: int = GRID_POINTS) -> ArrayPair:
     """Return a grid of states: x up to GRID_REACH |x0|, v up to k1 times that.
 
     On one diagonal alpha is 0.
@@ -69,7 +70,7 @@ def input_gain(plant: Plant) -> float:
     return float(_model(plant, np.zeros(1), np.zeros(1))[1][0])
 
 
-def _model(plant: Plant, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _model(plant: Plant, x: np.ndarray, v: np.ndarray) -> ArrayPair:
     """Return f and g of the first channel, with every channel in the same state."""
     p = SimpleNamespace(**plant.parameters)
     pairs = zip(np.ravel(x).tolist(), np.ravel(v).tolist(), strict=True)
