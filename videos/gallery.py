@@ -1,5 +1,5 @@
 """The clips that README and the pages show: laws side by side, a few seconds, as animated WebP in
-videos/gallery.
+videos/gallery; and of each a picture for phones, upright, as PNG.
 
 make gallery          or          python videos/gallery.py
 
@@ -17,6 +17,8 @@ from smc_mujoco.draw.film.film import Frames, write
 from smc_mujoco.mechanisms.plant import Plant
 
 FOLDER = Path(__file__).parent / "gallery"
+PHONE = (400, 600)  # px
+STILL = 0.4  # of a clip's seconds, of its picture for phones; chosen
 
 
 class Clip(NamedTuple):
@@ -30,9 +32,10 @@ class Clip(NamedTuple):
     condition: str = "nominal"
     changes: Mapping[str, Any] = {}
     laws: Sequence[str | Law] = ()
+    phone: bool = True  # whether its charts' titles fit a picture for phones
 
-    def frames(self) -> Frames:
-        """Return the pictures of the clip."""
+    def frames(self, **options: Any) -> Frames:
+        """Return the pictures of the clip; options as of `smc.film`."""
         changes = dict(self.changes)
         runs = []
         for law in self.laws:
@@ -41,7 +44,11 @@ class Clip(NamedTuple):
             runs = smc.paper.comparison(
                 str(self.plant), self.condition, duration=self.seconds, changes=changes
             ).values()
-        return smc.film(smc.run(runs), title=self.title, fps=20.0)
+        return smc.film(smc.run(runs), title=self.title, fps=20.0, **options)
+
+    def still(self) -> Frames:
+        """Return the picture for phones."""
+        return self.frames(size=PHONE, at=STILL * self.seconds)
 
 
 BLOW = {
@@ -112,6 +119,7 @@ CLIPS = {  # name of the clip's file -> what it shows
         3.2,
         changes=EIGHT,
         laws=("geometric", "quaternion_sliding"),
+        phone=False,
     ),
 }
 
@@ -119,3 +127,5 @@ if __name__ == "__main__":
     for name, clip in CLIPS.items():
         path = write(clip.frames(), FOLDER / f"{name}.webp")
         print(f"{path.relative_to(FOLDER.parents[1])}  {path.stat().st_size / 1e6:.2f} MB")
+        if clip.phone:
+            write(clip.still(), FOLDER / f"{name}.png")

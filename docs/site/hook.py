@@ -17,6 +17,8 @@ CATALOGUE = "catalogue.md"  # its tables name all plants and laws
 GROUP = "Catalogue"  # where the contents show their pages
 HEADER = "smc_mujoco/exchange/c/smc_law.h"  # to which pages link
 
+CLIP = r'(?<!\.png">)<img ([^>]*src="([^"]*gallery/)(\w+)\.webp"[^>]*)>'
+
 sys.path.insert(0, str(Path(__file__).parent))
 
 import catalogue  # noqa: E402
@@ -50,7 +52,7 @@ def on_config(config):
 
 def on_files(files, config):
     """Add the gallery, the generated pages and their pictures to the site's files."""
-    for path in sorted((ROOT / GALLERY).glob("*.webp")):
+    for path in sorted((ROOT / GALLERY).iterdir()):
         files.append(File.generated(config, f"{GALLERY}/{path.name}", abs_src_path=str(path)))
     files.append(File.generated(config, HEADER, abs_src_path=str(ROOT / HEADER)))
     for page in PAGES:
@@ -109,5 +111,13 @@ def linked(markdown: str) -> str:
 
 
 def on_page_content(html, page, config, files):
-    """Typeset the equations."""
-    return typeset(html)
+    """Typeset the equations, and give phones the pictures of clips that are made for them."""
+    return re.sub(CLIP, on_phones, typeset(html))
+
+
+def on_phones(clip: re.Match[str]) -> str:
+    """Return a clip's image with its picture for phones, if it has one."""
+    if not (ROOT / GALLERY / f"{clip[3]}.png").exists():
+        return clip[0]
+    source = f'<source media="(max-width: 30em)" srcset="{clip[2]}{clip[3]}.png">'
+    return f"<picture>{source}{clip[0]}</picture>"

@@ -21,8 +21,10 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
-LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
-SAME_RUNS = "the same runs settle"  # as far as these runs go: a share's interval is wider than 10 %
+LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
+SAME_RUNS = (
+    "settle in the same runs"  # as far as these runs go: a share's interval is wider than 10 %
+)
 MEDIANS = (
     f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share; "
     f"of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less."
@@ -42,7 +44,7 @@ UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval]; bold: no law is better.",
     "detects": f"Detects 24 %: a lead of 24 % would be seen in {100 * POWER:g} % of such tests.",
     "no lead": "Detects no lead: too few runs to see any lead.",
-    "below": "Below: smaller than what the problem can show, so not ranked.",
+    "below": "Below: smaller than what the problem can show; laws below it are not ranked.",
     "by the step": "By the step: the median at the physics step, and at half of it.",
 }
 
@@ -72,7 +74,7 @@ class Lead(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The ratio with its interval, such as "0.88 of pid (0.84 to 0.92), ahead in 24 of 24
+        """The ratio with its interval, such as "0.88 of pid's (0.84 to 0.92), ahead in 24 of 24
         runs"; "5 of 24 runs of pid have no value, ahead in 24 of 24 runs"; "a is below the
         sensor's 0.01 rad, b is not: at least 1.3 times less".
         """
@@ -90,7 +92,7 @@ class Lead(NamedTuple):
         ahead = f"ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
         if self.lacking:
             return f"{self.lacking} runs of {self.rival} have no value, {ahead}"
-        return f"{ratio} of {self.rival} ({low} to {high}), {ahead}"
+        return f"{ratio} of {self.rival}'s ({low} to {high}), {ahead}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -147,7 +149,7 @@ class Block:
         names = joined(low)
         if len(low) == len(self.medians) == 2:
             names = "both"
-        return f"{names} below {self.floor}: not ranked"
+        return f"{names} are below {self.floor}, so not ranked"
 
     @property
     def sample(self) -> str:
@@ -263,31 +265,33 @@ class Board(Tables):
             return reason
         if not self.best:
             return "none is unbeaten in every condition"
-        apart = self.cannot_tell
-        if all(block.level for block in self.blocks):
-            apart = SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS
-        unbeaten = "none beaten"
-        if any(self.losses(entry.law) for entry in self.entries):
-            unbeaten = f"undefeated: {joined(self.best)}"
-        if len(self.best) > 1:
-            unbeaten += f"; {apart}"
-        return unbeaten
+        return self.alike
 
     @property
-    def cannot_tell(self) -> str:
-        """That laws cannot be told apart, and the largest of the least leads that would have been
-        seen; which law is below the floor, where one is.
+    def alike(self) -> str:
+        """That the best laws are level or cannot be told apart, and the largest of the least leads
+        that would have been seen; which law is below the floor, where one is.
         """
+        if len(self.best) == 1:
+            return f"{self.best[0]} is undefeated, but does not beat every rival"
+        names = "both" if len(self.entries) == 2 else "all"
+        if any(self.losses(entry.law) for entry in self.entries):
+            names = joined(self.best)
+        if all(block.level for block in self.blocks):
+            return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         for block in self.blocks:
             if block.lead and block.lead.floor:
-                return block.lead.words
+                return f"{names} are undefeated; {block.lead.words}"
         seen = []
         for lead in map(self.visible, self.best):
             if not math.isnan(lead):
                 seen.append(lead)
         if not seen:
-            return "cannot tell them apart"
-        return f"cannot tell them apart ({_detects(max(seen), max(seen) >= MAX_VISIBLE)})"
+            return f"{names} are statistically indistinguishable"
+        least = "no lead"
+        if max(seen) < MAX_VISIBLE:
+            least = f"a lead of {100 * max(seen):.2g} %"
+        return f"{names} are statistically indistinguishable ({least} would show)"
 
     def visible(self, law: str) -> float:
         """Return the largest, over the blocks, of the least leads that would have been seen, a

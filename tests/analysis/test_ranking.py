@@ -729,9 +729,9 @@ SHOWN = [
     (FINE, "the problem's 0.00015 m"),
 ]
 BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
-    ((0.3, 0.9), None, "both below {q}: not ranked"),
-    ((0.001, 0.3), None, "both below {q}: not ranked"),
-    ((0.5, 0.6, 3.0), None, "a and b below {q}: not ranked"),
+    ((0.3, 0.9), None, "both are below {q}, so not ranked"),
+    ((0.001, 0.3), None, "both are below {q}, so not ranked"),
+    ((0.5, 0.6, 3.0), None, "a and b are below {q}, so not ranked"),
     ((0.5, 2.0), "a", "a wins: a is below {q}, b is not: at least 2."),
     ((0.5, 1.01), None, "a is below {q}, b is not"),
     ((0.5, 4.0, 5.0), "a", "a wins: a is below {q}, b is not: at least "),

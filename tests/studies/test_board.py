@@ -298,4 +298,4 @@ def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     assert "third wins under nominal, loses under noise" in split
     assert "second wins under noise, loses under nominal" in split
     lead = Lead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
-    assert lead.words == "0.850 of b (0.800 to 0.900), ahead in 5 of 8 sets of gains"
+    assert lead.words == "0.850 of b's (0.800 to 0.900), ahead in 5 of 8 sets of gains"

@@ -45,7 +45,7 @@ def tune(
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
-    searches: Annotated[int, typer.Option(min=1, help="Searches, which share nothing.")] = 12,
+    searches: Annotated[int, typer.Option(min=1, help="Independent searches.")] = 12,
     budget: Annotated[
         int, typer.Option(min=1, help="Sets of gains that a search tries at most, for each gain.")
     ] = 64,
@@ -71,7 +71,7 @@ def tune(
     and the plant. The objective is error times time, plus variation of u, summed over seven
     conditions in runs of 5 s: nominal, noise, delay, a sine and a constant disturbance, 30 % more
     and 30 % less mass. Each search has its own start, noise and initial states, so their results
-    show how much a tuning decides by chance. The same seed gives the same gains. With
+    show how much of a tuning is chance. The same seed gives the same gains. With
     --out each search is kept in the folder FILE-searches: if you stop the command, it continues
     there.
 
@@ -112,8 +112,8 @@ def margins(
     kinds: Annotated[
         str | None,
         typer.Option(
-            help="Any of delay, disturbance, friction, mass, noise, jitter, missed, as a,b; "
-            "default the first 5."
+            help="Any of delay, disturbance, friction, mass, noise, jitter, missed, gain, as a,b; "
+            "default: the first five."
         ),
     ] = None,
     gains: options.Gains = "tuned",
@@ -134,9 +134,9 @@ def margins(
 
     A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one,
     noise is the standard deviation of the position (that of the velocity is 5/s times as large),
-    and the delay of the command is in s. The column theory has the limit of the loop linearised at
-    rest, such as the delay at which rest becomes unstable, if the law can be linearised. A law may
-    tolerate more, with a small steady oscillation.
+    and the delay of the command is in s. The column "theory" has the limit of the loop linearised
+    at rest, such as the delay at which rest becomes unstable, if the law can be linearised. A law
+    may tolerate more, with a small steady oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """

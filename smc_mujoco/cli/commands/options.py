@@ -83,7 +83,7 @@ Condition = Annotated[
     ),
 ]
 Defaults = Annotated[
-    bool, typer.Option("--defaults", help="Name a winner also over laws with default gains.")
+    bool, typer.Option("--defaults", help="Name a winner even if a rival has default gains.")
 ]
 Disturbance = Annotated[
     float | None,

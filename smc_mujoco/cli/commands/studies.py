@@ -55,9 +55,10 @@ def which(
     """Recommend a law for a plant: which to use, with which gains, the second best, and how sure
     that is.
 
-    All laws that suit the plant are compared by the rules of `compare`, with gains of the package
-    or tuned now. On a model of your own that takes minutes for each law: --quick takes a sixteenth
-    of it, --law fewer laws. If you stop the command, it continues when you start it again.
+    All laws that suit the plant are compared by the rules of `compare`, with the package's gains
+    or with gains that are tuned now. On a model of your own tuning takes minutes for each law.
+    --quick takes a sixteenth of that time; --law names the laws to try. If you stop the command, it
+    continues when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
@@ -132,8 +133,8 @@ def compare(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Compare laws on plants in conditions: tune what has no gains, run, and say which law is
-    better, and how sure that is.
+    """Compare laws on plants in conditions: tune the laws that have no gains, run all of them, and
+    say which is better and how sure that is.
 
     A law with gains in brackets keeps them. Any other law, including one from your own file, has
     the package's gains for the plant, or else is tuned by the same rule, which takes seconds to
