@@ -307,13 +307,9 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     return next((machine.unit for machine in known if machine), "")
 
 
-def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
-    """Return law -> sources of its gains in some rows, by default in all."""
-    columns = []
-    for name in ("law", "source", "search"):
-        columns.append(np.asarray(table.column(name)))
-    if rows is not None:
-        columns = [column[rows] for column in columns]
+def sources(table: Columns, rows: np.ndarray) -> dict[str, tuple[Source, ...]]:
+    """Return law -> sources of its gains in some rows."""
+    columns = [np.asarray(table.column(name))[rows] for name in ("law", "source", "search")]
     by_law: dict[str, tuple[Source, ...]] = {}
     for law, kind, search in sorted(set(zip(*columns, strict=True)), key=str):
         about = {"kind": kind, "search": search and json.loads(search)}
