@@ -482,7 +482,7 @@ QUIET = ("slow", "middle")
 CHEAP = ("calm",)  # of the cheapest set, whatever the load
 SENTENCES = (
     Sentence("integral", TWISTING, RIVALS, (*QUIET, "fast", "strong"), within=True),
-    Sentence("smooth", RIVALS, SMOOTH, (*QUIET, "noisy"), high=10.0),
+    Sentence("smooth", RIVALS, SMOOTH, QUIET, high=10.0),
     Sentence("smooth, by noise", RIVALS, SMOOTH, QUIET, "rate", high=300.0),
     Sentence("sign", SMOOTH, ("classical",), QUIET),
     Sentence("cheap", OBSERVERS, (*TWISTING, "classical", "implicit_first_order"), CHEAP, "least"),

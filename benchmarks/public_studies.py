@@ -1,5 +1,5 @@
-"""Three public studies of sliding mode, run again by this package alone: two of a two-link arm, one
-of a cart-pole.
+"""Five public studies of sliding mode, run again by this package alone: two of a two-link arm, one
+of a cart-pole, one of a link that hangs, one of a unit mass.
 
     python benchmarks/public_studies.py
 
@@ -63,6 +63,15 @@ LIMA = {
     0.2: (0.027862, 0.053873, -0.073364),
     0.5: (0.101058, -0.001915, -0.438110),
 }
+LINK = """
+<mujoco model="link"><option gravity="0 0 -9.81"/><worldbody><body>
+  <joint name="hinge" axis="0 1 0" damping="1"/>
+  <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></worldbody></mujoco>
+"""
+UNIT = """
+<mujoco model="unit"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
+  <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>
+"""
 
 
 @smc.law_function(joint=True, gains={"lam": 5.0, "width": 0.1, "c": 0.5})
@@ -129,6 +138,21 @@ def pushing(y, p, memory):
     return p.level * math.copysign(1.0, y.v)
 
 
+@smc.law_function(gains={"la": 5.0, "Kd": 10.0, "epsilon": 0.1})
+def layered(y, gains, memory):
+    """Torques of a hanging link of 1 kg and 1 m, and a layer."""
+    s = y.de + gains.la * y.e
+    layer = min(max(s / gains.epsilon, -1.0), 1.0)
+    return (1.0 - gains.la) * y.de + 9.81 * math.sin(y.x) - gains.Kd * layer, s
+
+
+@smc.law_function(gains={"c": 1.5, "alpha": 2.0, "epsilon": 0.01})
+def smoothed(y, gains, memory):
+    """A smooth sign, and the damping of the line that s = 0 is."""
+    s = y.de + gains.c * y.e
+    return -gains.c * y.de - gains.alpha * s / (abs(s) + gains.epsilon), s
+
+
 def arm(lam, goal=STEP, width=0.1, c=0.5, duration=10.0):
     """Return the scenario of the arm."""
     free = smc.Channel(motor=True, u_max=5e3)
@@ -154,6 +178,31 @@ def cart(duration=39.98, level=0.4):
         duration=duration,
         control_period=2e-3,
         physics_step=1.25e-4,
+    )
+
+
+def link():
+    """Return the scenario of the hanging link."""
+    return smc.Scenario(
+        plant=smc.plant_from(LINK, channels={"hinge": smc.Channel(motor=True, u_max=20.0)}),
+        law=layered,
+        reference=smc.Constant(math.pi / 4),
+        x0=0.0,
+        duration=5.0,
+        control_period=0.01,
+    )
+
+
+def unit():
+    """Return the scenario of the unit mass."""
+    return smc.Scenario(
+        plant=smc.plant_from(UNIT, channels={"slide": smc.Channel(motor=True, u_max=100.0)}),
+        law=smoothed,
+        disturbance=smc.Sine(1.0, 2.0),
+        x0=1.0,
+        v0=-2.0,
+        duration=10.0,
+        control_period=1e-4,
     )
 
 

@@ -98,3 +98,25 @@ def test_in_forty_seconds_the_cart_s_command_is_that_of_the_study_s_table():
     u = smc.run(studies.cart()).u[:-1, 0]
     found = np.abs(u).mean(), np.abs(np.diff(u, prepend=0.0)).sum()
     assert found == pytest.approx((studies.LIMA_MEAN, studies.LIMA_STEPS), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "goal", "push", "size"),
+    [
+        (studies.link(), math.pi / 4, lambda t, x, v: -v - 9.81 * math.sin(x), math.pi / 4),
+        (studies.unit(), 0.0, lambda t, x, v: math.sin(2 * t), 1.0),
+    ],
+)
+def test_euler_s_steps_as_the_studies_take_them_agree_within_one_percent(
+    scenario, goal, push, size
+):
+    trace, law, h = smc.run(scenario), scenario.law, scenario.control_period
+    x, v, found = trace.x[0, 0], trace.v[0, 0], []
+    for t in trace.t[:-1].tolist():
+        see = SimpleNamespace(x=x, e=x - goal, de=v)
+        u, _ = law.function(see, SimpleNamespace(**law.gains), None)
+        found.append(x)
+        x, v = x + h * v, v + h * (u + push(t, x, v))
+    found = np.array(found)
+    np.testing.assert_allclose(trace.x[:-1, 0], found, atol=0.01 * size)
+    assert np.abs(trace.e[:-1]).sum() == pytest.approx(np.abs(found - goal).sum(), rel=0.01)
