@@ -108,12 +108,6 @@ def test_the_ends_are_the_order_statistics_that_the_binomial_distribution_gives(
     assert interval(np.arange(1.0, n + 1))[1:3] == (low, high)
 
 
-def test_from_six_to_forty_seeds_it_covers_93_percent_or_more():
-    for n in range(6, 41):
-        low, high = interval(np.arange(1, n + 1))[1:3]
-        assert stats.binom.cdf(high - 1, n, 0.5) - stats.binom.cdf(low - 1, n, 0.5) > 0.93
-
-
 @pytest.mark.slow
 def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_pooled_runs_does_not():
     rng = np.random.default_rng(0)
@@ -218,6 +212,7 @@ WINS = [  # what a law and a rival with twice its values have besides, who wins,
     ({"trends": {"a": 0.5 * FLAT, "b": FLAT}}, "a", "a falling one is not"),
     ({"floors": 1e3}, None, "values below what the problem can show win nothing"),
     ({"floors": 1.3}, "a", "a law below it beats a rival beyond it"),
+    ({"relevant": 0.5}, None, "a lead that is just relevant wins nothing"),
 ]
 
 
@@ -238,21 +233,6 @@ def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals
     assert not Comparison({"a": scores["a"], "b": unpaired}).beaten.any()
     # nor does a law that is always last hide it
     assert Comparison(scores | {"z": blocks(9.0), "never": blocks(INF)}).winners == ["a"]
-
-
-@pytest.mark.parametrize(
-    ("factor", "relevant", "wins"),
-    [
-        (1.02, 0.03, False),
-        (1.04, 0.03, True),
-        (1.04, 0.05, False),
-    ],
-)
-def test_less_than_the_least_relevant_difference_is_a_tie_however_sure_it_is(
-    factor, relevant, wins
-):
-    found = Comparison({"a": blocks(1.0), "b": blocks(factor)}, relevant=relevant)
-    assert found.beaten.tolist() == [[False], [wins]]
 
 
 @pytest.mark.slow

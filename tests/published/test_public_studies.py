@@ -65,14 +65,6 @@ def test_the_arm_is_the_report_s_equation(lam):
     np.testing.assert_allclose(trace.u[:1000], u, rtol=1e-4, atol=1e-3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("lam", studies.PETRIDIS)
-def test_the_arm_settles_when_its_report_says(lam):
-    traces = smc.run([studies.arm(lam), studies.arm(lam, studies.PATH)])
-    found = [studies.settled(trace) for trace in traces]
-    assert found == pytest.approx(studies.PETRIDIS[lam][::2], abs=0.35)  # read off figures
-
-
 @pytest.mark.parametrize("level", [0.4, -0.4])
 def test_the_cart_is_the_study_s_equation_and_its_rows_are_the_study_s(level):
     def slope(x, v, u):
@@ -101,22 +93,20 @@ def test_in_forty_seconds_the_cart_s_command_is_that_of_the_study_s_table():
 
 
 @pytest.mark.parametrize(
-    ("scenario", "goal", "push", "size"),
+    ("scenario", "push"),
     [
-        (studies.link(), math.pi / 4, lambda t, x, v: -v - 9.81 * math.sin(x), math.pi / 4),
-        (studies.unit(), 0.0, lambda t, x, v: math.sin(2 * t), 1.0),
+        (studies.link(), lambda t, x, v: -v - 9.81 * math.sin(x)),
+        (studies.unit(), lambda t, x, v: math.sin(2 * t)),
     ],
 )
-def test_euler_s_steps_as_the_studies_take_them_agree_within_one_percent(
-    scenario, goal, push, size
-):
-    trace, law, h = smc.run(scenario), scenario.law, scenario.control_period
-    x, v, found = trace.x[0, 0], trace.v[0, 0], []
-    for t in trace.t[:-1].tolist():
-        see = SimpleNamespace(x=x, e=x - goal, de=v)
+def test_euler_s_steps_as_the_studies_take_them_agree_within_one_percent(scenario, push):
+    trace = smc.run(scenario)
+    law, h = scenario.law, scenario.control_period
+    x, v = trace.x[0, 0], trace.v[0, 0]
+    errors = []
+    for t, r in zip(trace.t[:-1], trace.r[:-1, 0], strict=True):
+        errors.append(x - r)
+        see = SimpleNamespace(x=x, e=x - r, de=v)
         u, _ = law.function(see, SimpleNamespace(**law.gains), None)
-        found.append(x)
         x, v = x + h * v, v + h * (u + push(t, x, v))
-    found = np.array(found)
-    np.testing.assert_allclose(trace.x[:-1, 0], found, atol=0.01 * size)
-    assert np.abs(trace.e[:-1]).sum() == pytest.approx(np.abs(found - goal).sum(), rel=0.01)
+    np.testing.assert_allclose(trace.e[:-1, 0], errors, atol=0.01 * abs(errors[0]))
