@@ -112,10 +112,10 @@ def linked(markdown: str) -> str:
 
 def on_page_content(html, page, config, files):
     """Typeset the equations, and give phones the pictures of clips that are made for them."""
-    return re.sub(CLIP, on_phones, typeset(html))
+    return re.sub(CLIP, with_phone, typeset(html))
 
 
-def on_phones(clip: re.Match[str]) -> str:
+def with_phone(clip: re.Match[str]) -> str:
     """Return a clip's image with its picture for phones, if it has one."""
     if not (ROOT / GALLERY / f"{clip[3]}.png").exists():
         return clip[0]
