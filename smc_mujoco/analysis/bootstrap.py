@@ -29,6 +29,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.kinds import Array
+
 LEVEL = 0.95  # of confidence, of every interval and verdict; chosen
 # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
 RESAMPLES = 1999
@@ -45,7 +47,7 @@ class Interval(NamedTuple):
     n: int  # number of samples: seeds, or sets of gains
 
 
-def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Interval:
+def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
     """Return the median of the blocks' medians, of values (blocks, n) that are NaN where there is
     no run.
 
@@ -85,7 +87,7 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
     return Interval(centre, float(lower[at - 1]), float(upper[RESAMPLES - at]), n)
 
 
-def middle(values: np.ndarray) -> np.ndarray:
+def middle(values: Array) -> Array:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered = np.sort(values, axis=-1)
     n = (~np.isnan(values)).sum(axis=-1, keepdims=True)
@@ -113,7 +115,7 @@ def share_interval(share: float, n: int) -> Interval:
 
 
 @functools.lru_cache(maxsize=8)
-def draws(n: int) -> np.ndarray:
+def draws(n: int) -> Array:
     """Return how often each of n samples is drawn in each resample, (n, RESAMPLES)."""
     drawn = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
     return np.ascontiguousarray(drawn.T, np.int32)

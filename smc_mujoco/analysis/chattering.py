@@ -14,7 +14,6 @@ Control Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
 """
 
 import cmath
-import dataclasses
 import functools
 import itertools
 import math
@@ -24,8 +23,9 @@ import numpy as np
 
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, whole
-from smc_mujoco.common.kinds import Fields, Names, Pair
+from smc_mujoco.common.kinds import Array, Fields, Names, Pair
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
@@ -75,7 +75,7 @@ Balance = tuple[float, float]  # amplitude of e, rad or m, and omega, rad/s, whe
 Cell = tuple[np.ndarray, np.ndarray]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Chattering:
     """A predicted limit cycle of one channel.
 
@@ -246,7 +246,7 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         omega = math.exp(slow + i * dw)
         return loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES) * loop.response(omega)
 
-    def at_corners(cells: np.ndarray, side: int) -> np.ndarray:
+    def at_corners(cells: Array, side: int) -> Array:
         places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
         return np.array([product(i, k) for i, k in places]).reshape(-1, len(CORNERS))
 
@@ -274,7 +274,7 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
                 yield found
 
 
-def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
+def _may_balance(products: Array, sides: Array) -> Array:
     """Return whether N L may be 1 in cells, (K,), from its values at their corners, (K, 4), with a
     margin.
     """
@@ -289,7 +289,7 @@ def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
     return near & (np.ceil(lowest / math.tau) * math.tau <= highest)
 
 
-def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
+def _balanced(loop: Loop, low: Array, high: Array) -> Balance | None:
     """Return the balance in a cell or near it, with all samples; None where N jumps across it."""
     from scipy.optimize import root
 
@@ -297,7 +297,7 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
     largest = high + MAX_SHIFT
     largest[1] = min(largest[1], math.log(math.pi / loop.scenario.control_period))
 
-    def excess(z: np.ndarray) -> np.ndarray:
+    def excess(z: Array) -> Array:
         inside = np.clip(z, least, largest)
         amplitude, omega = np.exp(inside).tolist()
         product = cmath.log(
@@ -305,7 +305,7 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
         )
         return np.array([product.real, product.imag]) + (inside - z)
 
-    def solved() -> Iterator[np.ndarray]:
+    def solved() -> Iterator[Array]:
         yield root(excess, 0.5 * (low + high), options=ROOT_OPTIONS).x
         yield _bisected(excess, low, high)
 
@@ -316,9 +316,7 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
     return None
 
 
-def _bisected(
-    excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
+def _bisected(excess: Callable[[Array], Array], low: Array, high: Array) -> Array:
     """Return where log |N L| and arg N L are 0, in a cell or beside it: solved for amplitude and
     omega in turn.
     """
@@ -404,7 +402,7 @@ def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
     return ((up - down) * (fast - slow).conjugate()).imag < 0.0
 
 
-def _turns(loop: Loop, balances: Sequence[Balance]) -> np.ndarray:
+def _turns(loop: Loop, balances: Sequence[Balance]) -> Array:
     """Return the phase of L at cycles, unwrapped over frequency, in turns."""
     omegas = [omega for _, omega in balances]
     if len(omegas) < 2:
@@ -427,7 +425,7 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
     if math.isnan(wave.third):
         return wave
 
-    def excess(z: np.ndarray) -> list[float]:
+    def excess(z: Array) -> list[float]:
         product = np.log(loop.wave(*np.exp(z)).gain * loop.response(math.exp(z[1])))
         return [product.real, product.imag]
 

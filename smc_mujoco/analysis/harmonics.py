@@ -22,7 +22,7 @@ import numpy as np
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
-from smc_mujoco.common.kinds import ArrayPair, Floats, Pair
+from smc_mujoco.common.kinds import Array, ArrayPair, Floats, Pair
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
@@ -188,7 +188,7 @@ class Loop:
         answer = np.abs(self._answer(omega)[self.rows[: self.scenario.plant.driven]])
         return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
 
-    def _solve(self, omega: complex) -> np.ndarray:
+    def _solve(self, omega: complex) -> Array:
         """Return the state at samples per unit of held u, with u's images at omega + 2 pi m /
         control_period.
         """
@@ -220,7 +220,7 @@ class Loop:
         _, sliding = self._controlled(s.control_period, [x, np.zeros(len(x))])
         return float(np.abs(sliding).max())
 
-    def _controlled(self, h: float, motion: list[np.ndarray]) -> ArrayPair:
+    def _controlled(self, h: float, motion: list[Array]) -> ArrayPair:
         """Return u and s for x and v of the channel, and of the joint that it moves, every h
         seconds.
         """
@@ -305,7 +305,7 @@ class Loop:
         )
 
     def _harmonics_of_e(
-        self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray
+        self, amplitude: float, omega: float, u: Array, angles: Array
     ) -> list[complex]:
         """Return the harmonics of e: the given amplitude, then the mechanism's answer to the other
         harmonics of u.
@@ -330,7 +330,7 @@ class Loop:
 
     def _excited(
         self, amplitudes: Sequence[complex], omega: float, max_samples: float, position: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[Array, Array, Array]:
         """Return omega t, u and s of the samples after memories have settled, for an error of these
         harmonics.
 
@@ -374,10 +374,10 @@ class Clock(NamedTuple):
     """The times of an excitation's samples."""
 
     h: float  # from one sample to the next, s
-    turns: np.ndarray  # exp(j omega t) of all samples, complex, (K,)
+    turns: Array  # exp(j omega t) of all samples, complex, (K,)
     first: int  # number of samples in which memories settle
-    angles: np.ndarray  # omega t of the others, rad
-    against: np.ndarray  # exp(-j omega t) of the others, complex
+    angles: Array  # omega t of the others, rad
+    against: Array  # exp(-j omega t) of the others, complex
 
 
 class Controller:
@@ -399,7 +399,7 @@ class Controller:
     def __call__(
         self,
         fixed: Mapping[int, float],
-        motion: Sequence[np.ndarray],
+        motion: Sequence[Array],
         models: Sequence[Floats],
     ) -> ArrayPair:
         """Return u and s, each (K,), for the samples of a motion, with memories as at the start of
@@ -449,7 +449,7 @@ def transition(
     return stepped[:n, :n], stepped[:n, n:]
 
 
-def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.ndarray:
+def _behind(drive: Actuator, block: Array, model: mujoco.MjModel) -> Array:
     """Return the `rates` of a model behind a drive: the drive's outputs become states, and its
     inputs the commands.
 
@@ -496,11 +496,11 @@ def _play_at(c: float) -> complex:
     return complex(sine, cosine) * 2.0 / math.pi
 
 
-def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
+def _harmonic(values: Array, angles: Array) -> complex:
     return _first(values, np.exp(-1j * angles))
 
 
-def _first(values: np.ndarray, against: np.ndarray) -> complex:
+def _first(values: Array, against: Array) -> complex:
     """Return the complex amplitude of sin(angle), given exp(-j angle): a Hann window of sum 1
     rejects other waves.
     """
@@ -508,7 +508,7 @@ def _first(values: np.ndarray, against: np.ndarray) -> complex:
 
 
 @functools.lru_cache(maxsize=64)
-def _window(count: int) -> np.ndarray:
+def _window(count: int) -> Array:
     return np.hanning(count) / np.hanning(count).sum()
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.common.jit import NotCompilable, call
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.simulation import callback, cfunctions, state
 from smc_mujoco.simulation.prepare import prepare
@@ -63,7 +64,7 @@ def law_time(scenario: Scenario) -> LawTime | None:
     return LawTime(median, high, median / float(np.median(other)))
 
 
-def _measured(scenario: Scenario) -> np.ndarray:
+def _measured(scenario: Scenario) -> Array:
     """Return what the law measures in the last channel at each sample of a run, (samples, fields
     of a Measurement).
     """
@@ -79,7 +80,7 @@ def _measured(scenario: Scenario) -> np.ndarray:
     return np.array(seen)
 
 
-def _round(timed: Law, seen: np.ndarray) -> np.ndarray:
+def _round(timed: Law, seen: Array) -> Array:
     """Return the time of a law at each sample, s, (samples,)."""
     function = cfunctions.compile_component(timed)
     copies = max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1)))

@@ -31,7 +31,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Finite, Natural, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import ArrayPair, Pair
+from smc_mujoco.common.kinds import Array, ArrayPair, Pair
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
@@ -51,10 +51,10 @@ class Linear:
 
     inertia: float
     damping: float
-    stiffness: np.ndarray
+    stiffness: Array
 
     @functools.cached_property
-    def modes(self) -> np.ndarray:
+    def modes(self) -> Array:
         """The stiffnesses of the modes, (n,), smallest first; a negative one is unstable by
         itself.
         """
@@ -79,7 +79,7 @@ def linear(plant: Plant) -> Linear:
             "each"
         )
 
-    def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
+    def slopes(at: Callable[[Array, int], float]) -> Array:
         """Return -d f_i / d z_j / g, (n, n), by central differences."""
         steps = DIFFERENCE_STEP * np.eye(n)
         return np.array(
@@ -214,7 +214,7 @@ def steady_error(plant: Plant, lam: Natural, k1: Natural, d: Finite) -> float:
 
 def restoring_force(
     plant: Plant, law: Law, u_max: float = math.inf
-) -> Callable[[np.ndarray], np.ndarray] | None:
+) -> Callable[[Array], Array] | None:
     """Return the force, N or N m, that pulls all channels back from the same x > 0, (k,), or None
     without theory.
     """
@@ -233,7 +233,7 @@ def restoring_force(
     ):
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
-    def force(x: np.ndarray) -> np.ndarray:
+    def force(x: Array) -> Array:
         nominal = []
         for each in x:
             nominal.append(plant.nominal(np.full(plant.n, each), v, 0, p))

@@ -14,6 +14,7 @@ import numpy as np
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, has, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -39,7 +40,7 @@ class Columns(Protocol):
     arrived, and every metric.
     """
 
-    def column(self, name: str) -> np.ndarray:
+    def column(self, name: str) -> Array:
         """Return the values of a column, with None or NaN for missing ones."""
         ...
 
@@ -51,11 +52,11 @@ class Columns(Protocol):
 class ByRow(NamedTuple):
     """A metric of the rows of a table, each (rows,)."""
 
-    values: np.ndarray  # see `values`
+    values: Array  # see `values`
     # y', the same at half the physics step: inf for a run that then failed, NaN for none
-    halves: np.ndarray
-    trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
-    arrived: np.ndarray  # 1.0 for a run that has arrived, else 0.0
+    halves: Array
+    trends: Array  # rho, see `metrics.catalogue.trends`; NaN for none
+    arrived: Array  # 1.0 for a run that has arrived, else 0.0
 
 
 def check_table(table: object) -> None:
@@ -64,7 +65,7 @@ def check_table(table: object) -> None:
         raise ScenarioError(f"table is {shown(table)}: give a study's, as smc.Table.read(path)")
 
 
-def values(table: Columns, metric: str) -> np.ndarray:
+def values(table: Columns, metric: str) -> Array:
     """Return a metric by row: inf for a failed run, and for one that has not arrived unless the
     metric is an error; NaN where it does not apply.
 
@@ -106,12 +107,12 @@ def by_row(table: Columns, metric: str) -> ByRow:
     return ByRow(whole, halves, trends, has_arrived(table).astype(float))
 
 
-def _settled(times: np.ndarray) -> np.ndarray:
+def _settled(times: Array) -> Array:
     """Return 0.0 for a time, 1.0 for never, NaN for none."""
     return np.where(np.isnan(times), np.nan, np.isinf(times))
 
 
-def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndarray:
+def _from_json(table: Columns, column: str, name: str, absent: float) -> Array:
     """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run
     that failed.
     """
@@ -122,12 +123,12 @@ def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndar
     return np.array(found, float)
 
 
-def has_arrived(table: Columns) -> np.ndarray:
+def has_arrived(table: Columns) -> Array:
     """Return which rows are runs that have arrived."""
     return table.column("arrived") == np.array(True)
 
 
-def failed(table: Columns) -> np.ndarray:
+def failed(table: Columns) -> Array:
     """Return which rows are runs that failed."""
     lost = np.array([failure is not None for failure in table.column("failure")], bool)
     return lost | ~np.isnan(np.array(table.column("diverged_at"), float))
@@ -152,12 +153,12 @@ class Scores(NamedTuple):
 
     blocks: list[int]  # the numbers of these blocks in the group
     # NaN where not all laws ran, or every law did the same as with an earlier seed
-    values: dict[str, np.ndarray]
-    outcomes: dict[str, np.ndarray]  # as `Group.outcome`
-    sets: dict[str, np.ndarray]  # as `Group.sets`
-    halves: dict[str, np.ndarray]  # as `ByRow.halves`
-    trends: dict[str, np.ndarray]  # as `ByRow.trends`
-    arrived: dict[str, np.ndarray]  # as `ByRow.arrived`
+    values: dict[str, Array]
+    outcomes: dict[str, Array]  # as `Group.outcome`
+    sets: dict[str, Array]  # as `Group.sets`
+    halves: dict[str, Array]  # as `ByRow.halves`
+    trends: dict[str, Array]  # as `ByRow.trends`
+    arrived: dict[str, Array]  # as `ByRow.arrived`
 
 
 class Group:
@@ -166,9 +167,7 @@ class Group:
     Arrays are (laws, blocks, seeds), -1 where there is no run.
     """
 
-    def __init__(
-        self, name: Mapping[str, str], rows: np.ndarray, columns: Mapping[str, np.ndarray]
-    ):
+    def __init__(self, name: Mapping[str, str], rows: Array, columns: Mapping[str, Array]):
         self.name = name  # the plant that they share, or plant and condition, as column -> value
         keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
         self.blocks = tuple(dict.fromkeys(keys))  # (plant, condition)
@@ -189,7 +188,7 @@ class Group:
             )
 
     @property
-    def common(self) -> np.ndarray:
+    def common(self) -> Array:
         """Whether every law ran, (blocks, seeds)."""
         return np.all(self.rows >= 0, axis=0)
 
@@ -247,7 +246,7 @@ def groups(table: Columns, by: Sequence[str]) -> list[Group]:
     return made
 
 
-def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def _checked_sets(table: Columns, columns: Mapping[str, Array]) -> Array:
     """Return a number for each row, equal for equal gains; refuse runs of a cell that differ in
     more than the law.
     """
@@ -273,7 +272,7 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
     return np.array(sets, np.int64)
 
 
-def _outcomes(table: Columns) -> np.ndarray:
+def _outcomes(table: Columns) -> Array:
     """Return a number for each row: equal for runs whose metrics are all equal up to rounding."""
     columns = []
     for name in (*CATALOGUE, "diverged_at"):
@@ -307,7 +306,7 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     return next((machine.unit for machine in known if machine), "")
 
 
-def sources(table: Columns, rows: np.ndarray) -> dict[str, tuple[Source, ...]]:
+def sources(table: Columns, rows: Array) -> dict[str, tuple[Source, ...]]:
     """Return law -> sources of its gains in some rows."""
     columns = [np.asarray(table.column(name))[rows] for name in ("law", "source", "search")]
     by_law: dict[str, tuple[Source, ...]] = {}

@@ -17,7 +17,7 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import LEVEL, Interval, share_interval
 from smc_mujoco.analysis.worst_case.uncertainty import Constant, Member, Members, Uncertainty
 from smc_mujoco.common.constraints import MAX_SEED
-from smc_mujoco.common.kinds import ArrayPair, Pair
+from smc_mujoco.common.kinds import Array, ArrayPair, Pair
 from smc_mujoco.simulation.scenario import Scenario
 
 RESAMPLES = 499  # of a bootstrap: chosen
@@ -99,7 +99,7 @@ class Space:
         if levels or within.jitter > 0.0 or _random(scenario):
             add(CHANCE, math.nan, math.nan, "")
 
-    def scenario_at(self, shares: np.ndarray) -> Scenario:
+    def scenario_at(self, shares: Array) -> Scenario:
         """Return the scenario at a share of each axis."""
         known = dict(zip(self.names, shares.tolist(), strict=True))
         m = len(self.members.constants)
@@ -123,7 +123,7 @@ class Space:
             return low + share * (high - low)
         return constant.value(share)
 
-    def column(self, axis: int, shares: np.ndarray) -> np.ndarray:
+    def column(self, axis: int, shares: Array) -> Array:
         """Return the values of an axis at points, (N,); for chance the shares."""
         if self.names[axis] == CHANCE:
             return shares[:, axis]
@@ -139,9 +139,9 @@ class SobolResult:
     unit: str  # of the score
     axes: tuple[Axis, ...]  # the largest total index first
     space: Space  # what the columns of `shares` mean
-    shares: np.ndarray  # (N, axes), where in each axis's range a run lies
-    values: np.ndarray  # (N,), its score; a run without one has the worst of the others
-    failed: np.ndarray  # (N,) bool, whether it fails or ends beyond 5 % of its scale
+    shares: Array  # (N, axes), where in each axis's range a run lies
+    values: Array  # (N,), its score; a run without one has the worst of the others
+    failed: Array  # (N,) bool, whether it fails or ends beyond 5 % of its scale
     unscored: int  # how many of them have no score
     regions: tuple[Region, ...]
 
@@ -159,7 +159,7 @@ def _random(scenario: Scenario) -> bool:
     )
 
 
-def designs(points: int, k: int, seed: int) -> np.ndarray:
+def designs(points: int, k: int, seed: int) -> Array:
     """Return Saltelli's design, ((k + 2) points, k):
 
     A, B, then A with one column of B, for each column.
@@ -175,7 +175,7 @@ def designs(points: int, k: int, seed: int) -> np.ndarray:
     return np.concatenate([a, b, *mixed])
 
 
-def estimates(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> ArrayPair:  # scipy's
+def estimates(f_A: Array, f_B: Array, f_AB: Array) -> ArrayPair:  # scipy's
     """Return the first-order and total indices of outputs, (s, k) each; (s, n) at A and at B, (k,
     s, n) mixed.
 
@@ -192,14 +192,14 @@ def estimates(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> ArrayPair: 
     return np.where(common**2 < 1.0, alone, 0.0).T, whole.T
 
 
-def _standardised(f: np.ndarray) -> np.ndarray:
+def _standardised(f: Array) -> Array:
     """Return outputs of mean 0 and variance 1; 0 where they do not vary."""
     centred = f - f.mean(-1, keepdims=True)
     deviation = centred.std(-1, keepdims=True)
     return np.divide(centred, deviation, out=np.zeros_like(centred), where=deviation > 0.0)
 
 
-def possible(first: np.ndarray, total: np.ndarray) -> np.ndarray:
+def possible(first: Array, total: Array) -> Array:
     """Return estimates, (k,) each, moved to where indices can be, as (2, k): 0 <= first <= total <=
     1.
 
@@ -212,7 +212,7 @@ def possible(first: np.ndarray, total: np.ndarray) -> np.ndarray:
 
 
 def indices(
-    space: Space, scores: np.ndarray, points: int, shares: np.ndarray, values: np.ndarray, seed: int
+    space: Space, scores: Array, points: int, shares: Array, values: Array, seed: int
 ) -> list[Axis]:
     """Return each axis with its indices."""
     from scipy.stats import sobol_indices, spearmanr
@@ -223,7 +223,7 @@ def indices(
     first = total = [Interval(0.0, 0.0, 0.0, points)] * k
     if np.ptp(parts[:2]):
 
-        def of(at: np.ndarray) -> np.ndarray:
+        def of(at: Array) -> Array:
             """Return both indices of each axis, (2, k), from some of the points."""
             # twice: scipy fails on one axis of one output, and centres in place
             some = np.stack([parts[:, at]] * 2)
@@ -250,7 +250,7 @@ def indices(
     return axes
 
 
-def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
+def _within(cuts: Sequence[Cut], shares: Array) -> Array:
     """Return which points lie within all cuts, (N,)."""
     sides = []
     for cut in cuts:
@@ -262,7 +262,7 @@ def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
     return np.ones(len(shares), bool)
 
 
-def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region]:
+def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
     """Return regions where runs fail, chosen by the first half of the points, with rates from the
     second.
 
@@ -303,7 +303,7 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
     return found
 
 
-def _more_fail(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
+def _more_fail(failed: Array, within: Array, left: Array) -> bool:
     """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact
     test.
     """
@@ -315,13 +315,13 @@ def _more_fail(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool
     return float(np.asarray(fisher_exact(counts, "greater"))[1]) < REGION_ERROR
 
 
-def _rate(failed: np.ndarray) -> Interval:
+def _rate(failed: Array) -> Interval:
     return share_interval(
         float(failed.mean()) if len(failed) else 0.0, max(1, len(failed))
     )._replace(n=len(failed))
 
 
-def _gain(within: np.ndarray, failed: np.ndarray, bounds: int) -> float:
+def _gain(within: Array, failed: Array, bounds: int) -> float:
     """Return how well a region where more fail explains failures: the gain in log likelihood less
     BIC's price.
     """
@@ -333,15 +333,13 @@ def _gain(within: np.ndarray, failed: np.ndarray, bounds: int) -> float:
     return sum(map(_log_likelihood, parts)) - _log_likelihood(failed) - bounds * math.log(n)
 
 
-def _log_likelihood(failed: np.ndarray) -> float:
+def _log_likelihood(failed: Array) -> float:
     n = len(failed)
     k = int(failed.sum())
     return sum(count * math.log(count / n) for count in (k, n - k) if count)
 
 
-def improvement(
-    space: Space, shares: np.ndarray, values: np.ndarray, failed: np.ndarray
-) -> Improvement | None:
+def improvement(space: Space, shares: Array, values: Array, failed: Array) -> Improvement | None:
     """Return the half of an axis with the fewest failures and then the best median, chosen by half
     of the points, with numbers from the others.
 

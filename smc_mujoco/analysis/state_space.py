@@ -7,6 +7,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, joint_names
@@ -92,7 +93,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     )
 
 
-def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: str) -> None:
+def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: Array, name: str) -> None:
     """Set the commands that hold a mechanism at rest; raise ScenarioError if there are none."""
     b = rates(model, data)[model.nv : 2 * model.nv, 2 * model.nv + model.na :][:, driven]
     mujoco.mj_forward(model, data)
@@ -103,7 +104,7 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: 
         raise ScenarioError(f"no command holds {name} at rest at x = {x}: give another x")
 
 
-def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+def rates(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return d(rates) / d(positions, velocities, activations, commands) at `data`, square; rows of
     commands are 0.
     """
@@ -113,7 +114,7 @@ def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     point = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
     model.opt.timestep = INSTANT_STEP  # the force of a drive is that at the end of a step
 
-    def rates_at(offset: np.ndarray) -> np.ndarray:
+    def rates_at(offset: Array) -> Array:
         data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = point
         mujoco.mj_integratePos(model, data.qpos, offset[:nv], 1.0)
         data.qvel[:] += offset[nv : 2 * nv]

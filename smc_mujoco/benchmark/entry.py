@@ -25,6 +25,7 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.kinds import AnyPath, Data, Fields, Names, Numbers
@@ -45,7 +46,7 @@ DIVISIONS = {
 EVERYWHERE = "all"  # the set of gains of the division "one set"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Entry:
     """An entry, as its folder says.
 

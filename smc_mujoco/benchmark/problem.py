@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
-from smc_mujoco.common.kinds import Data, Floats, Names, Numbers
+from smc_mujoco.common.kinds import Array, Data, Floats, Names, Numbers
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law, known_laws
@@ -43,7 +44,7 @@ MEASURES = "accuracy", "settling", "calm"  # that have targets
 SIZES = "sigma", "amplitude", "x", "y", "z", "w20"  # fields of a disturbance that scale it
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Instance:
     """What distinguishes an instance of a problem from the others: a side and factors, see the
     rules.
@@ -56,7 +57,7 @@ class Instance:
     seed: int
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Problem:
     """A problem. It is made by `problem`.
 
@@ -242,7 +243,7 @@ class Problem:
         }
         return values | self._times(trace, worst, values)
 
-    def _times(self, trace: Trace, worst: np.ndarray, values: Numbers) -> dict[str, float]:
+    def _times(self, trace: Trace, worst: Array, values: Numbers) -> dict[str, float]:
         """Return the time of each target, by name."""
         reached = [_kept(trace, worst, level) for level in self.targets.get("accuracy", ())]
         times = dict(zip(self._names(), map(_or_never, reached), strict=False))
@@ -347,7 +348,7 @@ def _scaled(signal: Any, factor: float) -> Any:
     return dataclasses.replace(signal, **sizes)
 
 
-def _kept(trace: Trace, error: np.ndarray, level: float) -> float:
+def _kept(trace: Trace, error: Array, level: float) -> float:
     """Return the time from which an error, (K + 1,), is kept below a level, s; inf if that is in
     the last fifth.
     """

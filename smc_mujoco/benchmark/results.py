@@ -10,7 +10,6 @@ speed, calm. An entry has the mean rank of its medians over the board's problems
 over problems, and the share of the targets that it reaches and keeps.
 """
 
-import dataclasses
 import functools
 import hashlib
 import os
@@ -26,9 +25,10 @@ import numpy as np
 from smc_mujoco.benchmark import enter, runs, suite
 from smc_mujoco.benchmark.enter import RESULT, TABLE
 from smc_mujoco.benchmark.problem import problem
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
-from smc_mujoco.common.kinds import AnyPath, ArrayPair, Data, Fields, Names, Numbers
+from smc_mujoco.common.kinds import AnyPath, Array, ArrayPair, Data, Fields, Names, Numbers
 
 MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 TITLES = {
@@ -79,7 +79,7 @@ def _check(values: Any, fields: Data) -> None:
             raise ScenarioError(f"its {name} is {shown(values.get(name))}")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Standing:
     """The place of an entry on a board."""
 
@@ -92,7 +92,7 @@ class Standing:
     reached: float  # share of the targets of all runs that are reached and kept
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Board:
     """A question and the entries' places."""
 
@@ -151,7 +151,7 @@ class Result:
         """Problem -> measure -> the median over its instances, see `Runs.medians`."""
         return self.runs.medians()
 
-    def targets(self, problems: Sequence[str], measure: str) -> np.ndarray:
+    def targets(self, problems: Sequence[str], measure: str) -> Array:
         """Return the times from which the targets of a measure are reached and kept, s, inf for
         never, (targets,).
         """
@@ -192,7 +192,7 @@ class Results:
         """Return the problems that inform a board."""
         return self._informing[question]
 
-    def ranks(self, question: str, names: Sequence[str]) -> np.ndarray:
+    def ranks(self, question: str, names: Sequence[str]) -> Array:
         """Return the ranks of entries on each problem of a board, (entries, problems); equal
         medians share a rank.
         """
@@ -282,7 +282,7 @@ class Results:
         return Change(entry=name, question=question, ratios=ratios)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Change:
     """How the medians of an entry on a board's problems changed: problem -> the new one over the
     old one.
@@ -311,7 +311,7 @@ class Change:
         return line
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Changes:
     """What changed between two results on a suite, by entry and board."""
 

@@ -19,6 +19,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
 from smc_mujoco.common.files import as_path
 
@@ -36,7 +37,7 @@ class Constraint:
         raise NotImplementedError
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Number(Constraint):
     """A number > `above`, >= `low` and <= `high`, finite unless `infinite`, as a float."""
 
@@ -56,7 +57,7 @@ class Number(Constraint):
         )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Whole(Constraint):
     """A whole number from `low` to `high`, as an int; also inf if `infinite`."""
 
@@ -70,7 +71,7 @@ class Whole(Constraint):
         return whole(what, value, self.low, self.high)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class OneOf(Constraint):
     """One of some names."""
 
@@ -82,7 +83,7 @@ class OneOf(Constraint):
         raise unknown(what, value, self.names)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Flag(Constraint):
     """True or False."""
 
@@ -92,7 +93,7 @@ class Flag(Constraint):
         raise ScenarioError(f"{what} is {shown(value)}: give True or False")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Each(Constraint):
     """A value that satisfies `one`, or a list with such a value for each channel, as a tuple."""
 
@@ -109,7 +110,7 @@ class Each(Constraint):
         return tuple(self.one(f"{what}[{i}]", item) for i, item in enumerate(listed))
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Range(Constraint):
     """Two numbers, as `Number` declares them, the lowest first."""
 
@@ -127,7 +128,7 @@ class Range(Constraint):
         return low, high
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class FilePath(Constraint):
     """The path of a file or folder, as a Path."""
 
@@ -135,7 +136,7 @@ class FilePath(Constraint):
         return as_path(value, what)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class OrNone(Constraint):
     """None, or what satisfies `one`."""
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 AnyPath = str | os.PathLike[str]
-ArrayPair = tuple[np.ndarray, np.ndarray]
+Array = np.ndarray
+ArrayPair = tuple[Array, Array]
 Data = Mapping[str, Any]  # values by name, to be read
 Fields = dict[str, Any]  # the same, to be filled
 Floats = tuple[float, ...]

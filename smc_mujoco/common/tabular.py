@@ -8,7 +8,6 @@ A table that is wider than the terminal is shown in several parts, each with the
 left.
 """
 
-import dataclasses
 import io
 import re
 import textwrap
@@ -16,6 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.common import html
+from smc_mujoco.common.data import named_data
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
@@ -58,7 +58,7 @@ class Cell(NamedTuple):
     alarm: str = ""  # a last line, such as how many runs failed
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Tabular:
     """A table."""
 

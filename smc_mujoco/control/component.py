@@ -20,6 +20,7 @@ from typing import Annotated, Any, NamedTuple, TypedDict
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Each, Number, Whole, constrained
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.kinds import Data, Names, Pair
@@ -62,7 +63,7 @@ class Options(TypedDict, total=False):
     family: str
     continuous: bool
     finite_time: str
-    accuracy: Mapping[str, AccuracyOrder]
+    accuracy: Mapping[str, AccuracyOrder] | AccuracyOrder
     admits: Mapping[str, Callable[[SimpleNamespace], float]]
     joint: bool
 
@@ -75,7 +76,7 @@ class GainWarning(UserWarning):
     """Gains violate a condition of the law's theorem."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Component:
     """A function bound to its gains. Laws with equal gains are equal, whatever their sources."""
 
@@ -235,7 +236,7 @@ def _unpickled(
     return component
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Template:
     """A function with the properties that its decorator gives it, see `law_function`."""
 
@@ -510,6 +511,9 @@ def template_decorator(
                 f"{option} is {shown(tests)}: give functions of the gains by their words, such as "
                 "{'a < b': lambda g: g.a < g.b}"
             )
+    order = options.get("accuracy")
+    if isinstance(order, int | float) or callable(order):
+        options["accuracy"] = {"s": order, "e": order}
     for option, keys in OPTION_KEYS.items():
         if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
             names = " and ".join(map(repr, keys))

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Annotated
 
 from smc_mujoco.common.constraints import OneOf, constrained
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.common.kinds import Data, Floats, Names, Numbers
@@ -147,7 +148,7 @@ def in_set(plant: Plant, name: str, gains: str) -> bool:
     return True
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class TunedGains:
     """The gains of a law on a plant, and the searches that found them."""
 

@@ -30,6 +30,7 @@ from numba import carray, njit
 from numba.extending import overload
 
 from smc_mujoco.common.jit import call, floats, pointer, record_at
+from smc_mujoco.common.kinds import Array
 
 
 class JointMeasurement(NamedTuple):
@@ -42,18 +43,18 @@ class JointMeasurement(NamedTuple):
     dt: float  # control period
     model: float  # 1 if the scenario lets the law use M, h and g, else 0
     dynamics: Any  # handle of the nominal mechanism, for `coriolis` and `jacobian`
-    x: np.ndarray  # measured positions
-    v: np.ndarray  # measured or estimated velocities
-    e: np.ndarray  # x - r
-    de: np.ndarray  # v - r'
-    r: np.ndarray  # references
-    dr: np.ndarray
-    ddr: np.ndarray
-    a: np.ndarray  # estimated accelerations; r'' if the estimator gives none
-    limit: np.ndarray  # bounds on |u|
-    M: np.ndarray  # nominal mass matrix of M x'' + h = u, (n, n), at the measured x
-    h: np.ndarray  # Coriolis forces c(x, v), gravity, springs and dampers, in the unit of u
-    g: np.ndarray  # h(x, 0), the forces at rest: gravity and springs
+    x: Array  # measured positions
+    v: Array  # measured or estimated velocities
+    e: Array  # x - r
+    de: Array  # v - r'
+    r: Array  # references
+    dr: Array
+    ddr: Array
+    a: Array  # estimated accelerations; r'' if the estimator gives none
+    limit: Array  # bounds on |u|
+    M: Array  # nominal mass matrix of M x'' + h = u, (n, n), at the measured x
+    h: Array  # Coriolis forces c(x, v), gravity, springs and dampers, in the unit of u
+    g: Array  # h(x, 0), the forces at rest: gravity and springs
 
 
 # the vectors, M, h and g, in the order in which they are stored

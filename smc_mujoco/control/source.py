@@ -11,6 +11,7 @@ import dataclasses
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.kinds import Data, Fields
@@ -42,7 +43,7 @@ def spread_in_words(searches: int, spread: float) -> str:
     return f"{searches} searches, J up to {1.0 + spread:.2g} times the least"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Search:
     """The searches for gains behind a law."""
 
@@ -67,7 +68,7 @@ class Search:
         return f"{self.name}, {self.evaluations} evaluations, {spread}"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Source:
     """Where a set of gains comes from."""
 

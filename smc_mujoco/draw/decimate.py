@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.simulation.trace import Trace
 
 MEAN_WINDOW = (
@@ -32,10 +33,10 @@ LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest 
 class Envelope(NamedTuple):
     """Range and mean of a signal in windows of time: low, mean and high, each (windows, n)."""
 
-    t: np.ndarray  # middles, (windows,)
-    low: np.ndarray
-    mean: np.ndarray
-    high: np.ndarray
+    t: Array  # middles, (windows,)
+    low: Array
+    mean: Array
+    high: Array
 
 
 def finite(trace: Trace) -> Trace:
@@ -60,7 +61,7 @@ def end(traces: Sequence[Trace]) -> float:
     return max(trace.scenario.samples * trace.scenario.control_period for trace in traces)
 
 
-def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
+def windows(t: Array, y: Array, edges: Array) -> Envelope:
     """Return range and mean of y (K+1, n), held from sample to sample, between consecutive edges
     (s, ascending).
 
@@ -74,7 +75,7 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
     return Envelope((edges[:-1] + edges[1:]) / 2, low, mean, np.maximum.reduceat(y, start[:-1]))
 
 
-def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
     """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP
     between swings.
 
@@ -103,7 +104,7 @@ def window(trace: Trace) -> int:
     return 4 * round(max(share * trace.scenario.samples, shortest) / 4)
 
 
-def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
+def chattering_parts(y: Array, width: int) -> list[slice]:
     """Return where y (K+1,) chatters.
 
     A move is a step between samples of more than MIN_MOVE of the largest |y|. A reversal is a pair
@@ -121,7 +122,7 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     first = moving[turns]
     last = moving[turns + 1]
 
-    def sequences(near: int) -> list[np.ndarray]:
+    def sequences(near: int) -> list[Array]:
         """Return the indices of the reversals in each row of `near`-close ones."""
         brief = np.flatnonzero(last - first <= near)
         parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
@@ -139,7 +140,7 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     return result
 
 
-def smooth(y: np.ndarray, width: int) -> np.ndarray:
+def smooth(y: Array, width: int) -> Array:
     """Return y (K+1,), replaced where it chatters by its mean over `width` samples with triangular
     weights.
 
@@ -167,18 +168,18 @@ def smooth(y: np.ndarray, width: int) -> np.ndarray:
     return line
 
 
-def triangular_mean(y: np.ndarray, half: int) -> np.ndarray:
+def triangular_mean(y: Array, half: int) -> Array:
     """Return the means of y (K,) with the weights 1, 2, ... half, ... 2, 1, (K - 2 half + 2,)."""
     return running_mean(running_mean(y, half), half)
 
 
-def running_mean(y: np.ndarray, width: int) -> np.ndarray:
+def running_mean(y: Array, width: int) -> Array:
     """Return the mean of y (K,) over each `width` samples in a row, (K - width + 1,)."""
     total = np.concatenate([[0.0], np.cumsum(y)])
     return (total[width:] - total[:-width]) / width
 
 
-def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+def line(t: Array, y: Array, width: int) -> tuple[Array, Array]:
     """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points
     that keep extremes.
     """

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from smc_mujoco.common.kinds import ArrayPair, Data, Fields, Pair
+from smc_mujoco.common.kinds import Array, ArrayPair, Data, Fields, Pair
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
@@ -87,21 +87,21 @@ DASHES = (0, (4, 4))  # of a reference's line
 REFERENCE = "reference"  # id of a reference's lines
 
 
-def off_path(trace: Trace) -> np.ndarray:
+def off_path(trace: Trace) -> Array:
     """Return how far an arm's tip is off its path, (K+1, 1) mm."""
     from smc_mujoco.metrics.tip import tip_error
 
     return peaks(1e3 * tip_error(trace), trace)
 
 
-def contact_force(trace: Trace) -> np.ndarray:
+def contact_force(trace: Trace) -> Array:
     """Return the force of a contact of an arm's tip, (K+1, 1) N."""
     from smc_mujoco.metrics.tip import contacts
 
     return contacts(trace).force[:, None]
 
 
-QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
+QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
     "e": lambda trace: trace.x - trace.r,
     "v": lambda trace: trace.v,
@@ -349,7 +349,7 @@ def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
     return words
 
 
-def curve(trace: Trace, y: np.ndarray, name: str) -> ArrayPair:
+def curve(trace: Trace, y: Array, name: str) -> ArrayPair:
     """Return the line of a quantity y (K+1,): times in s, and values.
 
     A short trace is not smoothed.
@@ -377,7 +377,7 @@ def mean_window(traces: Sequence[Trace]) -> float:
     return longest
 
 
-def peaks(y: np.ndarray, trace: Trace) -> np.ndarray:
+def peaks(y: Array, trace: Trace) -> Array:
     """Return the largest of y (K+1,) within a window around each sample, (K+1, 1), or MIN_ERROR if
     that is more.
     """
@@ -491,7 +491,7 @@ def steps(trace: Trace, name: str) -> str:
     return "steps-post" if name == "u" and not smoothed(trace) else "default"
 
 
-def channels(ax: Axes, trace: Trace, y: np.ndarray, name: str, look: Data) -> list[Artist]:
+def channels(ax: Axes, trace: Trace, y: Array, name: str, look: Data) -> list[Artist]:
     """Draw the channels of y, (K+1, n), one by one, the slowest x thick."""
     artists: list[Artist] = []
     slowest = -1
@@ -647,7 +647,7 @@ def note(ax: Axes, words: str) -> None:
     )
 
 
-def references(traces: Sequence[Trace]) -> list[tuple[Trace, np.ndarray, np.ndarray]]:
+def references(traces: Sequence[Trace]) -> list[tuple[Trace, Array, Array]]:
     """Return the longest trace of each reference, with its times (K+1,) and values (K+1,), the mean
     of its channels.
     """
@@ -777,7 +777,7 @@ def crowded(panel: Panel) -> bool:
     return wide > MAX_BANDS
 
 
-def drawn_channels(y: np.ndarray) -> list[int]:
+def drawn_channels(y: Array) -> list[int]:
     """Return the indices of the channels of y, (K + 1, n), that are drawn one by one.
 
     Those of its least and largest value are among them, so that their curves reach as far as those
@@ -790,7 +790,7 @@ def drawn_channels(y: np.ndarray) -> list[int]:
     return sorted({*chosen.tolist(), int(np.nanargmin(y)) % n, int(np.nanargmax(y)) % n})
 
 
-def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:
+def lasting(traces: Sequence[Trace], name: str) -> list[Array]:
     """Return the values of successful runs; if there are none, of failed ones without their
     ends.
     """

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import Fields
+from smc_mujoco.common.kinds import Array, Fields
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.gain_sets import law as law_with_gains
 from smc_mujoco.control.law import Law, laws
@@ -135,7 +135,7 @@ class Session:
         self.begin(self.first)
         self.message = ""
 
-    def push(self, body: str, force: np.ndarray) -> None:
+    def push(self, body: str, force: Array) -> None:
         """Push a body from now on: a half sine of 0.1 s with this peak in the axes of the world,
         N.
         """
@@ -152,7 +152,7 @@ class Session:
             run,
         )
 
-    def state(self, run: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def state(self, run: int) -> tuple[Array, Array, Array]:
         """Return positions, velocities and activations of a run."""
         bind = self.batches[run].batch.bind
         if self.batches[run].model.na:
@@ -161,7 +161,7 @@ class Session:
             act = np.zeros(0)
         return bind("qpos")[0], bind("qvel")[0], act
 
-    def log(self, run: int) -> np.ndarray:
+    def log(self, run: int) -> Array:
         """Return the samples of a run so far, (samples, channels)."""
         return self.batches[run].logs[0][: self.sample]
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import HIT, RUB
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -55,7 +56,7 @@ def shapes(scenario: Scenario) -> list[Shape]:
     return found
 
 
-def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> list[State | None]:
+def timeline(trace: Trace, times: Array, hold: float = MIN_STATE_TIME) -> list[State | None]:
     """Return the state at each time, s; None for a machine without states, and after its run
     failed.
     """
@@ -82,7 +83,7 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> l
     return states
 
 
-def at_rest(trace: Trace) -> np.ndarray:
+def at_rest(trace: Trace) -> Array:
     """Return where each channel is at rest, in proportion to the speeds of its group, (K + 1,
     n).
     """
@@ -114,7 +115,7 @@ def backlash_gap(scenario: Scenario) -> float:
 
 
 @once_per_trace
-def in_contact(trace: Trace) -> np.ndarray:
+def in_contact(trace: Trace) -> Array:
     """Return where each channel touches an obstacle or another channel, (K + 1, n)."""
     contact = np.zeros(trace.x.shape, bool)
     if not trace.scenario.contact:
@@ -149,7 +150,7 @@ def in_contact(trace: Trace) -> np.ndarray:
     return contact | (stopped & (parts[0].model.jnt_limited[joints] > 0))
 
 
-def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], np.ndarray]:
+def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], Array]:
     """Return the pairs of geoms that hit each other, and the channel that moves each body, -1 if
     none does.
     """
@@ -165,7 +166,7 @@ def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], np.ndarray]:
     return hits, owner
 
 
-def flanks(trace: Trace) -> np.ndarray:
+def flanks(trace: Trace) -> Array:
     """Return the side from which each rotor pushes its joint, -1, 0 or 1, (K + 1, n): 1 pushes
     towards larger x.
     """
@@ -173,7 +174,7 @@ def flanks(trace: Trace) -> np.ndarray:
     return np.sign(np.nan_to_num(trace.reaction if alone else trace.force))
 
 
-def extended(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
+def extended(on: Array, t: Array, hold: float) -> Array:
     """Return the signal (K + 1,), extended by `hold` s each time it is on, without gaps shorter
     than that.
     """
@@ -185,7 +186,7 @@ def extended(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     return on
 
 
-def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
+def backlash_side(flank: Array, t: Array, hold: float) -> Array:
     """Return the key of SIDES at each sample, (K + 1,): flank -1 or 1, 0 in play, 2 if it crosses
     too often to show.
     """
@@ -198,14 +199,14 @@ def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     return np.where(extended(rattles, t, hold), 2, sides).astype(int)
 
 
-def stick_words(sticks: np.ndarray) -> str:
+def stick_words(sticks: Array) -> str:
     """Return words for channels (n,) that stick or slide."""
     if sticks.all() or not sticks.any():
         return "sticks" if sticks.all() else "slides"
     return f"{sticks.sum()} of {len(sticks)} stick"
 
 
-def backlash_words(sides: Sequence[int] | np.ndarray) -> str:
+def backlash_words(sides: Sequence[int] | Array) -> str:
     """Return words for channels in their backlash."""
     if len(set(sides)) == 1:
         return SIDES[int(sides[0])]

@@ -21,7 +21,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.kinds import Floats, Names
+from smc_mujoco.common.kinds import Array, Floats, Names
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.control.written import Matrix, WrittenLaw, state_feedback
@@ -41,10 +41,10 @@ class System(NamedTuple):
     any period).
     """
 
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    d: np.ndarray
+    a: Array
+    b: Array
+    c: Array
+    d: Array
     dt: float | bool | None
 
 
@@ -206,7 +206,7 @@ def law_from_control(
     return decorate(function)()
 
 
-def _of_all_channels(K: Any) -> np.ndarray | None:
+def _of_all_channels(K: Any) -> Array | None:
     """Return K as an array of one row for each driven channel and two columns for each of several
     channels; None if it is something else.
     """
@@ -222,7 +222,7 @@ def _of_all_channels(K: Any) -> np.ndarray | None:
     return gains
 
 
-def _rows(matrix: np.ndarray) -> Matrix:
+def _rows(matrix: Array) -> Matrix:
     return tuple(tuple(row) for row in matrix.tolist())
 
 

@@ -25,9 +25,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from smc_mujoco.common.constraints import OneOf, constrained
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.jit import Uncompiled
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.law import Law, Measurement, law_function
 
 Act = Callable[[np.ndarray], Any]
@@ -44,7 +46,7 @@ ONNX_DTYPES = {
 }
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Policy(Uncompiled):
     """The function of a policy's law."""
 
@@ -60,7 +62,7 @@ class Policy(Uncompiled):
         """The law's name."""
         return self.name
 
-    def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
+    def __call__(self, y: Measurement, gains: Any, memory: Array) -> tuple[float, float]:
         """Return u, and 0 for s."""
         scale = y.limit if self.units == "u_max" else 1.0
         if math.isinf(scale):
@@ -102,21 +104,21 @@ class Controller(Policy):
     xref is (r, r', r''), u is in N or N m, and the entry "s" of the dict is the law's s.
     """
 
-    def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
+    def __call__(self, y: Measurement, gains: Any, memory: Array) -> tuple[float, float]:
         """Return u and s."""
         answer = self.act.compute(y.t, np.array([y.x, y.v]), np.array([y.r, y.dr, y.ddr]))  # pyright: ignore[reportFunctionMemberAccess]
         u, info = answer if isinstance(answer, tuple) else (answer, {})
         return float(np.asarray(u, float).item()), float(info.get("s", 0.0))
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class File:
     """A policy in a file. Two are equal if their content is."""
 
     path: str = dataclasses.field(compare=False)
     digest: str  # of its bytes
 
-    def __call__(self, observation: np.ndarray) -> Any:
+    def __call__(self, observation: Array) -> Any:
         """Return the action."""
         return load_network(self)(observation)
 
@@ -173,7 +175,7 @@ class Network:
     module: Any  # the copy
     predicts: bool = False  # whether to call its method `predict`, as of stable-baselines3
 
-    def __call__(self, observation: np.ndarray) -> Any:
+    def __call__(self, observation: Array) -> Any:
         """Return the action."""
         if self.predicts:
             return _predict(self.module, observation)
@@ -294,7 +296,7 @@ def _callable(act: Any) -> tuple[Act, str]:
         ) from error
 
 
-def _predict(model: Any, observation: np.ndarray) -> Any:
+def _predict(model: Any, observation: Array) -> Any:
     """Return the action that a model predicts: the result of `predict`, or the first of a pair."""
     action = model.predict(observation, deterministic=True)
     if isinstance(action, tuple):
@@ -302,7 +304,7 @@ def _predict(model: Any, observation: np.ndarray) -> Any:
     return action
 
 
-def _forward(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndarray:
+def _forward(torch: ModuleType, module: Any, observation: Array) -> Array:
     """Return the output of a torch module for an observation, converted to the type of its
     parameters.
     """

@@ -19,10 +19,11 @@ import numpy as np
 
 from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.constraints import Number
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Floats, Names, Numbers, Pair
+from smc_mujoco.common.kinds import Array, Floats, Names, Numbers, Pair
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms import rotation
 
@@ -94,12 +95,12 @@ class Dynamics(NamedTuple):
     M is (n, n), h (n,), and g (n,), the h at rest.
     """
 
-    M: np.ndarray
-    h: np.ndarray
-    g: np.ndarray
+    M: Array
+    h: Array
+    g: Array
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Plant:
     """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d)."""
 
@@ -286,7 +287,7 @@ class Plant:
             return self.rest
         return (0.0,) * self.n
 
-    def errors(self, x: np.ndarray, r: np.ndarray) -> np.ndarray:
+    def errors(self, x: Array, r: Array) -> Array:
         """Return x - r, (..., n); of an attitude, the rotation vector from the reference's to the
         body's, rad.
         """
@@ -382,7 +383,7 @@ def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
         values[at] = values[at] + value if adds else value
 
 
-def field_array(model: mujoco.MjModel, name: str) -> np.ndarray:
+def field_array(model: mujoco.MjModel, name: str) -> Array:
     """Return the array of a model or option field that a Field names."""
     if name.startswith("opt."):
         owner = model.opt
@@ -404,6 +405,11 @@ def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> No
 def model_path(name: str) -> Path:
     """Return the path of the MJCF file models/<name>."""
     return shipped("models") / name
+
+
+def model_spec(name: str) -> mujoco.MjSpec:
+    """Return the MjSpec of the MJCF file models/<name>."""
+    return mujoco.MjSpec.from_file(str(model_path(name)))
 
 
 @functools.cache

@@ -59,7 +59,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, has, shown
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 
@@ -82,7 +84,7 @@ REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Group:
     """Channels of one kind and one unit."""
 
@@ -118,7 +120,7 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
     return tuple(found)
 
 
-def reference_rates(trace: Trace) -> np.ndarray:
+def reference_rates(trace: Trace) -> Array:
     """Return r' of all channels, (K+1, n); NaN where r is."""
     from smc_mujoco.simulation.python_functions import evaluate
 
@@ -156,7 +158,7 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     return dataclasses.replace(trace, **arrays)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Metric:
     """A metric's entry in the catalogue."""
 
@@ -312,7 +314,7 @@ def refuse(trace: Trace) -> None:
     raise ScenarioError(f"{run} has no score, {why}: {cure}")
 
 
-def error(trace: Trace) -> np.ndarray:
+def error(trace: Trace) -> Array:
     """Return e = x - r, (K+1, n)."""
     return trace.x - trace.r
 
@@ -329,7 +331,7 @@ def scale(trace: Trace) -> float:
     return float(max(start, travel)) or 1.0
 
 
-def at_rest(trace: Trace) -> np.ndarray:
+def at_rest(trace: Trace) -> Array:
     """Return where each channel of a group's trace is at rest, (K+1, n); see the module's
     conventions.
     """
@@ -385,7 +387,7 @@ def resolution(scenario: Scenario, group: Group) -> float:
     return apart
 
 
-def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:
+def last_exit(t: Array, magnitude: Array, band: float) -> float:
     """Return the time since t[0], s, from which magnitude, (K+1,), stays <= band; 0 if always, inf
     if never.
     """
@@ -407,12 +409,12 @@ def approaches(trace: Trace) -> list[list[slice]]:
     return channels
 
 
-def row_max(a: np.ndarray) -> np.ndarray:
+def row_max(a: Array) -> Array:
     """Return a.max(axis=1) of a, (K, n). It is much faster for few channels."""
     return functools.reduce(np.maximum, a.T)
 
 
-def turns(y: np.ndarray, threshold: float) -> int:
+def turns(y: Array, threshold: float) -> int:
     """Return how often y (K,) turns back by half its range; 0 for a range <= `threshold`."""
     count = 0
     direction = 0

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from smc_mujoco.common.kinds import Pair
+from smc_mujoco.common.kinds import Array, Pair
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 
@@ -52,7 +52,7 @@ MAX_CHANGE = 0.5  # of the amplitude, relative, from the first to the second hal
 NO_CYCLE = (math.nan, math.nan)
 
 
-def limit_cycle(t: np.ndarray, s: np.ndarray) -> Pair:
+def limit_cycle(t: Array, s: Array) -> Pair:
     """Return amplitude, in the unit of s, and frequency, Hz, of the limit cycle in samples; NaN,
     NaN without one.
 
@@ -107,7 +107,7 @@ def largest_cycle(trace: Trace) -> Pair:
     return max((cycle for cycle in cycles if not math.isnan(cycle[0])), default=NO_CYCLE)
 
 
-def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, periods: float) -> int:
+def _order(rates: Array, spectrum: Array, first: int, peak: int, periods: float) -> int:
     """Return which harmonic of the cycle the largest peak of s' is: 1, or larger for a wave with
     jumps or pulses.
 
@@ -135,7 +135,7 @@ def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, perio
     return order
 
 
-def _share(spectrum: np.ndarray, first: int, periods: float) -> float:
+def _share(spectrum: Array, first: int, periods: float) -> float:
     """Return the share of a spectrum's power in a cycle's harmonics: 0 for a flat spectrum, at most
     1.
     """
@@ -150,7 +150,7 @@ def _share(spectrum: np.ndarray, first: int, periods: float) -> float:
     )
 
 
-def _window(count: int) -> np.ndarray:
+def _window(count: int) -> Array:
     """Return the window of four cosines of F.
 
     J. Harris, Proc. IEEE 66:51, 1978: its side lobes are below -92 dB.
@@ -164,7 +164,7 @@ def _window(count: int) -> np.ndarray:
     )
 
 
-def _refined(rates: np.ndarray, peak: int) -> float:
+def _refined(rates: Array, peak: int) -> float:
     """Return the number of periods of a peak, to a fraction that follows from its phase in the two
     halves.
     """

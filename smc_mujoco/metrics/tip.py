@@ -21,7 +21,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import ArrayPair, Numbers
+from smc_mujoco.common.kinds import Array, ArrayPair, Numbers
 from smc_mujoco.mechanisms.hardware.part import OWN, drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
@@ -43,12 +43,12 @@ FORCE_START = 0.2
 class Contacts(NamedTuple):
     """Contacts of a run at its samples. All values are NaN after a failure."""
 
-    force: np.ndarray  # sum of the normal forces, N, (K + 1,); 0 without contact
-    depth: np.ndarray  # penetration of the deepest contact, m, (K + 1,); 0 without contact
-    push: np.ndarray  # sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3)
+    force: Array  # sum of the normal forces, N, (K + 1,); 0 without contact
+    depth: Array  # penetration of the deepest contact, m, (K + 1,); 0 without contact
+    push: Array  # sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3)
 
 
-def tip_path(plant: Plant, x: np.ndarray, factors: Numbers | None = None) -> np.ndarray:
+def tip_path(plant: Plant, x: Array, factors: Numbers | None = None) -> Array:
     """Return the tip's positions in space, m, (K, 3), at the channels' positions x, (K, n).
 
     Args:
@@ -91,7 +91,7 @@ def tip_paths(trace: Trace) -> ArrayPair:
     return paths
 
 
-def tip_error(trace: Trace) -> np.ndarray:
+def tip_error(trace: Trace) -> Array:
     """Return the tip's distance from its wanted path, m, (K + 1,). Raises like `tip_path`."""
     actual, wanted = tip_paths(trace)
     return np.linalg.norm(actual - wanted, axis=1)

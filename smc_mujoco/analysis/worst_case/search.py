@@ -32,6 +32,7 @@ import numpy as np
 
 from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.metrics.catalogue import CATALOGUE, arrived
 from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.simulation.run import stream
@@ -261,13 +262,13 @@ class Search:
         relay = Relay(sign * self.members.within.disturbance, **weights, slope=self.members.slope)
         return Case(self.members.bare.named(kind), relay)
 
-    def _forced(self, kind: str, force: np.ndarray) -> Case:
+    def _forced(self, kind: str, force: Array) -> Case:
         """Return a member with a force, limited to the class."""
         return Case(
             dataclasses.replace(self.members.bare, kind=kind, force=self.members.limited(force))
         )
 
-    def _constants(self) -> list[np.ndarray]:
+    def _constants(self) -> list[Array]:
         return [np.full(self.members.samples + 1, sign) for sign in SIGNS]
 
     def _single_switches(self) -> Iterator[Case]:
@@ -377,7 +378,7 @@ class Search:
                 evolution.tell([(points[i], ranks[i]) for i in range(BATCH_MEMBERS)])
 
 
-def relay_signals(trace: Trace) -> dict[str, np.ndarray]:
+def relay_signals(trace: Trace) -> dict[str, Array]:
     """Return what a relay sees of channel 0 at the control samples: "s", "rate" and "error",
     (samples + 1,) each.
     """
@@ -386,7 +387,7 @@ def relay_signals(trace: Trace) -> dict[str, np.ndarray]:
     return {"s": trace.s[:, 0], "rate": trace.v[:, 0] - dr, "error": trace.x[:, 0] - r}
 
 
-def recorded_force(trace: Trace, relay: Relay, before: np.ndarray) -> np.ndarray:
+def recorded_force(trace: Trace, relay: Relay, before: Array) -> Array:
     """Return the force of a relay over its bound, (samples + 1,), and `before` until the relay
     starts.
     """
@@ -413,7 +414,7 @@ def loop_frequency(trace: Trace) -> float:
     )
 
 
-def measurement_errors(trace: Trace, times: int, hold: int) -> Iterator[tuple[str, np.ndarray]]:
+def measurement_errors(trace: Trace, times: int, hold: int) -> Iterator[tuple[str, Array]]:
     """Yield errors of position and velocity, (2, times), each for `hold` samples: constant, and as
     a loop swings.
     """

@@ -22,9 +22,10 @@ import numpy as np
 
 from smc_mujoco.common import constraints
 from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesting
+from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Pair
+from smc_mujoco.common.kinds import Array, Pair
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
@@ -50,7 +51,7 @@ Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
 
 
 @suggesting
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Uncertainty:
     """What may happen: bounds on disturbance, noise, delay and parameters.
 
@@ -205,9 +206,9 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
 class Member:
     """One choice within the bounds of a class, see the module."""
 
-    shares: np.ndarray  # (constants,)
-    force: np.ndarray  # (samples + 1,), or (0,) without a disturbance
-    noise: np.ndarray  # (2, times); times is 0 without noise
+    shares: Array  # (constants,)
+    force: Array  # (samples + 1,), or (0,) without a disturbance
+    noise: Array  # (2, times); times is 0 without noise
     kind: str = ""  # the strategy that made it
 
     def named(self, kind: str) -> "Member":
@@ -260,7 +261,7 @@ class Members:
             # raises where bounds do not go together
             self.with_constants(np.full(len(self.constants), share))
 
-    def with_constants(self, shares: np.ndarray) -> Scenario:
+    def with_constants(self, shares: Array) -> Scenario:
         """Return the scenario with constants of the class."""
         scenario = self.scenario
         for constant, share in zip(self.constants, shares.tolist(), strict=True):
@@ -296,7 +297,7 @@ class Members:
                 errors[name] = Held(t, [*(bound * row).tolist(), 0.0])
         return dataclasses.replace(scenario, noise=dataclasses.replace(scenario.noise, **errors))
 
-    def signal(self, values: np.ndarray) -> Signal:
+    def signal(self, values: Array) -> Signal:
         """Return values at the samples as a signal: steps if it may jump and does so rarely, else
         straight lines.
         """
@@ -312,7 +313,7 @@ class Members:
             return Held(times, values[at].tolist())
         return TimeSeries(times, values[at].tolist())
 
-    def limited(self, force: np.ndarray) -> np.ndarray:
+    def limited(self, force: Array) -> Array:
         """Return a force limited to -1 .. 1, and in its slope."""
         force, change = np.clip(force, -1.0, 1.0), self.slope / self.within.disturbance
         if not change or np.abs(np.diff(force)).max(initial=0.0) <= change:
@@ -360,7 +361,7 @@ class Members:
         """Return how many numbers `moved` takes as z."""
         return len(self.constants) + knots * (self.forced + 2 * (self.times > 0))
 
-    def moved(self, member: Member, z: np.ndarray, knots: int) -> Member:
+    def moved(self, member: Member, z: Array, knots: int) -> Member:
         """Return a member moved by z, (size,): its constants, then knots of lines that are added to
         its signals.
         """
@@ -369,7 +370,7 @@ class Members:
         shares = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0)
         at = np.linspace(0.0, 1.0, knots)
 
-        def added(row: np.ndarray, more: np.ndarray) -> np.ndarray:
+        def added(row: Array, more: Array) -> Array:
             return np.clip(
                 row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0
             )
@@ -384,7 +385,7 @@ class Members:
         return Member(shares, force, np.array(noise), member.kind)
 
 
-def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def mutated_signal(values: Array, rng: np.random.Generator) -> Array:
     """Return values, (K,), of which a random piece is reversed in sign, or a switch comes earlier
     or later.
     """
@@ -404,7 +405,7 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return mutated
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Constant:
     """Something that is constant in a run and may differ from member to member."""
 

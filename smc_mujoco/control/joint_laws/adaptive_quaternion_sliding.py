@@ -72,7 +72,7 @@ RATE3 = Unit(time=-3)
         "Kx_up > Kz, or it does not adapt": lambda g: g.Kx_up > g.Kz,
         "K_up > K, or it does not adapt": lambda g: g.K_up > g.K,
     },
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Adaptive quaternion",
     memory=STEERING + 1,  # and K - K0
 )

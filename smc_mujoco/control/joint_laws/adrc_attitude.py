@@ -55,7 +55,7 @@ class Axis(NamedTuple):
             "lag": LAG,
         }
     ),
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="ADRC attitude",
     short="AA",
     memory=STEERING

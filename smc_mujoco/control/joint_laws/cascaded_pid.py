@@ -96,7 +96,7 @@ def _gains(turns, **values):
             "tilt": Gain(20.0 * DEGREES, Unit(), positive=True, held=True, turns=True),
         }
     ),
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Firmware's PIDs",
     short="FP",
     # integrals of positions and angles, of velocities and rates; w* - w before; whether there was

@@ -20,7 +20,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, SPEED, Gain
     joint=True,
     family="first-order",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     requires_model=True,
     gains={
         "k": Gain(10.0, ACCELERATION, positive=True),

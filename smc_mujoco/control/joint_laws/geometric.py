@@ -40,7 +40,7 @@ from smc_mujoco.control.units import RATE, Gain, Unit, shared
             "kW": Gain(69.27, RATE, positive=True, turns=True),
         }
     ),
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Geometric",
     memory=STEERING,
 )

@@ -38,7 +38,7 @@ from smc_mujoco.control.units import ACCELERATION, FORCE, RATE, SPEED, Gain, Uni
     joint=True,
     family="first-order",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     requires_model=True,
     gains={
         "force": Gain(10.0, held=True, shared=True),

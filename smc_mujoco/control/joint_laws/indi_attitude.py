@@ -65,7 +65,7 @@ def _low_pass(x, i, cutoff, dt, states):
             "spin": Gain(0.0, TIME, nonnegative=True, held=True, turns=True),
         }
     ),
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="INDI attitude",
     short="IN",
     memory=STEERING

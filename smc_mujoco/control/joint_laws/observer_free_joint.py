@@ -24,7 +24,7 @@ from smc_mujoco.control.units import OBSERVER_FREE
     joint=True,
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     gains=OBSERVER_FREE,
     label="Observer-free (every joint)",
     colour="#0072B2",

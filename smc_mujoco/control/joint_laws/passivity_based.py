@@ -24,7 +24,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, SPEED, Gain
     joint=True,
     family="first-order",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     requires_model=True,
     gains={
         "K": Gain(1.0, FORCE_PER_SPEED, positive=True),

@@ -37,7 +37,7 @@ from smc_mujoco.control.units import Gain, Unit, shared
             "rho": Gain(0.25, Unit(time=1), positive=True, turns=True),
         }
     ),
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Quaternion sliding",
     memory=STEERING,
 )

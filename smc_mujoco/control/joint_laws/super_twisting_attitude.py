@@ -41,7 +41,7 @@ from smc_mujoco.control.units import Gain, Unit, shared
             "z_max": Gain(math.inf, Unit(time=-2), nonnegative=True, held=True, turns=True),
         }
     ),
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Super-twisting attitude",
     memory=STEERING + 1,  # and z
 )

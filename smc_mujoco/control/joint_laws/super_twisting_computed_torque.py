@@ -27,7 +27,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
     family="super-twisting",
     continuous=True,
     finite_time="s",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     requires_model=True,
     gains={
         "k1": Gain(4.7, Unit(position=0.5, time=-1.5), positive=True),

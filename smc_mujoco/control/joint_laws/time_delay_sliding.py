@@ -31,7 +31,7 @@ from smc_mujoco.control.units import ACCELERATION, INERTIA, RATE, SPEED, Gain
     joint=True,
     family="first-order",
     continuous=True,
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "m": Gain(0.02, INERTIA, positive=True),
         "k": Gain(10.0, ACCELERATION, positive=True),

@@ -17,7 +17,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, SLOPE, Gain
 @law_function(
     family="adaptive",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "gamma": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "c": SLOPE,

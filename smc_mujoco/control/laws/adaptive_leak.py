@@ -18,7 +18,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SLOPE, SPE
 
 @law_function(
     family="adaptive",
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     gains={
         "gamma": Gain(15.0, FORCE_PER_POSITION, nonnegative=True),
         "c": SLOPE,

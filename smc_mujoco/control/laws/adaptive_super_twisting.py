@@ -21,7 +21,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, SLOPE, SPEED, Gain, Unit
 @law_function(
     family="adaptive",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Adaptive super-twisting",
     gains={
         "rate": Gain(

@@ -22,7 +22,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, SLOPE, SPEED, Ga
 @law_function(
     family="adaptive",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     gains={
         "K0": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "eps": Gain(0.1, SPEED, positive=True),

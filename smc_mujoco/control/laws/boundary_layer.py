@@ -23,7 +23,7 @@ REST = Rest(
 @law_function(
     family="first-order",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     admits={"d": lambda g: g.k},
     gains={
         "k": Gain(6.0, FORCE, nonnegative=True),

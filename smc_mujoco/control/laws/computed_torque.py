@@ -17,7 +17,7 @@ from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 @law_function(
     family="baseline",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     gains={
         "kp": Gain(9.0, FORCE_PER_POSITION, positive=True),
         "kd": Gain(6.0, FORCE_PER_SPEED, positive=True),

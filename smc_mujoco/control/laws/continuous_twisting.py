@@ -23,7 +23,7 @@ from smc_mujoco.control.units import FORCE_RATE, Gain, Unit
     family="higher-order",
     continuous=True,
     finite_time="e",
-    accuracy={"s": 3, "e": 3},
+    accuracy=3,
     gains={
         "L": Gain(1.0, FORCE_RATE, positive=True),
         "k1": Gain(

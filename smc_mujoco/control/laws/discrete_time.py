@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, SLOPE, Gain
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     label="Discrete-time",
     gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},
     memory=3,

@@ -26,7 +26,7 @@ from smc_mujoco.control.units import ACCELERATION, ASSUMED_B, RATE, SLOPE, Gain
 @law_function(
     family="disturbance-observer",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
         "c": SLOPE,

@@ -18,7 +18,7 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, SLOPE, Gain
 @law_function(
     family="first-order",
     continuous=True,
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "k": Gain(30.0, FORCE_RATE, nonnegative=True),
         "q": Gain(5.0, RATE, nonnegative=True),

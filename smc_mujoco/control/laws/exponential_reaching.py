@@ -16,7 +16,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, SLOPE, Gain
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "k": Gain(3.0, FORCE, nonnegative=True),
         "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),

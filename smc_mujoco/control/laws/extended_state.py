@@ -64,7 +64,7 @@ def observe(y, l1, l2, l3, memory):
 @law_function(
     family="disturbance-observer",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     label="Extended-state",
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),

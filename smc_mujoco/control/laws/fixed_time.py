@@ -22,7 +22,7 @@ def order(gains):
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": order, "e": order},
+    accuracy=order,
     label="Fixed-time",
     gains={
         "k1": Gain(2.0, force_per("a"), nonnegative=True),

@@ -52,7 +52,7 @@ def inferred(size, rate):
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "k_min": Gain(3.0, FORCE, nonnegative=True),
         "k_max": Gain(6.0, FORCE, nonnegative=True),

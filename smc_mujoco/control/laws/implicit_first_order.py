@@ -19,7 +19,7 @@ from smc_mujoco.control.units import FORCE, SLOPE, Gain
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     admits={"d": lambda g: g.k},
     label="Implicit first-order",
     gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},

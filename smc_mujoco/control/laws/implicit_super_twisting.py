@@ -24,7 +24,7 @@ from smc_mujoco.control.units import REACHED, SUPER_TWISTING
     family="super-twisting",
     continuous=True,
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     label="Implicit super-twisting",
     gains=SUPER_TWISTING,
     memory=1,

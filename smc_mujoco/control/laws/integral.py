@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, RATE, SLOPE, Gain
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     gains={
         "M": Gain(4.0, FORCE, nonnegative=True),
         "c": SLOPE,

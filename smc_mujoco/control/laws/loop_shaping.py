@@ -180,7 +180,7 @@ def observe(v, e, n0, n1, memory):
 @law_function(
     family="baseline",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Loop shaping",
     short="LS",
     gains={

@@ -56,7 +56,7 @@ def feedback(a1, a2, b, q0, q1, q2):
 @law_function(
     family="baseline",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="LQR with integral",
     short="LI",
     gains={

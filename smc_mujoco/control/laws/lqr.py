@@ -23,7 +23,7 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, WEIGHTS, Gain
 @law_function(
     family="baseline",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     gains={
         **WEIGHTS,
         "r": Gain(1.0, positive=True, held=True),  # only the ratios of the weights matter

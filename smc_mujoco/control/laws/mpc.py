@@ -439,7 +439,7 @@ def planned(n, e, de, middle, reach, memory):
 @law_function(
     family="predictive",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="MPC",
     short="MP",
     gains={

@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 @law_function(
     family="higher-order",
     finite_time="e",
-    accuracy={"s": 3, "e": 3},
+    accuracy=3,
     label="Nested third-order",
     gains={"a": Gain(5.0, FORCE, positive=True), "w": Gain(2.0, RATE, positive=True)},
     memory=1,

@@ -10,7 +10,7 @@ from smc_mujoco.control.law import law_function
 @law_function(
     family="baseline",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="No control",
     colour="#6E7781",
 )

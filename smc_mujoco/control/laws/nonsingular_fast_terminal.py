@@ -22,7 +22,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain
 @law_function(
     family="terminal",
     finite_time="e",
-    accuracy={"s": lambda g: g.p, "e": lambda g: g.p},
+    accuracy=lambda g: g.p,
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "rate": Gain(3.0, FORCE_PER_POSITION, nonnegative=True),

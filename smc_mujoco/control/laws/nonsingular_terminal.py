@@ -19,7 +19,7 @@ from smc_mujoco.control.units import FORCE, Gain
 @law_function(
     family="terminal",
     finite_time="e",
-    accuracy={"s": lambda g: g.p, "e": lambda g: g.p},
+    accuracy=lambda g: g.p,
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         **surface.nonsingular_terminal.gains,

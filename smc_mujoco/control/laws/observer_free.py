@@ -23,7 +23,7 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     admits={"d": lambda g: g.lam},
     gains=OBSERVER_FREE,
     label="Observer-free",

@@ -27,7 +27,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, OBSERVER_FREE, R
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, adaptive",
     gains={
         **OBSERVER_FREE,

@@ -27,7 +27,7 @@ from smc_mujoco.control.units import OBSERVER_FREE, RATE2, Gain
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, integral",
     gains={
         **OBSERVER_FREE,

@@ -56,7 +56,7 @@ def saturated(n):
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, Q15",
     gains={
         **OBSERVER_FREE,

@@ -27,7 +27,7 @@ QUARTER, MAX_S = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, single",
     gains=OBSERVER_FREE,
 )

@@ -29,7 +29,7 @@ TABLE.flags.writeable = False
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, table",
     gains={
         **OBSERVER_FREE,

@@ -23,7 +23,7 @@ MAX_S = 8.0  # 1 - tanh(8) = 2.3e-7
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, Taylor",
     gains={
         **OBSERVER_FREE,

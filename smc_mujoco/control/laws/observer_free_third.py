@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 @law_function(
     family="observer-free",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Observer-free, third order",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),

@@ -36,7 +36,7 @@ from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
 @law_function(
     family="disturbance-observer",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="PD with observer",
     short="PO",
     gains={

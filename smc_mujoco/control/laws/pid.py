@@ -19,7 +19,7 @@ from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, TIME, 
 @law_function(
     family="baseline",
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     gains={
         "kp": Gain(10.0, FORCE_PER_POSITION, nonnegative=True),
         "ki": Gain(5.0, Unit(force=1, position=-1, time=-1), nonnegative=True),

@@ -16,7 +16,7 @@ from smc_mujoco.control.units import SLOPE, Gain, force_per
     family="first-order",
     continuous=True,
     finite_time="s",
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Power-rate",
     gains={
         "k": Gain(6.0, force_per("a"), nonnegative=True),

@@ -16,7 +16,7 @@ from smc_mujoco.control.units import FORCE, SPEED_PER_ROOT, Gain
 @law_function(
     family="higher-order",
     finite_time="e",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, SPEED_PER_ROOT, positive=True)},
     memory=1,
     relative_degree=2,

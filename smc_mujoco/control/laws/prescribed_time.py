@@ -20,7 +20,7 @@ from smc_mujoco.control.units import FORCE, INERTIA, SLOPE, TIME, Gain
 @law_function(
     family="first-order",
     finite_time="s",
-    accuracy={"s": 1, "e": 1},
+    accuracy=1,
     label="Prescribed-time",
     gains={
         "T": Gain(2.0, TIME, positive=True),

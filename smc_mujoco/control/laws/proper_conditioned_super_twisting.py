@@ -24,7 +24,7 @@ from smc_mujoco.control.units import REACHED, SUPER_TWISTING
     family="super-twisting",
     continuous=True,
     finite_time="s",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     label="Proper conditioned super-twisting",
     gains=SUPER_TWISTING,
     memory=1,

@@ -28,7 +28,7 @@ def brakes(gains):
 @law_function(
     family="higher-order",
     finite_time="e",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     label="Quasi-continuous",
     gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, SPEED_PER_ROOT, positive=True)},
     memory=1,

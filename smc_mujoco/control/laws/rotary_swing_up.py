@@ -60,7 +60,7 @@ from smc_mujoco.control.units import (
     plants=("furuta",),
     requires_model=True,
     continuous=True,
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Rotary swing-up",
     short="RU",
 )

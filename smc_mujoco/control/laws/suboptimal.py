@@ -18,7 +18,7 @@ from smc_mujoco.control.units import FORCE, Gain
 @law_function(
     family="higher-order",
     finite_time="e",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     gains={"r1": Gain(4.0, FORCE, positive=True), "r2": Gain(1.5, FORCE, positive=True)},
     memory=3,
     relative_degree=2,

@@ -26,7 +26,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, SLOPE, G
     family="super-twisting",
     continuous=True,
     finite_time="s",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     admits={"d'": lambda g: min(g.k2, g.k1**2 - g.k2)},
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, nonnegative=True),

@@ -19,7 +19,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, SLOPE, Gain
     family="super-twisting",
     continuous=True,
     finite_time="s",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, nonnegative=True),
         "k2": Gain(4.4, FORCE_RATE, nonnegative=True),

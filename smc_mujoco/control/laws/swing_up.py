@@ -26,7 +26,7 @@ from smc_mujoco.control.units import FORCE_PER_SPEED, INERTIA, RATE, Gain, Unit
 
 @law_function(
     family="baseline",
-    accuracy={"s": 0, "e": 0},
+    accuracy=0,
     label="Swing-up",
     gains={
         "k": Gain(4.0, Unit(position=-1), positive=True),  # of the force k E

@@ -16,7 +16,7 @@ from smc_mujoco.control.units import FORCE, Gain
 @law_function(
     family="higher-order",
     finite_time="e",
-    accuracy={"s": 2, "e": 2},
+    accuracy=2,
     admits={"d": lambda g: min(g.r1 - g.r2, g.r2)},
     gains={"r1": Gain(3.7, FORCE, positive=True), "r2": Gain(2.3, FORCE, positive=True)},
     memory=1,

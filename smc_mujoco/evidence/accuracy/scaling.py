@@ -10,13 +10,13 @@ are above rounding, and no run's error still falls or grows: by more than a fact
 of the last three parts to the next.
 """
 
-import dataclasses
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.common.kinds import Floats
+from smc_mujoco.common.data import named_data
+from smc_mujoco.common.kinds import Array, Floats
 
 # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
 TREND = 1.5
@@ -26,7 +26,7 @@ QUANTITIES = ("e", "s")
 UNTOLD = "the order cannot be told"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Scaling:
     """The order with which the error of one quantity falls with the control period, and its 95 %
     interval.
@@ -56,7 +56,7 @@ class Scaling:
         )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Accuracy:
     """The accuracy of one law on one plant in one condition."""
 
@@ -111,7 +111,7 @@ class Accuracy:
 
 
 def scaling(
-    parts: np.ndarray,
+    parts: Array,
     periods: Sequence[float],
     theory: float | None,
     floor: float,
@@ -155,7 +155,7 @@ def scaling(
     )
 
 
-def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
+def fit(periods: Array, errors: Array) -> tuple[float, float, float]:
     """Return the exponent of periods (P,), s, in positive errors (starts, P), and its interval; NaN
     for too few.
     """
@@ -196,7 +196,7 @@ def _difference(order: float, low: float, high: float, theory: float | None) -> 
     return "falls slower than promised: these gains, not sampling, limit it"
 
 
-def _periods(periods: Sequence[float], mask: np.ndarray) -> str:
+def _periods(periods: Sequence[float], mask: Array) -> str:
     """Return the marked periods in words."""
     if mask.all():
         return "all periods:"

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common import files
 from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import reading, replacing
 from smc_mujoco.common.frozen import frozen
@@ -96,7 +97,7 @@ class Allowed(NamedTuple):
     near: int = NEAR_SETS  # and around the best of them
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Entry(Statement):
     """A claim of a paper, with what measures it."""
 
@@ -118,7 +119,7 @@ class Entry(Statement):
     values: Data = NO_FIELDS  # its numbers, such as the levels of a sweep
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Paper:
     """A paper, its claims, and what their runs are made of."""
 

@@ -26,6 +26,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.common import html
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.kinds import Fields, Names, Numbers
@@ -230,7 +231,7 @@ class Threshold(NamedTuple):
             yield Beside(what, value)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Statement:
     """What the paper claims, and how it is measured."""
 
@@ -268,7 +269,7 @@ class Statement:
         )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Claim(Statement):
     """A claim and its verdict."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import reading, with_ending, write_json
-from smc_mujoco.common.kinds import AnyPath, Data, Names
+from smc_mujoco.common.kinds import AnyPath, Array, Data, Names
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
 
@@ -188,7 +188,7 @@ class Certificate:
         outside = np.flatnonzero(self.level(x, np.zeros_like(x)) > part["outer"])
         return float(x[max(outside[0] - 1, 0)] if len(outside) else x[-1])
 
-    def contains(self, x: Any, v: Any) -> np.ndarray:
+    def contains(self, x: Any, v: Any) -> Array:
         """Return whether each state lies in the region from which all come to rest or into the
         bound.
 
@@ -205,7 +205,7 @@ class Certificate:
             )
         return inside
 
-    def level(self, x: Any, v: Any) -> np.ndarray:
+    def level(self, x: Any, v: Any) -> Array:
         """Return W of "level sets" at states, 1 outside of its grid; see `contains` for the
         arguments.
         """

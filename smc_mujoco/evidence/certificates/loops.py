@@ -3,7 +3,6 @@
 M x'' = A sin x + B x + C x^3 - (E + F x^2) x' - sigma(s) + d
 """
 
-import dataclasses
 import math
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.kinds import Data, Floats, Pair
 
 Function = Callable[[np.ndarray], np.ndarray]
@@ -24,7 +24,7 @@ ONE_JOINT_TERMS: dict[str, Callable[[Any], Floats]] = {
 }
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Loop:
     """A loop of one channel, as functions of arrays in SI units."""
 

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 from scipy.optimize import brentq
 
-from smc_mujoco.common.kinds import ArrayPair, Pair
+from smc_mujoco.common.kinds import Array, ArrayPair, Pair
 from smc_mujoco.evidence.certificates.loops import Loop
 from smc_mujoco.simulation.cfunctions import cached
 
@@ -65,7 +65,7 @@ def rest(loop: Loop, reach: float) -> float:
     return float(root)
 
 
-def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
+def form(loop: Loop, reach: float, attracts: Attracts) -> Array | None:
     """Return P of a set z' P z <= 1, z = (x, s), around all worst cases of the loop that is linear
     between its rests.
 
@@ -97,7 +97,7 @@ def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
     return None if best is None else np.linalg.inv(best)
 
 
-def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
+def _attracted(loop: Loop, reach: float, attracts: Attracts) -> Array | None:
     """Return P of the largest set z' P z <= 1 on which the form of the loop's linearisation surely
     falls; or None.
     """
@@ -134,9 +134,9 @@ class Levels:
     W(-x, -s) = W(x, s). It falls between its levels inner and outer.
     """
 
-    x: np.ndarray  # (n,)
-    s: np.ndarray  # (2 n - 1,)
-    W: np.ndarray  # (n, 2 n - 1)
+    x: Array  # (n,)
+    s: Array  # (2 n - 1,)
+    W: Array  # (n, 2 n - 1)
     inner: float  # level
     outer: float  # level
     bound: float  # the largest |x| in cells that the inner level reaches
@@ -201,9 +201,7 @@ def _inner(window: Pair) -> float:
 class _Grid:
     """W on the nodes with x >= 0, and the cells where it does not fall."""
 
-    def __init__(
-        self, loop: Loop, x: np.ndarray, s: np.ndarray, W: np.ndarray, size: np.ndarray | None
-    ):
+    def __init__(self, loop: Loop, x: Array, s: Array, W: Array, size: Array | None):
         n = x.size // 2
         self.loop = loop
         self.x = x[n:]
@@ -277,7 +275,7 @@ class _Grid:
         return None
 
 
-def axis(reach: float, step: float) -> np.ndarray:
+def axis(reach: float, step: float) -> Array:
     """Return 2 CELLS + 1 nodes from -reach to reach, `step` apart at 0 and ever wider outwards."""
     step = min(step, reach / CELLS * 0.999)
     wide: Any = brentq(lambda a: reach / np.sinh(a) * np.sinh(a / CELLS) - step, 1e-6, 60.0)
@@ -286,7 +284,7 @@ def axis(reach: float, step: float) -> np.ndarray:
     return np.concatenate([-half[:0:-1], half])
 
 
-def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndarray:
+def times(loop: Loop, x: Array, s: Array, cost: Array) -> Array:
     """Return 1 - exp(-T) on the nodes, T the largest integral of the cost under |d| <= d0; 1 where
     the grid is left.
     """
@@ -321,7 +319,7 @@ def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndar
     return W
 
 
-def _smooth(W: np.ndarray, count: int, switches: bool) -> np.ndarray:
+def _smooth(W: Array, count: int, switches: bool) -> Array:
     """Return W averaged over neighbours; W' at a node is convex in the gradient of W, so it falls
     nearly as before.
     """
@@ -366,7 +364,7 @@ def _sweep(W, open_, cells, shares, decay):
     return change
 
 
-def falls(loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray) -> ArrayPair:
+def falls(loop: Loop, x: Array, s: Array, corners: Array) -> ArrayPair:
     """Return the least and the largest W' at samples of each cell under the worst d, two arrays of
     (n, 2 n).
     """

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.metrics.limit_cycle import limit_cycle
 from smc_mujoco.simulation.trace import Trace
 
@@ -13,22 +14,22 @@ END_SAMPLES = (
 )
 
 
-def late(signal: np.ndarray) -> float:
+def late(signal: Array) -> float:
     """Return the largest magnitude of a signal, (samples, channels), at the end of its run."""
     return float(np.abs(signal[-END_SAMPLES:]).max())
 
 
-def half(signal: np.ndarray) -> np.ndarray:
+def half(signal: Array) -> Array:
     """Return the last half of a signal."""
     return signal[len(signal) // 2 : -1]
 
 
-def largest(signal: np.ndarray) -> float:
+def largest(signal: Array) -> float:
     """Return the largest magnitude in the last half of a signal; NaN if the run failed."""
     return float(np.abs(half(signal)).max())
 
 
-def late_step(signal: np.ndarray) -> float:
+def late_step(signal: Array) -> float:
     """Return the largest change of a signal, (samples, channels), from sample to sample at the end
     of its run.
     """
@@ -48,7 +49,7 @@ def exponent(levels: Sequence[float], errors: Iterable[float]) -> float:
     return float("nan")
 
 
-def settled(trace: Trace, signal: np.ndarray, band: float) -> float:
+def settled(trace: Trace, signal: Array, band: float) -> float:
     """Return the time from which a signal, (samples, channels), stays within a band, s; inf if it
     does not.
     """

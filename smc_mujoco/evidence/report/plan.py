@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from smc_mujoco.common.cache import cached
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.kinds import Names
 from smc_mujoco.common.progress import Report, bar
 from smc_mujoco.evidence.papers.gaber import scenarios
@@ -18,7 +19,7 @@ GAINS = "tuned"  # the set of gains of everything but the claims, which have the
 T = TypeVar("T")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Plan:
     """How much of everything."""
 
@@ -43,7 +44,7 @@ QUICK = Plan(
 )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Work:
     """What every section needs: the plan, the folder for results, and threads."""
 

@@ -21,7 +21,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
-from smc_mujoco.common.kinds import Data, Fields, Numbers
+from smc_mujoco.common.kinds import Array, Data, Fields, Numbers
 from smc_mujoco.common.progress import bar
 from smc_mujoco.evidence.rigs import search
 from smc_mujoco.evidence.rigs.records import Columns, Record
@@ -75,11 +75,11 @@ class Identified:
     before: Rig  # with the values before
     values: Numbers  # quantity -> value found
     errors: Numbers  # quantity -> its standard error
-    correlations: np.ndarray  # of the errors, (p, p), in the order of `values`
+    correlations: Array  # of the errors, (p, p), in the order of `values`
     fits: tuple[Numbers, ...]  # of each record
     fits_before: tuple[Numbers, ...]
     predictions: tuple[
-        tuple[Record, Record, np.ndarray], ...
+        tuple[Record, Record, Array], ...
     ]  # predicted columns, measured ones, and their times
     evaluations: int  # how many parameter sets were simulated
     independent: float  # how many samples of the residuals are independent of each other
@@ -263,7 +263,7 @@ def _solved(
     seed: int,
     most: int,
     report: Any,
-) -> tuple[Replays, Slopes, np.ndarray]:
+) -> tuple[Replays, Slopes, Array]:
     """Return the replays of the last search, their slopes at the solution, and its error due to
     steps, (p,).
     """
@@ -283,7 +283,7 @@ def _solved(
 
 def _starting_states(
     fitted: Rig, data: Sequence[Data], replays: Replays, point: Point
-) -> list[np.ndarray | None]:
+) -> list[Array | None]:
     """Return the state from which each record is repeated as a whole, (2n,); None for the measured
     one.
 

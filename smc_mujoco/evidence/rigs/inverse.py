@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
@@ -46,7 +47,7 @@ class Filter:
         self.stride = max(1, round(COMPARED_PERIOD / self.step))
         self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")
 
-    def cubic(self, name: str, derivative: int = 0) -> np.ndarray:
+    def cubic(self, name: str, derivative: int = 0) -> Array:
         """Return a column or its derivative, (N,), at the samples that are compared, from cubics
         about each of them.
         """
@@ -58,19 +59,19 @@ class Filter:
         )
         return np.asarray(smooth)[:: self.stride]
 
-    def low(self, values: np.ndarray) -> np.ndarray:
+    def low(self, values: Array) -> Array:
         """Return the part of values (N,) below CUTOFF, without the ends."""
         from scipy.signal import sosfiltfilt
 
         return self.inner(sosfiltfilt(self.poles, values))
 
-    def inner(self, values: np.ndarray) -> np.ndarray:
+    def inner(self, values: Array) -> Array:
         """Return values (N,) without the ends."""
         cut = round(END_DURATION / (self.stride * self.step))
         return values[cut : len(values) - cut]
 
 
-def times(data: Record, columns: Columns) -> np.ndarray:
+def times(data: Record, columns: Columns) -> Array:
     """Return the times at which torques are compared, s."""
     filtered = Filter(data, columns)
     return filtered.inner(data[columns.time][:: filtered.stride])

@@ -14,7 +14,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
-from smc_mujoco.common.kinds import AnyPath, ArrayPair, Data, Floats, Names
+from smc_mujoco.common.kinds import AnyPath, Array, ArrayPair, Data, Floats, Names
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.python_functions import evaluate
@@ -183,7 +183,7 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
     return data
 
 
-def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
+def _checked_step(t: Array, period: float | None, rig: str) -> float:
     """Return the median step of a record's times, s. Refuse times that a replay cannot use."""
     if len(t) < 2:
         raise ScenarioError(f"the record of {rig} has {len(t)} samples: give at least two")
@@ -218,7 +218,7 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
     return step
 
 
-def step_of(t: np.ndarray) -> float:
+def step_of(t: Array) -> float:
     """Return the median step of times, s."""
     return max(RESOLUTION, round(float(np.median(np.diff(t))) / RESOLUTION) * RESOLUTION)
 
@@ -237,7 +237,7 @@ def noise(data: Record, columns: Columns) -> float:
     return float(min(medians)) / (NORMAL_MEDIAN * math.sqrt(70.0))
 
 
-def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
+def _numbers(name: str, values: Any, rig: str) -> Array:
     """Return a column as finite floats, (K,)."""
     try:
         array = np.asarray(values, float)
@@ -275,7 +275,7 @@ def state(data: Record, columns: Columns, period: float, at: int) -> ArrayPair:
     return x, np.array([cubic[2] for cubic in cubics])
 
 
-def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
+def rate(values: Array, period: float, order: int = 1) -> Array:
     """Return a derivative of columns, (..., K), from a cubic about each sample.
 
     Order 0 is the cubic itself.

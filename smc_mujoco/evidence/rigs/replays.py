@@ -24,8 +24,9 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
-from smc_mujoco.common.kinds import Data, Fields, Numbers
+from smc_mujoco.common.kinds import Array, Data, Fields, Numbers
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Record
 from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
@@ -46,7 +47,7 @@ WORST = 1.0
 SINGULAR_RATIO = 1e-6
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Piece:
     """A part of a record that is compared with its replay."""
 
@@ -55,38 +56,38 @@ class Piece:
     skipped: int  # samples at its start that are not compared
     measured: Record  # the columns compared, (N,) each
     spread: Numbers  # norm of each whole column about its mean: the unit of residuals
-    scales: np.ndarray  # units of the free states, (s,)
+    scales: Array  # units of the free states, (s,)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Point:
     """A point of the search."""
 
-    values: np.ndarray  # quantities in their scales, (p,)
-    states: np.ndarray  # moves of each piece's free states, (pieces, s)
+    values: Array  # quantities in their scales, (p,)
+    states: Array  # moves of each piece's free states, (pieces, s)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Slopes:
     """Residuals of each piece at a point, in the order of time, each sample with all columns, and
     their derivatives.
     """
 
     point: Point
-    residuals: list[np.ndarray]  # (N,) of each piece
-    by_values: list[np.ndarray]  # derivatives by the quantities, (N, p)
-    by_states: list[np.ndarray]  # derivatives by the piece's states, (N, s)
+    residuals: list[Array]  # (N,) of each piece
+    by_values: list[Array]  # derivatives by the quantities, (N, p)
+    by_states: list[Array]  # derivatives by the piece's states, (N, s)
     columns: int  # number of columns that are compared
     records: int  # number of records whose pieces these are
 
-    def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def freed(self, rows: Sequence[Array]) -> list[Array]:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can
         cause.
         """
         pairs = zip(self.by_states, rows, strict=True)
         return [row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0] for S, row in pairs]
 
-    def moves(self, step: np.ndarray) -> np.ndarray:
+    def moves(self, step: Array) -> Array:
         """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities
         (p,) best.
         """
@@ -95,7 +96,7 @@ class Slopes:
             moves.append(-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0])
         return np.array(moves)
 
-    def stepped(self, step: np.ndarray) -> "Slopes":
+    def stepped(self, step: Array) -> "Slopes":
         """Return the slopes after a small step of the quantities (p,), with residuals that follow
         from derivatives.
 
@@ -123,7 +124,7 @@ class Slopes:
         return 100.0 * (1.0 - math.sqrt(self.cost / (self.columns * self.records)))
 
 
-def cost(rows: Sequence[np.ndarray]) -> float:
+def cost(rows: Sequence[Array]) -> float:
     """Return the sum of squares."""
     return float(sum(np.sum(residuals**2) for residuals in rows))
 
@@ -193,7 +194,7 @@ class Replays:
         """Return what the replay of piece k takes from its record."""
         return self.pieces[k].part
 
-    def state(self, point: Point, k: int) -> np.ndarray | None:
+    def state(self, point: Point, k: int) -> Array | None:
         """Return positions and velocities at the start of piece k, (2n,); None if they are not
         free.
         """
@@ -211,13 +212,13 @@ class Replays:
             states[k, -n:] = -self._part(k).state[n:] / piece.scales[-n:]
         return Point(point.values, states)
 
-    def residuals(self, points: Sequence[Point]) -> list[list[np.ndarray]]:
+    def residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
         return [
             list(map(self.relative, self.pieces, by_piece)) for by_piece in self.predicted(points)
         ]
 
-    def costs(self, points: Sequence[Point]) -> np.ndarray:
+    def costs(self, points: Sequence[Point]) -> Array:
         """Return the sum of squares of each piece at each point, (points, pieces)."""
         found = []
         for by_piece in self.residuals(points):
@@ -301,7 +302,7 @@ class Replays:
             found.append(columns)
         return found
 
-    def relative(self, piece: Piece, predicted: Record) -> np.ndarray:
+    def relative(self, piece: Piece, predicted: Record) -> Array:
         """Return the residuals of a piece, sample by sample with all columns, (N,), divided by the
         columns' spread.
         """
@@ -382,7 +383,7 @@ class Replays:
         return pieces
 
 
-def _norm(values: np.ndarray) -> float:
+def _norm(values: Array) -> float:
     """Return the norm of a column about its mean; 1 for a constant one."""
     return float(np.linalg.norm(values - values.mean())) or 1.0
 

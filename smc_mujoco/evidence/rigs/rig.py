@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
+from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data, Fields, Floats, Names, Numbers
+from smc_mujoco.common.kinds import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Columns, Record
@@ -37,7 +38,7 @@ FAILED_FIT = -1e3  # percent: fit of a replay that fails in an open loop
 FALL_RANGES = 2.0  # ranges of a joint beyond which the twin of a closed loop has fallen; chosen
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Quantity:
     """A number of a rig."""
 
@@ -69,17 +70,17 @@ class Fall(float):
     __repr__ = __str__
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Part:
     """What a replay takes from a record, whatever the quantities of the rig."""
 
     fields: Data  # of the replay's Scenario: law, duration, signals
-    state: np.ndarray  # measured positions and velocities at the start, (2n,)
+    state: Array  # measured positions and velocities at the start, (2n,)
     largest_u: float  # of the recorded command, in the unit of u
     zero: Numbers  # quantities that the record determines, see `Rig.zero`
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Rig:
     """A real machine.
 
@@ -119,7 +120,7 @@ class Rig:
     machine: Callable[[Values], Fields]
     controller: Law | None = None
     columns: Columns = dataclasses.field(default_factory=Columns)
-    commands: Callable[[Record, int], np.ndarray] | None = None
+    commands: Callable[[Record, int], Array] | None = None
     zero: Callable[[Values, Record], dict[str, float]] | None = None
     start: float = 0.0
     score_from: float = 0.0
@@ -227,7 +228,7 @@ class Rig:
             raise self._too_short(data, "repeat", first + records.MIN_SAMPLES + 1)
         times = (period * np.arange(last + 1 - first)).tolist()
 
-        def signal(values: np.ndarray) -> TimeSeries:
+        def signal(values: Array) -> TimeSeries:
             return TimeSeries(times, values[: len(times)].tolist())
 
         fields: Fields = {"duration": times[-1]}
@@ -265,7 +266,7 @@ class Rig:
         )
 
     def repeated(
-        self, part: Part, rounded: bool = False, state: np.ndarray | None = None, **changes: Any
+        self, part: Part, rounded: bool = False, state: Array | None = None, **changes: Any
     ) -> Scenario:
         """Return the scenario that repeats a part of a record.
 
@@ -411,7 +412,7 @@ class Rig:
     def fits(
         self,
         many: Sequence[Data],
-        states: Sequence[np.ndarray | None] | None = None,
+        states: Sequence[Array | None] | None = None,
         **changes: Any,
     ) -> list[dict[str, float]]:
         """Return `fit` of several records, simulated in one batch; see `predictions`."""
@@ -432,9 +433,9 @@ class Rig:
     def predictions(
         self,
         many: Sequence[Data],
-        states: Sequence[np.ndarray | None] | None = None,
+        states: Sequence[Array | None] | None = None,
         **changes: Any,
-    ) -> list[tuple[Record, Record, np.ndarray]]:
+    ) -> list[tuple[Record, Record, Array]]:
         """Return the predicted columns, the measured columns and their times of each record, from
         `score_from` on.
 
@@ -492,7 +493,7 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
     return percent
 
 
-def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
+def fallen(predicted: Record, measured: Record, t: Array) -> Fall | None:
     """Return the fall of a twin whose joints leave the measured ones by FALL_RANGES ranges; else
     None.
     """

@@ -15,6 +15,7 @@ import itertools
 
 import numpy as np
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.evidence.rigs import inverse
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
 from smc_mujoco.evidence.rigs.rig import Values
@@ -75,7 +76,7 @@ def _by_torques(replays: Replays) -> Point | None:
         record.update(dict.fromkeys(columns.torque, np.zeros_like(u)) | {columns.torque[0]: u})
         measured.append(inverse.measured(record, columns))
 
-    def differences(values: np.ndarray) -> np.ndarray:
+    def differences(values: Array) -> Array:
         quantities = twin.values | replays.values(Point(values, start.states))
         plant = twin.machine(Values(**quantities))["plant"]
         gaps = []
@@ -110,7 +111,7 @@ def better(replays: Replays, *points: Point) -> Point:
     return points[replays.costs(points).sum(axis=1).argmin()]
 
 
-def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
+def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, Array]:
     """Return what a search reaches when its replays are corrected, and how far the last halving
     moved it, (p,).
 
@@ -178,7 +179,7 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     return min(reached, key=lambda pair: pair[1])
 
 
-def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Point]:
+def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:
     """Return points with the same quantities, and states at the starts that a piece may choose
     from.
 
@@ -195,7 +196,7 @@ def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Poin
     return moved[-1:]
 
 
-def _moved(replays: Replays, slopes: Slopes, damping: float) -> np.ndarray:
+def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:
     """Return the quantities after a damped Gauss-Newton step, within their ranges, (p,)."""
     J, r = (np.concatenate(slopes.freed(rows)) for rows in (slopes.by_values, slopes.residuals))
     values = slopes.point.values

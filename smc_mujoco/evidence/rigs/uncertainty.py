@@ -18,6 +18,7 @@ import dataclasses
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.evidence.rigs import records
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
 from smc_mujoco.simulation.run import run
@@ -35,8 +36,8 @@ SINGULAR_RATIO = 1e-6
 
 
 def statistics(
-    replays: Replays, slopes: Slopes, by_steps: np.ndarray
-) -> tuple[dict[str, float], np.ndarray, float]:
+    replays: Replays, slopes: Slopes, by_steps: Array
+) -> tuple[dict[str, float], Array, float]:
     """Return the standard error of each quantity, their correlations (p, p), and `independent`, at
     the solution.
 
@@ -70,7 +71,7 @@ def statistics(
     return errors, correlations, count
 
 
-def jackknife(slopes: Slopes) -> np.ndarray:
+def jackknife(slopes: Slopes) -> Array:
     """Return the covariance of the solution, (p, p), from leaving out one block of time after the
     other.
     """
@@ -90,7 +91,7 @@ def jackknife(slopes: Slopes) -> np.ndarray:
     return (len(moved) - 1) / len(moved) * moved.T @ moved
 
 
-def by_correlation(slopes: Slopes, J: np.ndarray, count: float) -> np.ndarray:
+def by_correlation(slopes: Slopes, J: Array, count: float) -> Array:
     """Return the deviation of the solution, (p,), by least squares with `count` samples that are
     independent.
     """
@@ -121,7 +122,7 @@ def independent(slopes: Slopes) -> float:
     return sum(map(len, slopes.residuals)) / slopes.columns / float(np.median(times))
 
 
-def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _normal(r: Array, J: Array, S: Array) -> tuple[Array, Array]:
     """Return J'J and J'r of a piece, (p, p) and (p,), with J less what states S at its start can
     cause.
     """
@@ -129,7 +130,7 @@ def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np
     return J.T @ J, J.T @ r
 
 
-def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
+def _fed_back(replays: Replays, point: Point, J: Array) -> Array:
     """Return the deviation of the solution, (p,), that the measurement's noise causes through the
     controller.
 

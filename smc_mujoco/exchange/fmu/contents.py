@@ -13,7 +13,6 @@ because FMPy's `simulate_fmu` takes no inputs of several shapes. The elements fo
 the array of variables, so C reads them as an array.
 """
 
-import dataclasses
 import functools
 import math
 import re
@@ -21,6 +20,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from smc_mujoco.common.data import named_data
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -89,7 +89,7 @@ class Variable(NamedTuple):
     positive: bool = False  # whether it must be greater than 0
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class ExportedLaw:
     """A law with all that an FMU needs to control one joint, or many."""
 

@@ -22,8 +22,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Positive, Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, number, one_line, unknown
@@ -31,7 +29,7 @@ from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
 from smc_mujoco.common.guard import Failed, run_isolated
 from smc_mujoco.common.jit import Uncompiled
-from smc_mujoco.common.kinds import AnyPath, Data, Names, Numbers, Pair
+from smc_mujoco.common.kinds import AnyPath, Array, Data, Names, Numbers, Pair
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
@@ -85,7 +83,7 @@ class FmuLaw(Uncompiled):
         """The law's name."""
         return self.name
 
-    def __call__(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> Pair:
+    def __call__(self, y: Measurement, gains: Sequence[float], memory: Array) -> Pair:
         """Return u and s. The memory holds the number of the instance, 0 before the first sample.
 
         The FMU's own time counts its steps: it has none for a sample that is missed, and a late one
@@ -112,7 +110,7 @@ class FmuLaw(Uncompiled):
         values = (max(-MAX_DOUBLE, min(float(gain), MAX_DOUBLE)) for gain in gains)
         return dict(self.constants) | dict(zip(self.parameters, values, strict=False))
 
-    def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
+    def _begin(self, y: Measurement, gains: Sequence[float], memory: Array) -> int:
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
         names = [theirs for _, theirs in self.inputs]

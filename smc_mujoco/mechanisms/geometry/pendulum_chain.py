@@ -17,11 +17,9 @@ x_i). If they are side by side, its rest length is the pitch.
 
 import itertools
 
-import mujoco
-
 from smc_mujoco.mechanisms.geometry import coil
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit
-from smc_mujoco.mechanisms.plant import Field, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, geom_fields, model_spec
 
 PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each other
 HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
@@ -42,8 +40,8 @@ def compose(single, n, x0):
     """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (repeated) in
     keyframe `home`.
     """
-    source = mujoco.MjSpec.from_file(str(model_path(single)))
-    spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
+    source = model_spec(single)
+    spec = model_spec("common/theme.xml")
     spec.modelname = f"{n}_{source.modelname}s"
     spec.compiler.degree = source.compiler.degree
     spec.copy_during_attach = True

@@ -13,17 +13,15 @@ appendix: masses and length. Its friction (5e-4 N on the rail, 2e-6 N m s at the
 
 from math import cos, sin
 
-import mujoco
-
 from smc_mujoco.mechanisms.geometry import cart
-from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_spec
 
 MIN_INERTIA = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
 STOP_X = 1.7  # m, |x| at the end stops: chosen, before the posts
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("cart_pole.xml")))
+    return model_spec("cart_pole.xml")
 
 
 def fields(model, p):

@@ -22,11 +22,10 @@ cf pi/2 at speed: F here.
 
 from math import cos, pi, sin
 
-import mujoco
 from numba import njit
 
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_spec
 
 TORQUE_LIMIT = 6.0  # N m, of a motor on the published boards
 L2 = 0.3  # m, length of the lower link: the equation has only where its centre of mass lies
@@ -57,7 +56,7 @@ MODEL_1_0 = MODEL_1_1 | {
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("double_pendulum.xml")))
+    return model_spec("double_pendulum.xml")
 
 
 def fields(model, p):

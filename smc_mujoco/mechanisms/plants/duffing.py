@@ -11,12 +11,10 @@ alpha/beta and k = beta L^2 give the wells their positions and their stiffness -
 between them is 19 % too high for a = 1.5 m.
 """
 
-import mujoco
-
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.geometry import cart, coil
 from smc_mujoco.mechanisms.hardware.contact import bar
-from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_spec
 
 # m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
 ANCHOR_Y = 1.5
@@ -27,7 +25,7 @@ HALF_RAIL = 2.07  # m, half the length of the rail between its posts
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("duffing.xml")))
+    return model_spec("duffing.xml")
 
 
 def fields(model, p):

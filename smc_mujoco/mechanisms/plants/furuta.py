@@ -23,16 +23,14 @@ motor gives at most k V / R = 0.05 N m at rest, with k = 0.042 N m/A, R = 8.4 oh
 
 from math import cos, sin, sqrt
 
-import mujoco
-
-from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_spec
 
 MIN_INERTIA = 1e-13  # kg m^2, the least inertia about its length that MuJoCo takes well
 STALL_TORQUE = 0.042 * 10.0 / 8.4  # N m
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("furuta.xml")))
+    return model_spec("furuta.xml")
 
 
 def fields(model, p):

@@ -11,10 +11,8 @@ the right.
 
 from math import asin, cos, sin
 
-import mujoco
-
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit, solid
-from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_spec
 
 STOP_DEPTH = 0.4  # m, depth of stops and wall behind their faces, enough for a blow of 80 m/s
 LENGTH, BOB_RADIUS, ROD_RADIUS, HINGE_Z = 0.5, 0.065, 0.012, 0.8  # m
@@ -27,7 +25,7 @@ PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = (0.2, 0.30, 0.020, 0.4)
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("inverted_pendulum.xml")))
+    return model_spec("inverted_pendulum.xml")
 
 
 def fields(model, p):

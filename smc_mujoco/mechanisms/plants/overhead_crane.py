@@ -14,17 +14,15 @@ plane, and numbers like those of its testbed.
 
 from math import cos, sin
 
-import mujoco
-
 from smc_mujoco.mechanisms.geometry import cart
-from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_spec
 
 HOOK_HEIGHT = 0.095  # m, height of the hook above the load's middle
 STOP_X = 1.7  # m, |x| at the end stops: chosen, before the bridge's ends
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("overhead_crane.xml")))
+    return model_spec("overhead_crane.xml")
 
 
 def fields(model, p):

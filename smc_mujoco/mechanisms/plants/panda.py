@@ -54,7 +54,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.contact import box, rub
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, model_spec
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 LINKS = tuple(f"link{i}" for i in range(1, 8))
@@ -95,7 +95,7 @@ SECOND_SET = (
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("panda.xml")))
+    return model_spec("panda.xml")
 
 
 def fields(model, p):

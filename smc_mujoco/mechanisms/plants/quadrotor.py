@@ -43,12 +43,10 @@ drone-models 0.1.0 has it wrong in roll.
 
 import math
 
-import mujoco
-
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.rotors import ROTOR
-from smc_mujoco.mechanisms.plant import Field, Plant, Values, geom_fields, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, Values, geom_fields, model_spec
 
 NAMES = ("rotor1", "rotor2", "rotor3", "rotor4")
 PLACES = ((1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0))  # of the rotors along x and y, in a
@@ -156,7 +154,7 @@ SETS: dict[str, dict[str, float]] = {
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("quadrotor.xml")))
+    return model_spec("quadrotor.xml")
 
 
 def fields(model, p):

@@ -8,15 +8,13 @@ Nonlinear System Identification Benchmarks, 2019: its four identified parameters
 35.1507 N/V at up to 10 V.
 """
 
-import mujoco
-
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, model_spec
 
 FORCE_LIMIT = 35.1507 * 10.0  # N
 
 
 def build(n):
-    return mujoco.MjSpec.from_file(str(model_path("servo_axis.xml")))
+    return model_spec("servo_axis.xml")
 
 
 def fields(model, p):

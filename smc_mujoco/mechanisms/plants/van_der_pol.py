@@ -14,7 +14,7 @@ import mujoco
 
 from smc_mujoco.mechanisms.geometry import cart, coil
 from smc_mujoco.mechanisms.hardware.contact import bar
-from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_spec
 
 ANCHOR_Y = 3.0  # m, h: chosen, so that the limit cycle stays inside the stops
 DAMPER_Z = 0.45  # m, height of the damper above the floor, over the block
@@ -26,7 +26,7 @@ STOP_X, PEG_X = (2.2, 0.5)
 
 
 def build(n):
-    spec = mujoco.MjSpec.from_file(str(model_path("van_der_pol.xml")))
+    spec = model_spec("van_der_pol.xml")
     draw_springs(spec, spec.body("cart").pos[2], 0.05)
     return spec
 

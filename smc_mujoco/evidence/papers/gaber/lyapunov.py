@@ -24,7 +24,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from smc_mujoco.common.kinds import ArrayPair
+from smc_mujoco.common.kinds import Array, ArrayPair
 from smc_mujoco.mechanisms.plant import Plant
 
 GRID_POINTS = 201  # of a grid along each axis: odd, so that it has the origin
@@ -34,7 +34,7 @@ GRID_REACH = (
 )
 
 
-def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+def surface(plant: Plant, lam: float, k1: float, x: Array, v: Array) -> Array:
     """Return the paper's s = alpha - u / g in the states (x, v), arrays of one shape; in m/s or
     rad/s, as alpha.
     """
@@ -42,7 +42,7 @@ def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -
     return alpha + lam / _model(plant, x, v)[1] * np.tanh(alpha)
 
 
-def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+def vdot(plant: Plant, lam: float, k1: float, x: Array, v: Array) -> Array:
     """Return V' by (2) in the states (x, v), in the squared unit of s per second; u is not
     saturated.
     """
@@ -70,7 +70,7 @@ def input_gain(plant: Plant) -> float:
     return float(_model(plant, np.zeros(1), np.zeros(1))[1][0])
 
 
-def _model(plant: Plant, x: np.ndarray, v: np.ndarray) -> ArrayPair:
+def _model(plant: Plant, x: Array, v: Array) -> ArrayPair:
     """Return f and g of the first channel, with every channel in the same state."""
     p = SimpleNamespace(**plant.parameters)
     pairs = zip(np.ravel(x).tolist(), np.ravel(v).tolist(), strict=True)

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.evidence.rigs.controllers import rotary, state_feedback
 from smc_mujoco.evidence.rigs.records import STATE_SAMPLES, Columns, Record, rate
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
@@ -94,7 +95,7 @@ def machine(q):
     }
 
 
-def ripples(q, x: np.ndarray) -> np.ndarray:
+def ripples(q, x: Array) -> Array:
     """Return the share of the torque that the commutator adds at angles x of the motor, with a
     brush at 0.
     """
@@ -144,7 +145,7 @@ def zero(q, record: Record) -> dict[str, float]:
     return {}
 
 
-def _independent(values: np.ndarray) -> float:
+def _independent(values: Array) -> float:
     """Return how many independent samples have as precise a mean as these correlated ones, (K,)."""
     from scipy.signal import correlate
 
@@ -153,7 +154,7 @@ def _independent(values: np.ndarray) -> float:
     return float(len(values) * correlation[0] / (2.0 * correlation[:until].sum() - correlation[0]))
 
 
-def commands(record: Record, first: int) -> np.ndarray:
+def commands(record: Record, first: int) -> Array:
     """Return what the records' controller adds to the replay's feedback, V, (K,).
 
     That is the feedforward, the effect of the pendulum's reference, and the effect of the states of
@@ -167,7 +168,7 @@ def commands(record: Record, first: int) -> np.ndarray:
     lag = 1.0 + gains["cutoff"] * PERIOD
     target = record.get("target_alpha", np.zeros(first + n))
 
-    def filtered(z: np.ndarray) -> np.ndarray:
+    def filtered(z: Array) -> Array:
         return np.asarray(lfilter((gains["cutoff"], -gains["cutoff"]), (lag, -1.0), z - z[0]))
 
     arm, pendulum = (

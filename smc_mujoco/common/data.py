@@ -1,0 +1,20 @@
+"""Decorators of classes of data that does not change."""
+
+import dataclasses
+from typing import TypeVar, dataclass_transform
+
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def frozen_data(kind: type[T]) -> type[T]:
+    """Make a class frozen data."""
+    return dataclasses.dataclass(frozen=True)(kind)
+
+
+@dataclass_transform(
+    frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,)
+)
+def named_data(kind: type[T]) -> type[T]:
+    """Make a class frozen data whose fields are given by name."""
+    return dataclasses.dataclass(frozen=True, kw_only=True)(kind)
