@@ -92,6 +92,7 @@ PLANTS = tuple(gain_sets.STUDY)  # the plants of the first paper
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 
 BOUNDS_PER_FRICTION = 60.0  # of u, on each driven joint
+BEND = 1e4  # 1/rad (1/m), stiffness of bristles over the friction at which a joint breaks away
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
@@ -449,19 +450,27 @@ def _disturbed(make: Callable[[float], Signal]) -> Recipe:
     return lambda plant, duration: {"disturbance": _sized(make(duration / 2), plant)}
 
 
-def _rubbing(make: Callable[[float], Friction | tuple[Friction, ...]]) -> Recipe:
+def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) -> Recipe:
     """Return the friction that a function makes of a level, a sixtieth of the bound on each driven
     joint.
     """
 
     def fields(plant: Plant, duration: float) -> Fields:
         limits = Scenario.recorded(plant=plant, law="none").limits
-        parts = [make(limit / BOUNDS_PER_FRICTION) for limit in limits]
+        parts = [make(limit / BOUNDS_PER_FRICTION, plant) for limit in limits]
         if len(set(limits)) == 1:
             return {"friction": parts[0]}
         return {"friction": dict(zip(joint_names(plant), parts, strict=False))}
 
     return fields
+
+
+def _bristles(level: float, plant: Plant) -> Friction:
+    """Return bristles that bend by 0.1 mrad (mm) before a joint slides, as those of the study do.
+    On the library's plants they are as stiff as there.
+    """
+    stiffness = BEND * level if plant.is_user_model else LuGre.stiffness
+    return LuGre(0.5 * level, level, stribeck=0.05, stiffness=stiffness)
 
 
 IDEAL: dict[str, Recipe] = {
@@ -482,9 +491,9 @@ IDEAL: dict[str, Recipe] = {
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
 }
 REAL: dict[str, Recipe] = {
-    "friction": _rubbing(lambda level: (Coulomb(level), Viscous(0.5 * level))),
-    "coulomb": _rubbing(Coulomb),
-    "lugre": _rubbing(lambda level: LuGre(0.5 * level, level, stribeck=0.05)),
+    "friction": _rubbing(lambda level, plant: (Coulomb(level), Viscous(0.5 * level))),
+    "coulomb": _rubbing(lambda level, plant: Coulomb(level)),
+    "lugre": _rubbing(_bristles),
     "lag_20ms": {"actuator": Lag(0.02)},
     "dc_motor": {"actuator": DCMotor()},
     "stepper": _pulsed,

@@ -1098,8 +1098,8 @@ def _doubts(s: Resolved) -> Iterator[str]:
     too weak, and bristles that are too stiff.
     """
     for part in s.friction:
-        # bristles of the default stiffness are those of the named condition
-        if isinstance(part, LuGre) and part.stiffness > LuGre.stiffness:
+        # bristles of the default stiffness are those of the named condition on the library's plants
+        if isinstance(part, LuGre) and (part.stiffness != LuGre.stiffness or s.plant.is_user_model):
             damping = part.damping
             if damping is None:
                 model = compiled(s.plant.spec())

@@ -133,8 +133,9 @@ class Loop:
         self.d = np.zeros(n)  # disturbances at the last stage
         # sums over a control period: of the drives, of friction and contacts
         self.forces = np.zeros((2, n))
-        step = scenario.resolved.physics_step
-        self.drive_step = drive_step(scenario.chains[0], step, scenario.stages > 1)
+        self.drive_step = drive_step(
+            scenario.chains[0], scenario.resolved.physics_step, scenario.stages > 1
+        )
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         # the mean force in a step of RK4, and its rise to the last stage

@@ -253,7 +253,7 @@ def test_a_joint_of_a_file_that_is_no_channel_has_friction_by_name(part):
 
 
 @pytest.mark.parametrize("name", ["coulomb", "friction", "lugre"])
-@pytest.mark.parametrize("bounds", [(0.03, 0.03), (120.0, 7.0)])
+@pytest.mark.parametrize("bounds", [(0.03, 0.03), (120.0, 0.9)])
 def test_named_frictions_of_an_own_machine_are_shares_of_its_own_bounds(name, bounds):
     lift, turn = bounds
     text = ARM % (lift, lift, turn, turn)
@@ -265,6 +265,23 @@ def test_named_frictions_of_an_own_machine_are_shares_of_its_own_bounds(name, bo
         level = dry.static if name == "lugre" else dry.level
         assert level == pytest.approx(bound / 60.0)
         assert len(here) == (2 if name == "friction" else 1)
+
+
+@pytest.mark.parametrize("name", ["coulomb", "friction", "lugre"])
+@pytest.mark.parametrize("size", [1.0, 1e6])
+def test_an_own_joint_of_any_size_comes_to_rest_where_a_named_friction_stops_it(name, size):
+    inertia, bound = 2e-5 * size, 0.005 * size
+    text = f"""<mujoco><worldbody><body><joint name="j"/><inertial pos="0 0 0" mass="1"
+      diaginertia="{inertia} {inertia} {inertia}"/></body></worldbody><actuator>
+      <motor joint="j" ctrlrange="-{bound} {bound}"/></actuator></mujoco>"""
+    plant = smc.plant_from(text, channels=["j"], name="finger")
+    parts = conditions.NAMED[name].on(plant, 1.0)
+    trace = smc.run(smc.Scenario(plant=plant, law="none", v0=1.0, duration=1.0, **parts))
+    v = np.linspace(0.0, 1.0, 10001)
+    shares = {"coulomb": 1.0, "friction": 1.0 + 0.5 * v, "lugre": 0.5 + 0.5 * np.exp(-400.0 * v**2)}
+    way = np.trapezoid(inertia * v / (bound / 60.0 * shares[name]), v)
+    np.testing.assert_allclose(trace.x[-1], way, rtol=0.02)
+    assert np.abs(trace.v[-1]) < 1e-5
 
 
 ARM = """<mujoco><compiler angle="radian"/><worldbody><body>
