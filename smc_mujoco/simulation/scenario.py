@@ -448,11 +448,6 @@ class Scenario:
         return next((part for part in self.sensors if i in part.channels(self.plant)), None)
 
     @property
-    def voltage_motor(self) -> Actuator | None:
-        """A motor that has its voltage as u; None if no u is a voltage."""
-        return next((part for part in self.actuator if part.unit), None)
-
-    @property
     def accelerates(self) -> bool:
         """Whether u is an acceleration, of any joint."""
         return any(part.accelerates for part in self.actuator)
@@ -460,7 +455,7 @@ class Scenario:
     @property
     def force_command(self) -> bool:
         """Whether u is a force."""
-        return self.voltage_motor is None and not self.accelerates
+        return not any(part.unit or part.accelerates for part in self.actuator)
 
     @property
     def efforts(self) -> tuple[str, ...]:

@@ -474,5 +474,5 @@ def warn_of_broken(laws: Mapping[str, str]) -> None:
     """
     for name, failure in laws.items():
         warnings.warn(
-            f"{name} failed by itself in a run: {failure}", ScenarioWarning, users_stacklevel()
+            f"a run of {name} failed by itself: {failure}", ScenarioWarning, users_stacklevel()
         )

@@ -28,7 +28,7 @@ QUESTIONS = {
 @pytest.mark.parametrize("ask", QUESTIONS.values(), ids=QUESTIONS)
 def test_a_law_that_raises_is_told_once(ask):
     with pytest.warns(
-        smc.errors.ScenarioWarning, match=r"^late failed by itself in a run: .*too late"
+        smc.errors.ScenarioWarning, match=r"^a run of late failed by itself: .*too late"
     ) as reported:
         ask(late)
     assert len(reported) == 1

@@ -201,9 +201,7 @@ def test_a_law_that_raises_is_warned_of():
     def late(y, gains, memory):
         return 1.0 / (y.t < 0.005), 0.0
 
-    with pytest.warns(
-        smc.errors.ScenarioWarning, match="late.* failed by itself in a run: .* raised"
-    ):
+    with pytest.warns(smc.errors.ScenarioWarning, match="late.* failed by itself: .* raised"):
         smc.run([scenario(made(late))] * 2)
 
 

@@ -125,7 +125,7 @@ def _check(scenario: Scenario) -> None:
         "a feedforward": scenario.feedforward is not None,
         "a reference that is not 0": any(r != Constant(0.0) for r in scenario.references),
         "gains or bounds by channel": not law.uniform or len(set(scenario.limits)) > 1,
-        "a motor's voltage as u": scenario.voltage_motor is not None,
+        "a motor's voltage as u": any(part.unit for part in scenario.actuator),
         "an acceleration as u": scenario.accelerates,
         f"mechanism {scenario.mechanism!r}": scenario.mechanism != "equation" and plant.n == 1,
     }
