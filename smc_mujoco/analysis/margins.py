@@ -125,7 +125,8 @@ class Kind:
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
     signed: bool = False  # whether a level is tolerated only if its negative is, too
-    forces: bool = False  # whether levels are of the study's bound, so of a user's model its own
+    # whether levels are forces, which scale with the bound on u of a user's own model
+    forces: bool = False
     # of which a level is a multiple; 0: any level
     quantum: Callable[[Scenario], float] = lambda base: 0.0
     # largest level by linear theory, if there is any
@@ -408,7 +409,8 @@ def margins_of(
         now = sum(scenario.work for scenario in scenarios)
         expected = 0
         for (base, kind), search in zip(cells, searches, strict=True):
-            expected += search.left * base.work * (1 + kind.signed)
+            signs = 2 if kind.signed else 1
+            expected += search.left * base.work * signs
         results = [True] * len(tried)
         scores = runner(scenarios, summed(report, done, done + max(now, expected)))
         for k, ((share,), _) in zip(owners, scores, strict=True):

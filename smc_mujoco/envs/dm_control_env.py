@@ -64,7 +64,7 @@ class PlantTask(Episode, control.Task):
 
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Apply the action."""
-        self.tell(physics.data.ptr, self.setting.command(action))
+        self.apply_command(physics.data.ptr, self.setting.command(action))
 
     def after_step(self, physics: Physics) -> None:
         """Count the sample and read the state."""

@@ -207,7 +207,7 @@ class Setting:
         return ~(np.maximum(np.abs(x), np.abs(v)).max(axis=-1) < MAX_STATE)
 
 
-class Runs:
+class Records:
     """What the callback keeps of the episodes of a setting, one for each copy."""
 
     def __init__(self, setting: Setting, copies: int):
@@ -272,26 +272,26 @@ class Episode:
         mujoco.mj_resetData(setting.model, data)
         data.qpos[:], data.qvel[:] = models.state_with(setting.model, setting.joints, *self.start)
         if setting.uses_callback:
-            self.runs = Runs(setting, 1)
-            data.userdata[:] = self.runs.begin(0, *self.start)
+            self.callback_records = Records(setting, 1)
+            data.userdata[:] = self.callback_records.begin(0, *self.start)
             if setting.model.nkey and setting.model.na:  # thrust behind a lag
                 data.act[:] = setting.model.key_act[0]
         self.commands_given = []
         self.sample = 0
         self.read_state(data)
 
-    def tell(self, data: mujoco.MjData, command: np.ndarray) -> None:
+    def apply_command(self, data: mujoco.MjData, command: np.ndarray) -> None:
         """Give the drives a command, (driven,)."""
         if self.setting.uses_callback:
             self.commands_given.append(command)
-            self.runs.commands[0, : len(command)] = command
+            self.callback_records.commands[0, : len(command)] = command
         else:
             data.ctrl[self.setting.ctrl] = self.setting.scale * command
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
         if self.setting.uses_callback:
-            self.runs.check()
+            self.callback_records.check()
         self.x = data.qpos[self.setting.qpos]
         self.v = data.qvel[self.setting.qvel]
         self.diverged = bool(self.setting.diverged(self.x, self.v))

@@ -66,7 +66,7 @@ class FlightEnv(PlantEnv):
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the pose and its velocity, (6,) each."""
-        self.runs.check()
+        self.callback_records.check()
         first = self.setting.qpos[3]
         dof = self.setting.qvel[0]
         turn = rotation.rotation_vector(*data.qpos[first : first + 4])

@@ -97,7 +97,7 @@ class PlantEnv(Episode, gymnasium.Env):
 
     def take(self, command: np.ndarray) -> None:
         """Take one control period under a command and read the state."""
-        self.tell(self.data, command)
+        self.apply_command(self.data, command)
         with self.setting.stepping():
             mujoco.mj_step(self.setting.model, self.data, self.setting.scenario.steps)
         self.sample += 1

@@ -17,7 +17,7 @@ import numpy as np
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.envs.episode import Runs, Setting, bounded
+from smc_mujoco.envs.episode import Records, Setting, bounded
 from smc_mujoco.envs.gymnasium_env import action_space, observation_space
 from smc_mujoco.envs.tasks import reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
@@ -84,7 +84,7 @@ class BatchEnv(VectorEnv):
         self.qpos, self.qvel, self.ctrl, self.userdata = (
             self.batch.bind(name) for name in ("qpos", "qvel", "ctrl", "userdata")
         )
-        self.runs = Runs(self.setting, self.num_envs)
+        self.callback_records = Records(self.setting, self.num_envs)
         self.randoms: list[np.random.Generator] = []
         # control samples since each episode began, and the copies whose episode has ended
         self.samples = np.zeros(self.num_envs, int)
@@ -155,7 +155,7 @@ class BatchEnv(VectorEnv):
             start = self.setting.draw_start(self.randoms[i], options)
             self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)
             if self.setting.uses_callback:
-                self.userdata[i] = self.runs.begin(i, *start)
+                self.userdata[i] = self.callback_records.begin(i, *start)
         self.samples[mask] = 0
         self.ended[mask] = False
 
@@ -166,7 +166,7 @@ class BatchEnv(VectorEnv):
         """
         setting = self.setting
         failed = np.zeros(self.num_envs, bool)
-        self.runs.commands[:, : commands.shape[1]] = commands
+        self.callback_records.commands[:, : commands.shape[1]] = commands
         if not setting.uses_callback:
             self.ctrl[:, setting.ctrl] = setting.scale * commands
         try:
@@ -175,7 +175,7 @@ class BatchEnv(VectorEnv):
                 self.batch.step(ids, nstep=setting.scenario.steps)
         except SimulationError as error:
             failed[list(error.ids)] = True
-        self.runs.check()
+        self.callback_records.check()
         return failed
 
     def infos(self, e: np.ndarray) -> dict[str, Any]:

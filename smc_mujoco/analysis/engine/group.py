@@ -125,7 +125,7 @@ class Group:
     Args:
       scenarios: of one `key`.
       metrics: what is scored, names of `scores.METRICS`.
-      known: a form of this key whose code is there; the group's then has all of it.
+      known: a form whose code is compiled already; the group's form contains it, to use that code.
     """
 
     def __init__(

@@ -37,9 +37,11 @@ class Where(NamedTuple):
 
 
 def kept_at(n: int, first: int) -> tuple[int, ...]:
-    """Return the indices of what is kept: the squared distance at the start; whether a late sample
-    is in the band, and out of it; the largest squares of both late halves; the largest |u|; and the
-    first of the largest squares of PARTS, and of the ends of the late signals.
+    """Return where a run of n channels keeps each value in its row of work, from index `first` on.
+
+    In order: the squared distance at the start; whether a late sample is in the band, and out of
+    it; the largest squares of both late halves; the largest |u|. Then the first index of the
+    largest squares of PARTS, of the smallest and of the largest values of the late signals.
     """
     ends = first + 6 + PARTS
     return (*range(first, first + 7), ends, ends + SIGNALS * n)

@@ -85,7 +85,8 @@ class Caption:
         self.key = wrapped(parts, inside - self.note_room, KEY_LETTERS * s)
         self.badge = self.badges_sizes(states, below)
         lines = max(len(self.key), bool(self.changes))
-        self.top = (KEY_TOP + KEY_PITCH * lines + 4 * (lines > 0)) * s
+        foot = 4 if lines else 0
+        self.top = (KEY_TOP + KEY_PITCH * lines + foot) * s
 
     def badges_sizes(
         self, states: Sequence[Sequence[State | None]], below: tuple[float, float] | None
@@ -137,7 +138,8 @@ class Caption:
         if max(self.widths(least=True).max(), self.badge[:, 0].max()) > room:
             return math.inf
         tall = float(self.badge[:, 1].max())
-        both = self.widths() + self.badge[:, 0] + GAP * self.scale * (tall > 0.0)
+        gap = GAP * self.scale if tall else 0.0
+        both = self.widths() + self.badge[:, 0] + gap
         if (both <= room).all():
             return max(PILL * self.scale, tall) + GAP * self.scale
         return PILL * self.scale + tall + 1.5 * GAP * self.scale

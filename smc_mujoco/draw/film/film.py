@@ -291,14 +291,14 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     scenario = traces[0].scenario
     clock = frames.clock
     tracks = tracks_at(clock.times, traces, colours)
-    overlay = None
+    over = None  # the module that draws over arms and what flies
     below = None
     words = None
     if scenario.plant.has_path:
-        from smc_mujoco.draw.film import arm as overlay
-    if overlay and scenario.plant.tip:
-        below = overlay.room(traces)
-        words = overlay.key(traces)
+        from smc_mujoco.draw.film import arm as over
+    if over and scenario.plant.tip:
+        below = over.room(traces)
+        words = over.key(traces)
     grid_states = [track.grid_states for track in tracks]
     factor = clock.close.factor if clock.close else 1.0
     given = (frames.title, above, scale, arrows.scales(traces), grid_states, below, words, factor)
@@ -308,7 +308,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
         stages = []
         for stage in staged(tracks, frames.camera, caption, clock.times):
             stages.append(opened.enter_context(stage))
-        overlays = overlay.overlays(stages, caption.badges) if overlay else []
+        overlays = over.overlays(stages, caption.badges) if over else []
         yield from drawn(clock, stages, overlays, caption, charts)
         if clock.close:
             close = clock.close
