@@ -32,6 +32,7 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.constraints import Boolean, constrained
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
@@ -115,7 +116,7 @@ def find_boundaries(
 # the kinds of margins
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Kind:
     """A kind of margin: something that a law tolerates up to some level."""
 
@@ -303,7 +304,7 @@ KINDS = "delay", "disturbance", "friction", "mass", "noise"
 # margins of laws on plants
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Margin:
     """The largest level of one kind that one law tolerates on one plant."""
 

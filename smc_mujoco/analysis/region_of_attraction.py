@@ -31,7 +31,6 @@ four times as fast as RK4, with a difference of 1e-3 rad or m, less than a fifti
 
 import dataclasses
 import math
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -42,6 +41,7 @@ from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, 
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
+from smc_mujoco.common.kinds import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.progress import Report
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
@@ -73,11 +73,11 @@ class Basin:
 
     plant: str  # its name
     law: str  # its name
-    x: np.ndarray  # (nx,), positions of the grid, in the plant's unit
-    v: np.ndarray  # (nv,), velocities of the grid, per second
-    outcome: np.ndarray  # (nv, nx) int8: 1 converges, 0 undecided, -1 does not
+    x: Array  # (nx,), positions of the grid, in the plant's unit
+    v: Array  # (nv,), velocities of the grid, per second
+    outcome: Array  # (nv, nx) int8: 1 converges, 0 undecided, -1 does not
     # (nv, nx), duration of the run that decided, s; the whole duration if undecided
-    decided_at: np.ndarray
+    decided_at: Array
     unit: str  # of x, "rad" or "m"
     duration: float  # s, of the longest runs
     source: str = NONE  # where the law's gains come from, a kind of `control.source`
@@ -93,7 +93,7 @@ class Basin:
         """The share of the states that converge within the duration."""
         return float((self.outcome == CONVERGES).mean())
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: AnyPath) -> Path:
         """Write a .json file that `load` reads back."""
         data = {}
         for field in dataclasses.fields(self):
@@ -107,8 +107,8 @@ def basin(
     plant: str | Plant,
     law: str | Law | Template,
     points: tuple[int, int] = (50, 50),
-    x: Sequence[float] | np.ndarray | None = None,
-    v: Sequence[float] | np.ndarray | None = None,
+    x: Sequence[float] | Array | None = None,
+    v: Sequence[float] | Array | None = None,
     gains: str = "tuned",
     duration: float = DURATION,
     threads: int | None = None,
@@ -166,8 +166,8 @@ def basin(
 
 def basin_of(
     base: Scenario,
-    x: Sequence[float] | np.ndarray,
-    v: Sequence[float] | np.ndarray,
+    x: Sequence[float] | Array,
+    v: Sequence[float] | Array,
     threads: int | None = None,
     report: Report = lambda done, needed: None,
     device: str = "cpu",
@@ -222,7 +222,7 @@ def basin_of(
 class _Grid:
     """The runs of a map, whose states are (S, 2), x and v of every channel."""
 
-    def __init__(self, base: Scenario, x: np.ndarray, v: np.ndarray, threads: int | None):
+    def __init__(self, base: Scenario, x: Array, v: Array, threads: int | None):
         self.base = base
         self.x = x
         self.v = v
@@ -231,9 +231,7 @@ class _Grid:
         trace_bytes = 72 * (base.samples + 1) * base.plant.n
         self.traced = max(32, int(BATCH_BYTES / trace_bytes))  # runs whose traces fit in memory
 
-    def decide(
-        self, run: Callable, size: int, states: np.ndarray, report: Report
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def decide(self, run: Callable, size: int, states: Array, report: Report) -> ArrayPair:
         """Return the outcome of every state, and the duration of the run that decided, s.
 
         `run` gets a scenario, `size` states at most, and whether its verdict is final; it returns
@@ -258,7 +256,7 @@ class _Grid:
             left = left[waits]
         return outcome, decided_at
 
-    def by_mujoco(self, shortened: Scenario, states: np.ndarray, final: bool) -> list[int]:
+    def by_mujoco(self, shortened: Scenario, states: Array, final: bool) -> list[int]:
         """Return the outcomes of runs by MuJoCo."""
         cases = []
         for x, v in states.tolist():
@@ -276,7 +274,7 @@ class _Grid:
         from smc_mujoco.analysis.engine.group import Group
         from smc_mujoco.analysis.engine.outcome import NAME
 
-        def run(shortened: Scenario, states: np.ndarray, final: bool) -> np.ndarray:
+        def run(shortened: Scenario, states: Array, final: bool) -> Array:
             made = Group([shortened], (NAME,))
             rows = np.repeat(made.rows, len(states), axis=0)
             LATE, REACH, X0, V0 = made.places.of("late", "reach", "x0", "v0")
@@ -293,7 +291,7 @@ class _Grid:
         return run
 
 
-def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
+def verdict_of(trace: Trace, x: Array, v: Array, final: bool) -> int | None:
     """Return what the module's rule says of a run, for a grid x, v: 1, 0 or -1, or None if it needs
     a longer run.
     """
@@ -316,21 +314,21 @@ def _early(samples: int) -> int:
     return count - count // EARLY_PARTS
 
 
-def _reach(x: np.ndarray, v: np.ndarray, u_max: Any, final: bool) -> tuple[float, ...]:
+def _reach(x: Array, v: Array, u_max: Any, final: bool) -> Floats:
     """Return X, V, the bound on u, and whether the verdict is final."""
     return np.abs(x).max() or 1.0, np.abs(v).max() or 1.0, float(np.max(u_max)), float(final)
 
 
-def load(path: str | os.PathLike[str]) -> Basin:
+def load(path: AnyPath) -> Basin:
     """Read the map that `Basin.save` wrote."""
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:
-        fields: dict[str, Any] = read_json(file)
+        fields: Fields = read_json(file)
         fields |= {name: np.array(fields[name], kind) for name, kind in kinds.items()}
         return Basin(**fields)
 
 
-def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
+def _axis(name: str, values: Sequence[float] | Array) -> Array:
     axis = []
     for value in items_of(name, values):
         axis.append(number(f"a value of {name}", value))

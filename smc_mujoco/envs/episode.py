@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant
@@ -141,7 +142,7 @@ class Setting:
         if plant.rest:
             self.rest_r[: width // 3] = self.rest_x[: width // 3]
 
-    def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
+    def command(self, action: Any, copies: tuple[int, ...] = ()) -> Array:
         """Return the commands of an action, (*copies, driven): its saturated values times the
         limits.
         """
@@ -183,26 +184,26 @@ class Setting:
             self.check_start(x)
         return x, v
 
-    def check_start(self, x: np.ndarray) -> None:
+    def check_start(self, x: Array) -> None:
         """Raise ScenarioError for positions in an obstacle, or beyond one."""
         begun = dataclasses.replace(self.scenario, x0=tuple(x.tolist()))
         models.check_path(self.model, begun)
 
-    def reference(self, k: Any) -> np.ndarray:
+    def reference(self, k: Any) -> Array:
         """Return all r, r' and r'' at sample k, (..., 3 m), as a copy."""
         return np.take(self.references, k, axis=0, mode="clip")
 
-    def observe(self, x: np.ndarray, v: np.ndarray, k: Any) -> np.ndarray:
+    def observe(self, x: Array, v: Array, k: Any) -> Array:
         """Return the observation at sample k, (..., size): x, v, and the reference if the task has
         one.
         """
         return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
 
-    def errors(self, x: np.ndarray, v: np.ndarray, k: Any) -> Pair:
+    def errors(self, x: Array, v: Array, k: Any) -> Pair:
         """Return the errors e and w of the task for x, v (..., n) at sample k, (..., n) each."""
         return self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected)
 
-    def diverged(self, x: np.ndarray, v: np.ndarray) -> Any:
+    def diverged(self, x: Array, v: Array) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or NaN."""
         return ~(np.maximum(np.abs(x), np.abs(v)).max(axis=-1) < MAX_STATE)
 
@@ -217,7 +218,7 @@ class Records:
         self.commands = np.zeros((copies, width))  # of the laws
         self.kept: list[Any] = [None] * copies
 
-    def begin(self, i: int, x: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+    def begin(self, i: int, x: Array, v: Array) -> tuple[float, float]:
         """Begin an episode of copy i at x and v, (n,) each, and return its userdata."""
         started = object.__new__(Resolved)
         start = {"x0": tuple(x.tolist()), "v0": tuple(v.tolist())}
@@ -255,7 +256,7 @@ class Episode:
         self.episodes = 0
         self.diverged = False
         self.sample = 0  # control samples since the episode began
-        self.commands_given: list[np.ndarray] = []  # the commands of an episode with the callback
+        self.commands_given: list[Array] = []  # the commands of an episode with the callback
         self.x = self.v = np.zeros(setting.scenario.plant.n)
 
     def begin(
@@ -280,7 +281,7 @@ class Episode:
         self.sample = 0
         self.read_state(data)
 
-    def apply_command(self, data: mujoco.MjData, command: np.ndarray) -> None:
+    def apply_command(self, data: mujoco.MjData, command: Array) -> None:
         """Give the drives a command, (driven,)."""
         if self.setting.uses_callback:
             self.commands_given.append(command)
@@ -312,7 +313,7 @@ class Episode:
         return self.setting.errors(self.x, self.v, self.sample)
 
 
-def bounded(observation: np.ndarray) -> np.ndarray:
+def bounded(observation: Array) -> Array:
     """Return the last observation of an episode that diverged, limited to the observation space."""
     return np.clip(np.nan_to_num(observation, nan=MAX_STATE), -MAX_STATE, MAX_STATE)
 
@@ -330,7 +331,7 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
     return dict(changes)
 
 
-def _references(scenario: Resolved, samples: int) -> np.ndarray:
+def _references(scenario: Resolved, samples: int) -> Array:
     """Return r, r' and r'' at every sample, (K + 1, 3 m), of m references: one, or one for each
     driven channel.
     """

@@ -9,7 +9,6 @@ info has "time", s since the start, and "error", the e of the task in each chann
 `tasks` describes tasks and rewards; `vector_env` has many copies of a plant in one batch.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -18,6 +17,7 @@ import numpy as np
 from smc_mujoco.common import gl
 from smc_mujoco.common.constraints import OneOf
 from smc_mujoco.common.extras import extra
+from smc_mujoco.common.kinds import Array, Data, Fields
 from smc_mujoco.envs import registration
 from smc_mujoco.envs.episode import Episode, Setting, bounded
 from smc_mujoco.mechanisms.plant import Plant
@@ -52,7 +52,7 @@ class PlantEnv(Episode, gymnasium.Env):
         self,
         plant: Plant | str,
         task: str = "regulate",
-        changes: Mapping[str, Any] | None = None,
+        changes: Data | None = None,
         render_mode: str | None = None,
     ):
         """Make a plant with one of its tasks.
@@ -72,14 +72,14 @@ class PlantEnv(Episode, gymnasium.Env):
         self.data = mujoco.MjData(self.setting.model)
 
     def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+        self, *, seed: int | None = None, options: Data | None = None
+    ) -> tuple[Array, Fields]:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         super().reset(seed=seed)
         self.begin(self.data, self.np_random, options)
         return self.setting.observe(self.x, self.v, 0), self.reward_and_info()[1]
 
-    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Array, float, bool, bool, Fields]:
         """Take one control period.
 
         Return observation, reward, terminated, truncated and the info.
@@ -95,7 +95,7 @@ class PlantEnv(Episode, gymnasium.Env):
         """Take one control period and read the state."""
         self.take(self.setting.command(action))
 
-    def take(self, command: np.ndarray) -> None:
+    def take(self, command: Array) -> None:
         """Take one control period under a command and read the state."""
         self.apply_command(self.data, command)
         with self.setting.stepping():
@@ -103,7 +103,7 @@ class PlantEnv(Episode, gymnasium.Env):
         self.sample += 1
         self.read_state(self.data)
 
-    def render(self) -> np.ndarray | None:
+    def render(self) -> Array | None:
         """Return a picture from the plant's camera, (height, width, 3), with render_mode
         "rgb_array", else None.
         """
@@ -121,7 +121,7 @@ class PlantEnv(Episode, gymnasium.Env):
             self.renderer.close()
             self.renderer = None
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Fields:
         """Return all but the renderer and what the callback keeps, for copies and other processes.
 
         A copy of an episode with the callback repeats it.
@@ -131,7 +131,7 @@ class PlantEnv(Episode, gymnasium.Env):
             kept |= {"runs": None, "data": None}
         return kept
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: Fields) -> None:
         vars(self).update(state)
         if self.setting.uses_callback:
             self.data = mujoco.MjData(self.setting.model)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -31,7 +32,7 @@ def agent(
     model: str | None = None,
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
-) -> Callable[[Any], np.ndarray]:
+) -> Callable[[Any], Array]:
     """Return a law as an agent: a callable observation -> action, whose memory is cleared with each
     episode.
 
@@ -56,7 +57,7 @@ def agent(
     batch: Any = None
     last_episode = 0  # number of the episode in which it acted last
 
-    def act(observation: Any) -> np.ndarray:
+    def act(observation: Any) -> Array:
         """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of
         gymnasium.
         """
@@ -92,7 +93,7 @@ def _episode(environment: Any) -> Episode:
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")
 
 
-def _positions_and_velocities(observation: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
+def _positions_and_velocities(observation: Any, n: int) -> tuple[Array, Array]:
     """Return x and v, (n,) each."""
     values = getattr(observation, "observation", observation)
     if isinstance(values, Mapping) and "position" in values:

@@ -25,6 +25,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.kinds import Array, Fields
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.named import as_plant
@@ -68,11 +69,11 @@ class Task:
         """Return whether a plant has this task."""
         return True
 
-    def fields(self, plant: Plant) -> dict[str, Any]:
+    def fields(self, plant: Plant) -> Fields:
         """Return the Scenario fields for which the task has its own default."""
         return {}
 
-    def selected(self, plant: Plant) -> np.ndarray:
+    def selected(self, plant: Plant) -> Array:
         """Return the channels that `errors` treats differently from the rest, (n,) of bool."""
         return np.ones(plant.n, bool)
 
@@ -86,7 +87,7 @@ class Task:
         reach = np.abs(start - rest(plant))
         return -reach, reach
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
         """Return e and w for x and v, (..., n) each; `r` has the references r, r' and r'', (..., 3
         m), m of each.
         """
@@ -98,7 +99,7 @@ class Track(Task):
 
     moving = True
 
-    def fields(self, plant: Plant) -> dict[str, Any]:
+    def fields(self, plant: Plant) -> Fields:
         """Return the reference: for an arm one for each joint, about its rest."""
         if not plant.rest:
             return {"reference": TRACK_REFERENCE}
@@ -111,11 +112,11 @@ class Track(Task):
             references.append(OffsetSine(middle, amplitude, TRACK_REFERENCE.omega))
         return {"reference": references}
 
-    def selected(self, plant: Plant) -> np.ndarray:
+    def selected(self, plant: Plant) -> Array:
         """Return the channels with an actuator."""
         return np.arange(plant.n) < plant.driven
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
         """Return the distance of the driven channels from their references, and the state of the
         others.
         """
@@ -137,7 +138,7 @@ class SwingUp(Task):
         one_unit = plant.free or {"rad"}.issuperset(plant.units)
         return bool(down.any() and hangs.all() and one_unit)
 
-    def fields(self, plant: Plant) -> dict[str, Any]:
+    def fields(self, plant: Plant) -> Fields:
         """Return a torque too weak to push the heaviest pendulum up at once; a cart keeps its own
         limit.
         """
@@ -149,7 +150,7 @@ class SwingUp(Task):
         pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
         return {"u_max": SWING_UP_TORQUE * max(abs(f / g) for f, g in pulls)}
 
-    def selected(self, plant: Plant) -> np.ndarray:
+    def selected(self, plant: Plant) -> Array:
         """Return the channels that topple."""
         return toppling(plant)
 
@@ -158,7 +159,7 @@ class SwingUp(Task):
         down = toppling(plant)
         return (math.pi - SWING_UP_SPREAD) * down, (math.pi + SWING_UP_SPREAD) * down
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
         """Return the distance of toppling channels from upright, and the state of others."""
         return np.where(selected, 1.0 - np.cos(x), x), v
 
@@ -175,7 +176,7 @@ class Synchronise(Task):
         reach = np.full(plant.n, max(np.abs(plant.x0)))
         return -reach, reach
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
         """Return the distance of the channels from their mean."""
         return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
 
@@ -186,7 +187,7 @@ TASKS = {"regulate": Task(), "track": Track(), "swing_up": SwingUp(), "synchroni
 FLIGHT_TASKS = ["regulate", "track"]  # of free bodies
 
 
-def reward(e: np.ndarray, w: np.ndarray) -> Any:
+def reward(e: Array, w: Array) -> Any:
     """Return the reward for errors e and w, (..., n) each."""
     rate = -LN10 / e.shape[-1]
     return np.exp(rate * np.vecdot(e, e)) * (
@@ -209,7 +210,7 @@ def starts(task: Task, plant: Plant) -> Pair:
     return np.clip(rest(plant) + low, lowest, highest), np.clip(rest(plant) + high, lowest, highest)
 
 
-def rest(plant: Plant) -> np.ndarray:
+def rest(plant: Plant) -> Array:
     """Return the positions from which errors and spreads count, (n,): the plant's rest, or 0."""
     return np.array(plant.rest or (0.0,) * plant.n)
 
@@ -223,7 +224,7 @@ def _ranges(plant: Plant) -> Pair:
 
 
 @functools.lru_cache(maxsize=64)
-def toppling(plant: Plant) -> np.ndarray:
+def toppling(plant: Plant) -> Array:
     """Return the channels that fall when they lean, (n,) of bool: hinges for which x = 0 is
     unstable.
     """

@@ -8,7 +8,7 @@ begins the next one in the next step, which ignores the action, as gymnasium's o
 environments do (AutoresetMode.NEXT_STEP).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import mujoco
@@ -31,6 +31,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from mujoco.batch import Batch, SimulationError  # already imported with simulation.run
 
+from smc_mujoco.common.kinds import Array, ArrayPair, Data, Fields
+
 MAX_COPIES = 1_000_000  # a larger number is a mistake
 
 
@@ -45,7 +47,7 @@ class BatchEnv(VectorEnv):
         plant: Plant | str,
         num_envs: Annotated[int, Whole(low=1, high=MAX_COPIES)] = 1,
         task: str = "regulate",
-        changes: Mapping[str, Any] | None = None,
+        changes: Data | None = None,
         threads: int | None = None,
         max_episode_steps: Annotated[int, Whole(low=1, high=10**15)] | None = None,
         render_mode: None = None,
@@ -94,8 +96,8 @@ class BatchEnv(VectorEnv):
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
-        options: Mapping[str, Any] | None = None,
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+        options: Data | None = None,
+    ) -> tuple[Array, Fields]:
         """Begin new episodes, from seed, seed + 1, ... or a list of seeds.
 
         Options x0 and v0 hold for all copies.
@@ -119,9 +121,7 @@ class BatchEnv(VectorEnv):
         e, _ = self.setting.errors(x, v, self.samples)
         return self.setting.observe(x, v, self.samples), self.infos(e)
 
-    def step(
-        self, actions: Any
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: Any) -> tuple[Array, Array, Array, Array, Fields]:
         """Take one control period in every copy; copies at the end of an episode begin the next
         one.
         """
@@ -146,7 +146,7 @@ class BatchEnv(VectorEnv):
         self.ended = terminated | truncated
         return observations, rewards, terminated, truncated, self.infos(e)
 
-    def begin(self, mask: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
+    def begin(self, mask: Array, options: Data | None = None) -> None:
         """Begin new episodes of the copies where `mask`, (num_envs,) of bool, is true."""
         ids = np.flatnonzero(mask)
         with mjcb.installed(None):
@@ -159,7 +159,7 @@ class BatchEnv(VectorEnv):
         self.samples[mask] = 0
         self.ended[mask] = False
 
-    def advance(self, ids: np.ndarray, commands: np.ndarray) -> np.ndarray:
+    def advance(self, ids: Array, commands: Array) -> Array:
         """Take one control period in the copies `ids`.
 
         Return those that failed, (num_envs,) of bool.
@@ -178,7 +178,7 @@ class BatchEnv(VectorEnv):
         self.callback_records.check()
         return failed
 
-    def infos(self, e: np.ndarray) -> dict[str, Any]:
+    def infos(self, e: Array) -> Fields:
         """Return the infos of `Episode.reward_and_info` as gymnasium joins them; e is (num_envs,
         n).
         """
@@ -186,7 +186,7 @@ class BatchEnv(VectorEnv):
         known = np.ones(self.num_envs, bool)
         return {"time": times, "_time": known, "error": e, "_error": known.copy()}
 
-    def state(self) -> tuple[np.ndarray, np.ndarray]:
+    def state(self) -> ArrayPair:
         """Return positions and velocities of all copies, (num_envs, n) each."""
         return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
 

@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common.kinds import Array
+
 
 @njit(error_model="numpy")
 def rotation_vector(w, x, y, z):
@@ -128,7 +130,7 @@ def mix(x, u, rows, actuators, keeps_torques, controls):
         controls[j] = min(max(kept, rows[8 * j + 6]), rows[8 * j + 7])
 
 
-def pose_errors(x: np.ndarray, r: np.ndarray) -> np.ndarray:
+def pose_errors(x: Array, r: Array) -> Array:
     """Return the errors of poses x from references r, (K, 6) each: of an attitude the rotation
     vector between both.
     """

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
+from smc_mujoco.common.kinds import Floats, Numbers
 from smc_mujoco.common.text import counted, joined, stated
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
@@ -144,9 +145,7 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     return list(value)
 
 
-def bound(
-    name: str, value: float | ByChannel[float] | None, s: Any
-) -> float | tuple[float, ...] | None:
+def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | Floats | None:
     """Return the bound on |u| of all channels, or of each driven one if they differ."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
@@ -159,7 +158,7 @@ def bound(
     return bounds[0] if len(set(bounds)) == 1 else bounds
 
 
-def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[float, ...] | None:
+def state(name: str, value: float | Sequence[float] | None, s: Any) -> Floats | None:
     """Return n positions or velocities, from n numbers or one.
 
     Beyond MAX_STATE a run would have diverged.
@@ -233,7 +232,7 @@ def several(kind: type[T], example: str) -> Callable[[str, object, Any], tuple[T
     return convert
 
 
-def mismatch(name: str, value: Mapping[str, float] | None, s: Any) -> Mapping[str, float]:
+def mismatch(name: str, value: Numbers | None, s: Any) -> Numbers:
     """Return parameter factors; None means no factors."""
     return parameter_factors(name, {} if value is None else value)
 

@@ -19,12 +19,13 @@ start inwards, and pendulums that may touch each other ("bobs") start in order f
 import dataclasses
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.constraints import Natural, Whole, constrained
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import (
     MAX_ITEMS,
     ScenarioError,
@@ -37,6 +38,7 @@ from smc_mujoco.common.errors import (
     whole,
 )
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data, Fields, Floats
 from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
@@ -59,11 +61,11 @@ GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
 START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Starts:
     """Where runs begin, by seed. The fields are the arguments of `starts`."""
 
-    x0: tuple[float, ...] | None = None
+    x0: Floats | None = None
     spread: float = SPREAD
     by: float = 0.0
 
@@ -82,7 +84,7 @@ class Starts:
         middle = self.place(scenario, 0).resolved.x0
         return max(abs(x - r) for x, r in zip(middle, plant.origin, strict=True)) or self.by
 
-    def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
+    def check_condition(self, name: str, fields: Data) -> None:
         """Raise ScenarioError if both the starts and the fields of a condition set x0."""
         if self.x0 is not None and "x0" in fields:
             raise ScenarioError(
@@ -242,12 +244,12 @@ def case(
     gains: str = "tuned",
     seed: Annotated[int, Whole(low=0, high=GRID_SEEDS - 1)] = 0,
     starts: Starts | None = None,
-    changes: Mapping[str, Any] = frozen({}),
+    changes: Data = frozen({}),
 ) -> Scenario:
     """Return one run of a grid, with `changes` of the fields that its condition sets."""
     plant = as_plant(plant)
     condition = find_condition(condition)
-    fields: dict[str, Any] = {
+    fields: Fields = {
         "plant": plant,
         "law": _law(plant, law, gains, seed),
         "duration": duration,

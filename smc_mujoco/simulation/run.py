@@ -38,6 +38,8 @@ from smc_mujoco.simulation.trace import Trace, from_log, warn_of_broken
 # isort: split
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
+from smc_mujoco.common.kinds import Array
+
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system
 SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
@@ -223,12 +225,12 @@ def cores(threads: Annotated[int, Whole(low=1, high=1024)] | None = None) -> int
     return threads
 
 
-def poses(trace: Trace, times: np.ndarray) -> np.ndarray:
+def poses(trace: Trace, times: Array) -> Array:
     """Return qpos at times in s, (times, nq), see `states`."""
     return states(trace, times)[0]
 
 
-def states(trace: Trace, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def states(trace: Trace, times: Array) -> tuple[Array, Array]:
     """Return qpos, (times, nq), and qvel, (times, nv), at times in s, each at the physics step
     before; after a failure the last one.
 
@@ -297,7 +299,7 @@ class ScenarioBatch:
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
         self.reset()
         self.put_initial_states()
-        self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
+        self.fields: dict[str, Array] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
         self.calls = 0  # callbacks that each simulation should have had by now
         # whether a law may never return: a user's, compiled
@@ -381,7 +383,7 @@ class ScenarioBatch:
             self.batch.set_const(np.unique(changed).astype(np.int32))
 
     @property
-    def started(self) -> dict[str, np.ndarray]:
+    def started(self) -> dict[str, Array]:
         """The arrays of all simulations whose start is not MuJoCo's: states, and the past of
         delayed sensors.
         """
@@ -425,7 +427,7 @@ class ScenarioBatch:
             report(count * channels)
             steps -= count
 
-    def run_alive(self, action: Callable[[np.ndarray], None], calls: int) -> None:
+    def run_alive(self, action: Callable[[Array], None], calls: int) -> None:
         """Apply an action to the simulations that still run, and mark those that fail.
 
         The action is a function of their indices; MuJoCo should call the callback `calls` times in
@@ -465,7 +467,7 @@ class ScenarioBatch:
         records["failure"][interrupted] = state.INTERRUPTED
         records["failed_step"][interrupted] = before // self.scenarios[0].stages
 
-    def apply_in_thread(self, action: Callable[[np.ndarray], None], alive: np.ndarray) -> None:
+    def apply_in_thread(self, action: Callable[[Array], None], alive: Array) -> None:
         """Apply an action in a thread, so that Ctrl-C is heard while a law computes for ever.
 
         That thread cannot be stopped: it computes until the process ends, in the memory of this

@@ -24,8 +24,10 @@ from numba import njit
 from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Boolean, Natural, Number, Positive, constrain
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
+from smc_mujoco.common.kinds import Numbers, Pair
 from smc_mujoco.simulation import philox
 
 FOOT = 0.3048  # m
@@ -39,7 +41,7 @@ SINUSOIDS = (
 )
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Signal:
     """Base of all signals, which checks that every parameter is a finite number, within the
     constraint of its type.
@@ -81,7 +83,7 @@ class Signal:
         return getattr(self, "x", 0.0), getattr(self, "y", 0.0), getattr(self, "z", 0.0)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class PerChannel(Signal):
     """A separate reference for each driven channel.
 
@@ -94,7 +96,7 @@ class PerChannel(Signal):
         return {}  # each signal has its own
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Constant(Signal):
     """r(t) = amplitude."""
 
@@ -105,7 +107,7 @@ class Constant(Signal):
         return p.amplitude, 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Sine(Signal):
     """r(t) = amplitude sin(omega t + phase); omega in rad/s.
 
@@ -130,7 +132,7 @@ class Sine(Signal):
         return r, p.amplitude * p.omega * math.cos(angle), -p.omega * p.omega * r
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Step(Signal):
     """0 before `time`, amplitude from then on."""
 
@@ -142,7 +144,7 @@ class Step(Signal):
         return (p.amplitude if t >= p.time * EARLY else 0.0), 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Ramp(Signal):
     """0 before `time`, slope (t - time) from then on; slope in the signal's unit per second."""
 
@@ -156,7 +158,7 @@ class Ramp(Signal):
         return p.slope * (t - p.time), p.slope, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class MinimumJerk(Signal):
     """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration clipped to 0 .. 1: from rest to
     rest.
@@ -183,7 +185,7 @@ class MinimumJerk(Signal):
         )
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Pulse(Signal):
     """amplitude for time <= t < time + width, else 0."""
 
@@ -197,7 +199,7 @@ class Pulse(Signal):
         return (p.amplitude if on else 0.0), 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Impulse(Signal):
     """impulse / width for time <= t < time + width, else 0: a blow with the time integral
     `impulse`, N s or N m s.
@@ -219,7 +221,7 @@ class Impulse(Signal):
         return (p.impulse / p.width if on else 0.0), 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Gust(Signal):
     """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a
     horizontal force, N.
@@ -244,7 +246,7 @@ class Gust(Signal):
         return p.amplitude / 2.0 * (1.0 - math.cos(2.0 * math.pi * part)), 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Push(Signal):
     """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on
     the arm.
@@ -280,7 +282,7 @@ class Push(Signal):
         return math.sin(math.pi * part), 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Wind(Signal):
     """Air that moves past a body with drag, such as the `quadrotor`; a trace's d has the force that
     it exerts.
@@ -312,7 +314,7 @@ class Wind(Signal):
         return (0.5 - 0.5 * math.cos(2.0 * math.pi * part) if part < 1.0 else 0.0), 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Dryden(Signal):
     """Turbulence of MIL-F-8785C at low altitude: wind past a body with drag, of its own spectrum
     along x, y and z.
@@ -410,7 +412,7 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
     return memory[4] + (memory[0] - knot) * (memory[3] - memory[4])
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Relay(Signal):
     """A disturbance that sees the loop: it goes to `amplitude` if s sigma + rate e' + error e > 0,
     else to -amplitude.
@@ -452,7 +454,7 @@ class Relay(Signal):
         return memory[0], 0.0, 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class OrnsteinUhlenbeck(Signal):
     """Process noise with standard deviation sigma and correlation time tau, independent in every
     channel.
@@ -504,7 +506,7 @@ def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class BandLimited(Signal):
     """Process noise of standard deviation sigma between the frequencies low and high, Hz,
     independent in every channel.
@@ -561,7 +563,7 @@ def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
     return sigma * math.sqrt(2.0 / SINUSOIDS) * total
 
 
-def bounds_of(signal: Signal) -> tuple[float, float] | None:
+def bounds_of(signal: Signal) -> Pair | None:
     """Return bounds of |d| and |d'|, the second inf if d jumps; None if they are not known."""
     match signal:
         case Constant(amplitude=a):
@@ -575,7 +577,7 @@ def bounds_of(signal: Signal) -> tuple[float, float] | None:
     return None
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Noise:
     """Measurement noise:
 
@@ -608,7 +610,7 @@ class Noise:
         return self.position_error, self.velocity_error
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Jump:
     """A change of the plant's parameters at `time`, s, for the rest of the run.
 
@@ -617,7 +619,7 @@ class Jump:
     """
 
     time: Natural
-    factors: Mapping[str, float]
+    factors: Numbers
 
     def __post_init__(self):
         constrain(self)
@@ -629,7 +631,7 @@ class Jump:
         return f"jump at {self.time:g} s"
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Fault:
     """A fault of the actuators that begins at time `at`, s, and stays.
 
@@ -698,7 +700,7 @@ def after_pauses(k, steps, length, samples, phase):
     return steps - 1 - (within - sample * steps)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Clock:
     """The timer of the controller.
 
@@ -782,7 +784,7 @@ class Clock:
             )
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Sum(Signal):
     """The sum of constants, sines, steps, ramps and moves of minimum jerk."""
 
@@ -842,7 +844,7 @@ def _part_of_sum(t, kind, a, b, c):
     return _jerk(t, _Jerk(a, b, c))
 
 
-def extremes(signal: Signal, duration: float) -> tuple[float, float]:
+def extremes(signal: Signal, duration: float) -> Pair:
     """Return the least and the largest value of a signal of time among SAMPLES of a duration, s."""
     if isinstance(signal, Sum):
         parts = signal.signals

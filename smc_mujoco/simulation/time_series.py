@@ -5,7 +5,6 @@ space.
 import dataclasses
 import itertools
 import math
-import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 
@@ -14,6 +13,7 @@ from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
+from smc_mujoco.common.kinds import AnyPath, Array, Floats
 from smc_mujoco.mechanisms.inverse_kinematics import solve
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -83,7 +83,7 @@ class TimeSeries(Signal):
         object.__setattr__(self, "data", self._data())
         self.data.flags.writeable = False
 
-    def _data(self) -> np.ndarray:
+    def _data(self) -> Array:
         """Return the array that `value` reads, (rows, N)."""
         return np.array([self.times, self.values])
 
@@ -101,7 +101,7 @@ class TimeSeries(Signal):
         return {}
 
     @classmethod
-    def from_csv(cls, path: str | os.PathLike[str], column: str | None = None) -> "TimeSeries":
+    def from_csv(cls, path: AnyPath, column: str | None = None) -> "TimeSeries":
         """Return the series in a CSV file: a row per time, at a nearly constant rate.
 
         Commas separate the cells. If semicolons do, a comma is a decimal point.
@@ -197,7 +197,7 @@ class Waypoints(TimeSeries):
 
     rows = 4  # times, values and the spline's first and second derivative there
 
-    def _data(self) -> np.ndarray:
+    def _data(self) -> Array:
         from scipy.interpolate import make_interp_spline
 
         rest = [(1, 0.0), (2, 0.0)]
@@ -236,7 +236,7 @@ class Waypoints(TimeSeries):
         return r, dr / T, ddr / (T * T)
 
 
-def _floats(what: str, items: object) -> tuple[float, ...]:
+def _floats(what: str, items: object) -> Floats:
     """Return a user's sequence of finite numbers as floats."""
     if isinstance(items, np.ndarray):
         items = items.tolist()
@@ -262,7 +262,7 @@ def _check(what: str, times: Sequence[float], where: Callable[[int], str]) -> No
         )
 
 
-def _columns(path: str | os.PathLike[str], names: list[str], column: str | None) -> tuple[int, int]:
+def _columns(path: AnyPath, names: list[str], column: str | None) -> tuple[int, int]:
     """Return the indices of the columns of times and values; `column` may leave out the unit in a
     name.
     """

@@ -8,7 +8,7 @@ import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib import format as npy
@@ -24,6 +24,7 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
+from smc_mujoco.common.kinds import AnyPath, Array, Fields, Names
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
@@ -78,31 +79,31 @@ class Trace:
     its actuators get, the first in the first channel, and so on.
     """
 
-    t: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    u: np.ndarray
-    applied: np.ndarray
-    s: np.ndarray
-    d: np.ndarray
-    r: np.ndarray
-    force: np.ndarray
-    reaction: np.ndarray
+    t: Array
+    x: Array
+    v: Array
+    u: Array
+    applied: Array
+    s: Array
+    d: Array
+    r: Array
+    force: Array
+    reaction: Array
     scenario: Scenario
     diverged_at: float | None = None
     failure: str | None = None
-    held: np.ndarray | None = None
+    held: Array | None = None
 
     def __post_init__(self):
         for array in self.arrays().values():
             np.ndarray.setflags(array, write=False)  # a TypeError for what is no array
 
     @property
-    def e(self) -> np.ndarray:
+    def e(self) -> Array:
         """Errors, (K + 1, n), see `Plant.errors`."""
         return self.scenario.plant.errors(self.x, self.r)
 
-    def arrays(self) -> dict[str, np.ndarray]:
+    def arrays(self) -> dict[str, Array]:
         """Return the arrays by name; `held` only if it is not None."""
         arrays = {name: getattr(self, name) for name in ARRAYS}
         if self.held is None:
@@ -146,7 +147,7 @@ class Trace:
                 rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
         return html.fields(rows, "Trace")
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: AnyPath) -> Path:
         """Write a .npz file that `smc.load` reads back.
 
         Make missing folders, and replace an old file atomically.
@@ -166,7 +167,7 @@ class Trace:
                 f"cannot save {path}: its scenario is a text of {len(about):,} characters and more "
                 f"than {MAX_TEXT:,} are not read back: give it shorter time series"
             )
-        arrays: dict[str, Any] = {"about": np.array(about)} | self.arrays()
+        arrays: Fields = {"about": np.array(about)} | self.arrays()
         with replacing(path) as file:
             np.savez_compressed(file, **arrays)
         return path
@@ -187,7 +188,7 @@ class Trace:
             return ""
         return self.failure
 
-    def columns(self) -> dict[str, np.ndarray]:
+    def columns(self) -> dict[str, Array]:
         """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for
         several.
 
@@ -296,7 +297,7 @@ class Trace:
             variables, coords, about | ({"failure": self.failure} if self.failure else {})
         )
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
+    def export(self, path: AnyPath) -> Path:
         """Write the trace to a .csv, .parquet or .mat (MATLAB 5) file, without losing a bit.
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the
@@ -360,7 +361,7 @@ _WRITERS = {
 EXPORT_FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
 
 
-def formats(text: str) -> tuple[str, ...]:
+def formats(text: str) -> Names:
     """Return the formats of Trace.export in a text such as "csv,mat"."""
     names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in text.split(","))
     for name in names:
@@ -368,7 +369,7 @@ def formats(text: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
+def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | None) -> Trace:
     """Return the Trace of a log, (K + 1, n) LOG, of a run that failed at a physics step, or that
     did not fail.
 
@@ -408,7 +409,7 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     )
 
 
-def load(path: str | os.PathLike[str]) -> Trace:
+def load(path: AnyPath) -> Trace:
     """Return the trace in a file that `Trace.save` wrote.
 
     Raises:
@@ -440,9 +441,7 @@ def load(path: str | os.PathLike[str]) -> Trace:
     return Trace(**arrays, scenario=scenario, **end)
 
 
-def _checked_array(
-    archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None
-) -> np.ndarray:
+def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> Array:
     """Return an array of a file; a text if `scenario` is None.
 
     Check type and shape before the array is read.

@@ -12,6 +12,8 @@ from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, POWER, Effect, Rank, min_p
 from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
+from smc_mujoco.common.data import named_data
+from smc_mujoco.common.kinds import Names, Numbers, Pair
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
@@ -49,7 +51,7 @@ UNDER = {
 }
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Entry:
     """A law's line in a board."""
 
@@ -95,20 +97,20 @@ class Lead(NamedTuple):
         return f"{ratio} of {self.rival}'s ({low} to {high}), {ahead}"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Block:
     """Laws compared on one plant in one condition. A law's name is the key of the mappings."""
 
     plant: str
     condition: str
     # medians over the seeds; for "settles" the share of runs that do not settle
-    medians: Mapping[str, float]
+    medians: Numbers
     lacking: Mapping[str, int]  # number of runs that failed or have no value
-    best: tuple[str, ...]  # laws that no other is better than, of which every run has arrived
-    worse: tuple[str, ...]  # laws that another is better than
-    below: tuple[str, ...]  # laws below the floor, which are not ranked among themselves
+    best: Names  # laws that no other is better than, of which every run has arrived
+    worse: Names  # laws that another is better than
+    below: Names  # laws below the floor, which are not ranked among themselves
     floor: str  # in words, such as "the sensor's 0.01 rad"; "" where it is not known
-    away: tuple[str, ...]  # laws with runs that failed or have not arrived, which do not win
+    away: Names  # laws with runs that failed or have not arrived, which do not win
     ahead: str | None  # the law that is better than every other, laws with default gains included
     # None for one law, for "settles", or if the law in front has runs without a value
     lead: Lead | None
@@ -117,14 +119,14 @@ class Block:
     runs: int
     level: bool  # whether the `best` laws are all level with each other
     # the least lead that would have been seen, a share; {} without a test
-    visible: Mapping[str, float]
+    visible: Numbers
     # medians at the step and at half of it, where they differ much
-    by_step: Mapping[str, tuple[float, float]]
+    by_step: Mapping[str, Pair]
     samples: int  # largest number of any two laws, see `ranking`; for one law, of its runs
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     given: bool  # whether a law has one set of gains
     # the laws with default gains, over which no other law is named the winner
-    untuned: tuple[str, ...] = ()
+    untuned: Names = ()
 
     @property
     def winner(self) -> str | None:
@@ -132,7 +134,7 @@ class Block:
         return None if self.barred else self.ahead
 
     @property
-    def barred(self) -> tuple[str, ...]:
+    def barred(self) -> Names:
         """The laws with default gains that are worse than the law ahead, which is then not named
         the winner.
         """
@@ -179,7 +181,7 @@ class Board(Tables):
     x: str = ""  # the unit of positions, "rad" or "m"; "" where it is not known
 
     @property
-    def best(self) -> tuple[str, ...]:
+    def best(self) -> Names:
         """The laws that no other is better than, in any block.
 
         With several blocks there may be none.

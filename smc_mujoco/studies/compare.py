@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +16,7 @@ from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, co
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
+from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
@@ -142,7 +142,7 @@ class Compared(Tables):
                 tables += WorstCases(cases.values()).tables
         return tables
 
-    def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
+    def to_latex(self, path: AnyPath | None = None) -> str:
         """Return a LaTeX tabular for each plant in each condition, below comments with the
         verdicts; needs booktabs.
 
@@ -170,7 +170,7 @@ class Compared(Tables):
 
         return pandas.DataFrame(list(self._rows()))
 
-    def _rows(self) -> Iterator[dict[str, Any]]:
+    def _rows(self) -> Iterator[Fields]:
         """Yield the rows of `to_pandas`."""
         for board in self.leaderboard:
             for entry in board.entries:
@@ -192,7 +192,7 @@ class Compared(Tables):
 
     def plot(
         self,
-        path: str | os.PathLike[str] | None = None,
+        path: AnyPath | None = None,
         metrics: Sequence[str] = (),
         **options: Any,
     ) -> "Figure":
@@ -218,7 +218,7 @@ def compare(
     tune: Boolean = True,
     worst: "bool | Uncertainty" = False,
     *,
-    out: Annotated[str | os.PathLike[str], FilePath()] = "compared",
+    out: Annotated[AnyPath, FilePath()] = "compared",
     metrics: Sequence[str] = METRICS,
     duration: Positive | None = None,
     starts: Starts | None = None,

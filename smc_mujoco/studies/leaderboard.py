@@ -18,6 +18,7 @@ from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, Colu
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
+from smc_mujoco.common.kinds import Array, Names
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
@@ -29,10 +30,10 @@ Sources = Mapping[str, tuple[Source, ...]]  # law -> those of its gains
 class Holdout(NamedTuple):
     """J of the laws on one plant, on instances that no search has seen: law -> (instances,)."""
 
-    values: Mapping[str, np.ndarray]  # s^2
-    arrived: Mapping[str, np.ndarray]  # whether all runs of an instance have arrived
-    halves: Mapping[str, np.ndarray]  # at half the physics step, NaN where it was not computed
-    sets: Mapping[str, np.ndarray]  # the number of the set of gains
+    values: Mapping[str, Array]  # s^2
+    arrived: Mapping[str, Array]  # whether all runs of an instance have arrived
+    halves: Mapping[str, Array]  # at half the physics step, NaN where it was not computed
+    sets: Mapping[str, Array]  # the number of the set of gains
     least: float  # s^2, J of an error that is X0 throughout
 
 
@@ -146,7 +147,7 @@ def _family(comparisons: Iterable[Comparison]) -> int:
     return sum(len(one.floors) for one in comparisons if len(one.laws) > 1) or 1
 
 
-def _untuned(sources: Sources, defaults: bool) -> tuple[str, ...]:
+def _untuned(sources: Sources, defaults: bool) -> Names:
     """Return the laws with default gains, over which no winner is named; none if `defaults`."""
     if defaults:
         return ()
@@ -161,7 +162,7 @@ def _board(
     ran: Sequence[Scenario | None],
     metric: str,
     comparison: Comparison,
-    untuned: tuple[str, ...],
+    untuned: Names,
     sources: Sources,
     family: int,
 ) -> Board:
@@ -218,7 +219,7 @@ def _block(
     seeds: int,
     comparison: Comparison,
     at: int,
-    untuned: tuple[str, ...],
+    untuned: Names,
     floor: str,
 ) -> Block:
     """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
@@ -303,7 +304,7 @@ def _visible(comparison: Comparison, at: int, order: Sequence[str]) -> dict[str,
 
 
 def _entries(
-    comparison: Comparison, sets: Mapping[str, np.ndarray], sources: Sources
+    comparison: Comparison, sets: Mapping[str, Array], sources: Sources
 ) -> tuple[Entry, ...]:
     """Return the entries of all laws."""
     entries = []

@@ -6,11 +6,11 @@ import contextlib
 import functools
 import hashlib
 import json
-from typing import Any
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
+from smc_mujoco.common.kinds import Fields
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.codes import Hashes, code_hashes
@@ -41,7 +41,7 @@ UNRELATED = (
 MAX_NAME = 60  # characters of a condition's name
 
 
-def description(scenario: Scenario) -> dict[str, Any]:
+def description(scenario: Scenario) -> Fields:
     """Return the scenario as plain data.
 
     It is the same for equal scenarios: the source of gains is left out.
@@ -51,9 +51,7 @@ def description(scenario: Scenario) -> dict[str, Any]:
     return data
 
 
-def key(
-    scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes | None = None
-) -> str:
+def key(scenario: Scenario, data: Fields | None = None, plants: Hashes | None = None) -> str:
     """Return a hash, 32 hex digits, of all that determines a run: scenario, code, versions.
 
     `plants` is a cache.
@@ -76,7 +74,7 @@ def portable_key(scenario: Scenario) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
+def row(scenario: Scenario, plants: Hashes | None = None) -> Fields:
     """Return the columns of a table that describe a run. `plants` is as in `key`."""
     data = description(scenario)
     return {
@@ -99,7 +97,7 @@ def source(scenario: Scenario) -> dict[str, str | None]:
     return {"source": about["kind"], "search": about["search"] and to_json(about["search"])}
 
 
-def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
+def condition(scenario: Scenario, data: Fields | None = None) -> str:
     """Return the name of the run's condition: the given name, or the differences from the nominal
     condition.
     """
@@ -121,7 +119,7 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     return f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
 
 
-def _condition_text(data: dict[str, Any]) -> str:
+def _condition_text(data: Fields) -> str:
     """Return the fields of a description that belong to the condition, as JSON."""
     return to_json({name: value for name, value in data.items() if name not in NOT_OF_CONDITION})
 

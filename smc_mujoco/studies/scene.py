@@ -25,6 +25,7 @@ from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import exceeds
 from smc_mujoco.common import errors
 from smc_mujoco.common.catalogue import Catalogue, added, source
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
@@ -282,7 +283,7 @@ def summary(runs: Outcome) -> str:
 # the scene
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Scene:
     """What a scene file declares.
 

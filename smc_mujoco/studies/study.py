@@ -13,7 +13,6 @@ import contextlib
 import dataclasses
 import functools
 import hashlib
-import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,8 +24,10 @@ import numpy as np
 from smc_mujoco.analysis.step_halving import halved, repeats_all
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.constraints import FilePath, constrained
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, printable, shown
 from smc_mujoco.common.files import reading, to_json
+from smc_mujoco.common.kinds import AnyPath, Data, Fields, Names
 from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import COMPARED
 from smc_mujoco.control.law import checked_name
@@ -81,7 +82,7 @@ class Store:
                 for i, name in enumerate(part["hash"].to_pylist()):
                     self.where.setdefault(name, (path, i))
 
-    def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
+    def add(self, rows: Sequence[Data]) -> None:
         """Write finished runs as a part."""
         import pyarrow as pa
 
@@ -93,7 +94,7 @@ class Store:
         tables.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
-    def rows(self, names: Iterable[str]) -> Iterator[dict[str, Any]]:
+    def rows(self, names: Iterable[str]) -> Iterator[Fields]:
         """Yield the rows of finished runs, part by part."""
         places: dict[Path, list[int]] = {}
         for name in names:
@@ -103,7 +104,7 @@ class Store:
             if (part := self._read(path)) is not None:
                 yield from part.take(indices).to_pylist()
 
-    def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
+    def collect(self, hashes: Sequence[str], changes: Mapping[str, Data]) -> None:
         """Write the table of these finished runs, in this order.
 
         `changes` is hash -> columns that replace those of the part: scores at half the step, what a
@@ -152,13 +153,13 @@ class Store:
         return part if complete else None
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Extent:
     """The grid of a study; its fields are arguments of `grid`."""
 
-    plants: tuple[str, ...] = PLANTS
-    laws: tuple[str, ...] = COMPARED
-    conditions: tuple[str, ...]
+    plants: Names = PLANTS
+    laws: Names = COMPARED
+    conditions: Names
     seeds: int
     duration: float = DURATION
 
@@ -176,7 +177,7 @@ QUICK = Extent(
 @constrained
 def study(
     scenarios: Iterable[Scenario],
-    out: Annotated[str | os.PathLike[str], FilePath()],
+    out: Annotated[AnyPath, FilePath()],
     resume: bool = True,
     threads: int | None = None,
     progress: bool = False,

@@ -25,7 +25,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.html import table as html_table
+from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.common.text import counted, number
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
@@ -157,7 +158,7 @@ class Table:
     known: Mapping[str, Scenario] = dataclasses.field(default_factory=dict, repr=False)
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> "Table":
+    def read(cls, path: AnyPath) -> "Table":
         """Return the table in a parquet file that a study wrote, or in the study's folder.
 
         Raises:
@@ -177,7 +178,7 @@ class Table:
     def __len__(self) -> int:
         return self.data.num_rows
 
-    def __iter__(self) -> Iterator[dict[str, Any]]:
+    def __iter__(self) -> Iterator[Fields]:
         """Yield each row as column -> value, as pandas.DataFrame(table) reads it."""
         return iter(self.rows())
 
@@ -222,7 +223,7 @@ class Table:
         with package("pandas", "Table.to_pandas"):
             return self.data.to_pandas()
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Fields]:
         """Return every row as column -> value."""
         return self.data.to_pylist()
 

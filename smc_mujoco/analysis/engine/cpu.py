@@ -14,6 +14,7 @@ from smc_mujoco.analysis.engine.loop import simulation
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import Key, compile_for, jit, pointer
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.simulation.state import address
 
 PIECE_STEPS = 5_000_000  # in a call of compiled code, about half a second, which Ctrl-C waits for
@@ -50,9 +51,7 @@ def compiled(form: Form) -> Any:
     return made
 
 
-def run(
-    form: Form, rows: np.ndarray, tables: np.ndarray, threads: int, logs: np.ndarray | None = None
-) -> np.ndarray:
+def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None = None) -> Array:
     """Return the scores of runs, (runs, SCORES + metrics), given their rows; NaN after a failure.
 
     `logs` is (runs, K + 1, n, 6) and gets `form.LOGGED`, if the rows say `logging`.
@@ -82,7 +81,7 @@ def run(
     return scores
 
 
-def _pieces(form: Form, rows: np.ndarray, threads: int) -> Iterator[slice]:
+def _pieces(form: Form, rows: Array, threads: int) -> Iterator[slice]:
     """Yield the runs of a call: a share for each thread, of at most PIECE_STEPS."""
     if not len(rows):
         return

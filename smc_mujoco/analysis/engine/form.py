@@ -4,6 +4,7 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
+from smc_mujoco.common.kinds import Fields, Names
 from smc_mujoco.control.joint_law import stored_dtype
 from smc_mujoco.control.measurement import Measurement
 from smc_mujoco.mechanisms.hardware.drives import DriveStep, Series
@@ -23,7 +24,7 @@ class Part(NamedTuple):
     """A function of the user's, with the names of its parameters and its memory in a channel."""
 
     function: Any  # None: one in C, whose address is in the row
-    names: tuple[str, ...]
+    names: Names
     memory: int = 0
 
 
@@ -50,7 +51,7 @@ class Form(NamedTuple):
     delay: bool
     clock: bool
     slots: int  # commands that are under way
-    metrics: tuple[str, ...]
+    metrics: Names
 
 
 class Places:
@@ -142,16 +143,16 @@ def measured_places(form: Form) -> int:
     return len(Measurement._fields)
 
 
-def signals(form: Form) -> dict[str, Any]:
+def signals(form: Form) -> Fields:
     """Return the kinds of a form's signals, by the names of their places."""
-    found: dict[str, Any] = {"feedforward": form.feedforward}
+    found: Fields = {"feedforward": form.feedforward}
     for name in ("references", "disturbances", "errors"):
         for i, kind in enumerate(getattr(form, name)):
             found[f"{name} {i}"] = kind
     return {name: kind for name, kind in found.items() if kind is not None}
 
 
-def parameters(kind: Any) -> tuple[str, ...]:
+def parameters(kind: Any) -> Names:
     """Return the names of a signal's parameters."""
     if kind.series:  # its points say it all
         return ()

@@ -23,6 +23,7 @@ from numba.extending import intrinsic
 
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.loop import simulation
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.common.numba_internals import cgutils
 
 THREADS = 128  # in a block
@@ -78,7 +79,7 @@ def compiled(form: Form) -> Any:
     return cuda.jit(ARGUMENTS)(kernel(form))
 
 
-def run(form: Form, rows: np.ndarray, tables: np.ndarray) -> np.ndarray:
+def run(form: Form, rows: Array, tables: Array) -> Array:
     """Return the scores of runs, as `cpu.run` does."""
     made = compiled(form)
     scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)

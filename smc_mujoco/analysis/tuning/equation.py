@@ -11,6 +11,7 @@ import numpy as np
 
 from smc_mujoco.analysis.engine.group import Group, key
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common.kinds import Floats, Pair
 from smc_mujoco.simulation import state
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -38,9 +39,7 @@ class Equations:
             made = Group([cases[i] for i in indices], ("itae", "tv"))
             self.groups.append((indices, made, [made.gain_columns(name) for name in names]))
 
-    def __call__(
-        self, candidates: Sequence[tuple[float, ...]], terms: Any
-    ) -> list[tuple[float, float]]:
+    def __call__(self, candidates: Sequence[Floats], terms: Any) -> list[Pair]:
         count = len(self.cases)
         costs = [(0.0, 0.0)] * (count * len(candidates))
         for indices, made, columns in self.groups:
@@ -57,7 +56,7 @@ class Equations:
 
     def _costs(
         self, case: Scenario, failure: float, failed_step: float, itae: float, tv: float
-    ) -> tuple[float, float]:
+    ) -> Pair:
         if failure != state.FINE:
             return self.goal.terms_of_failure(failed_step * case.resolved.physics_step)
         start = sum(map(abs, case.resolved.x0))

@@ -24,14 +24,16 @@ gains beyond it cost more than that.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved as halved_step
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.kinds import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import pose_errors
@@ -66,7 +68,7 @@ class Evaluation(NamedTuple):
     J = tracking + weight variation + `Objective.excess`.
     """
 
-    gains: tuple[float, ...]
+    gains: Floats
     objective: float
     tracking: float
     variation: float
@@ -77,7 +79,7 @@ class Evaluation(NamedTuple):
         return self.tracking >= FAILURE_COST
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 
@@ -121,7 +123,7 @@ class Objective:
             f"{bound}"
         )
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> Fields:
         """Return it as JSON data, from which `restore` makes an equal one."""
         values = {}
         for f in dataclasses.fields(self):
@@ -168,15 +170,13 @@ class Objective:
             cases.append(case)
         return cases
 
-    def evaluation(
-        self, case: Scenario, traces: list[Trace], gains: tuple[float, ...] = ()
-    ) -> Evaluation:
+    def evaluation(self, case: Scenario, traces: list[Trace], gains: Floats = ()) -> Evaluation:
         """Return the evaluation of a candidate, given its first case and the traces of all."""
         tracking, variation = map(sum, zip(*map(self.terms_of_run, traces), strict=True))
         cost = tracking + self.weight * variation + self.excess(case)
         return Evaluation(gains, float(cost), float(tracking), float(variation))
 
-    def terms_of_run(self, trace: Trace) -> tuple[float, float]:
+    def terms_of_run(self, trace: Trace) -> Pair:
         """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its
         cost, and 0.
         """
@@ -188,9 +188,7 @@ class Objective:
             trace.scenario, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace)
         )
 
-    def terms_of_sums(
-        self, case: Scenario, itae: float, start: float, tv: float
-    ) -> tuple[float, float]:
+    def terms_of_sums(self, case: Scenario, itae: float, start: float, tv: float) -> Pair:
         """Return the terms of a run with this ITAE, sum |x0| and TV; x0 of a user's model counts
         from its goal.
         """
@@ -203,9 +201,7 @@ class Objective:
             bound = self.u_max
         return min(itae / start, FAILURE_COST), tv / (bound * self.duration)
 
-    def terms_of_pose(
-        self, case: Scenario, x: np.ndarray, r: np.ndarray, u: np.ndarray
-    ) -> tuple[float, float]:
+    def terms_of_pose(self, case: Scenario, x: Array, r: Array, u: Array) -> Pair:
         """Return the terms of a run of a free body, from its log, (K + 1, 6) each; NaN where the
         log has one.
         """
@@ -217,7 +213,7 @@ class Objective:
         variation = np.abs(np.diff(u, axis=0)).sum(axis=0) / (np.array(case.limits) * self.duration)
         return min(tracking, FAILURE_COST), float(variation.max())
 
-    def terms_of_failure(self, time: float) -> tuple[float, float]:
+    def terms_of_failure(self, time: float) -> Pair:
         """Return the terms of a run that fails at a time, s."""
         return FAILURE_COST * (2.0 - min(time / self.duration, 1.0)), 0.0
 
@@ -244,7 +240,7 @@ class Objective:
         return 2.0 * FAILURE_COST * len(self.conditions) * amplitude / self.chattering
 
 
-def restore(data: Mapping[str, Any]) -> Objective:
+def restore(data: Data) -> Objective:
     """Return the objective that `Objective.describe` wrote."""
     starts = dict(data.get("starts", {}))
     if starts.get("x0") is not None:
@@ -264,7 +260,7 @@ def objectives(
     instances: Sequence[int] | None = None,
     threads: int | None = None,
     halved: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> ArrayPair:
     """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo, and
     whether all runs of an instance have arrived, (laws,).
 

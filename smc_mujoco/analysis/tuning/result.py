@@ -2,15 +2,16 @@
 
 import dataclasses
 import math
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
+from smc_mujoco.common.kinds import AnyPath, Data, Fields
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import counted
 from smc_mujoco.control import source
@@ -24,7 +25,7 @@ HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class SearchResult:
     """What one search found. Searches share nothing: each has its own starts, noise and runs."""
 
@@ -50,7 +51,7 @@ def load_found(path: Path) -> SearchResult:
     return _found(read_json(path))
 
 
-def _found(data: Mapping[str, Any]) -> SearchResult:
+def _found(data: Data) -> SearchResult:
     history = tuple(map(_evaluation, data["history"]))
     return SearchResult(**dict(data) | {"best": _evaluation(data["best"]), "history": history})
 
@@ -190,7 +191,7 @@ class Tuned(Tables):
                 front.append(one)
         return front
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> Fields:
         """Return what `control.gain_sets` stores of it, without the history."""
         return {
             "gains": list(self.bounds),
@@ -202,7 +203,7 @@ class Tuned(Tables):
             "versions": self.versions,
         }
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: AnyPath) -> Path:
         """Write a .json file that `load` reads back."""
         path = with_ending(path, ".json")
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
@@ -216,12 +217,12 @@ class Tuned(Tables):
         return write_json(path, data)
 
 
-def load(path: str | os.PathLike[str], plant: Plant | None = None) -> Tuned:
+def load(path: AnyPath, plant: Plant | None = None) -> Tuned:
     """Read the tuning that `Tuned.save` wrote, of this plant if it is given."""
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
         data = read_json(file)
         scenario = serialise.restore(data["scenario"], plant)
-        fields: dict[str, Any] = {name: data[name] for name in SAVED_FIELDS}
+        fields: Fields = {name: data[name] for name in SAVED_FIELDS}
         fields |= {
             name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")
         }

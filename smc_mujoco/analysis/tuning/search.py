@@ -30,7 +30,6 @@ minimised.
 
 import contextlib
 import dataclasses
-import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -65,6 +64,7 @@ from smc_mujoco.common.errors import (
     find,
     users_stacklevel,
 )
+from smc_mujoco.common.kinds import AnyPath, Array, Floats, Names
 from smc_mujoco.common.progress import bar, told
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
@@ -118,7 +118,7 @@ def tune(
     starts: Starts | None = None,
     chattering: float | None = None,
     searches: Searches = SEARCHES,
-    folder: Annotated[str | os.PathLike[str], FilePath()] | None = None,
+    folder: Annotated[AnyPath, FilePath()] | None = None,
     outside_theorem: bool = False,
     device: Device = "cpu",
 ) -> Tuned:
@@ -223,7 +223,7 @@ class Trials:
 
     cheap: Evaluator
     accurate: Evaluator
-    names: tuple[str, ...]
+    names: Names
     # gains -> the largest values of some of them
     limit: Callable[[dict[str, float]], dict[str, float]]
     report: Callable[[int], None]  # called with the number of new evaluations
@@ -246,26 +246,26 @@ class Trials:
         """The accurate evaluation with the least J."""
         return min(self.decided.values(), key=lambda one: one.objective)
 
-    def screen(self, logs: np.ndarray) -> np.ndarray:
+    def screen(self, logs: Array) -> Array:
         """Return J of candidates (candidates, gains), given as log10 gains, from cheap runs."""
         return self._costs([self.gains(row) for row in logs.tolist()], self.cheap, self.screened)
 
-    def cost(self, logs: np.ndarray) -> float:
+    def cost(self, logs: Array) -> float:
         """Return the accurate J of a candidate, given as log10 gains (gains,)."""
         return self._costs([self.gains(logs.tolist())], self.accurate, self.decided)[0]
 
-    def within(self, logs: np.ndarray) -> bool:
+    def within(self, logs: Array) -> bool:
         """Return whether log10 gains hold the conditions of the law's theorem."""
         return self.holds(self.gains(logs.tolist()))
 
-    def drawn(self, draw: Callable[[], np.ndarray], inside: np.ndarray) -> np.ndarray:
+    def drawn(self, draw: Callable[[], Array], inside: Array) -> Array:
         """Return the first of DRAWS draws within the theorem, else `inside`."""
         for _ in range(DRAWS):
             if self.within(logs := draw()):
                 return logs
         return inside
 
-    def drawn_back(self, logs: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    def drawn_back(self, logs: Array, inside: Array) -> Array:
         """Return the log10 gains on the way from those `inside` to others, where the theorem
         ends.
         """
@@ -287,7 +287,7 @@ class Trials:
 
     def _costs(
         self, candidates: list[Gains], evaluate: Evaluator, known: dict[Gains, Evaluation]
-    ) -> np.ndarray:
+    ) -> Array:
         new = list(dict.fromkeys(gains for gains in candidates if gains not in known))
         known.update(zip(new, evaluate(new), strict=True))
         self.report(len(new))
@@ -299,8 +299,8 @@ def _rounded(gain: float) -> float:
 
 
 def _screened(
-    trials: Trials, box: Box, random: np.random.Generator, size: int, inside: np.ndarray
-) -> tuple[np.ndarray, float]:
+    trials: Trials, box: Box, random: np.random.Generator, size: int, inside: Array
+) -> tuple[Array, float]:
     """Return the log10 gains of the best of a Latin hypercube in the box, and their J; those
     `inside` if size is 0.
     """
@@ -318,8 +318,8 @@ def _screened(
 
 
 def _evolved(
-    trials: Trials, box: Box, random: np.random.Generator, logs: np.ndarray, cost: float, size: int
-) -> np.ndarray:
+    trials: Trials, box: Box, random: np.random.Generator, logs: Array, cost: float, size: int
+) -> Array:
     """Return the best log10 gains of an evolution from those given, whose J is `cost`, within a
     box.
     """
@@ -346,7 +346,7 @@ class _Enough(Exception):
     """A descent has ended."""
 
 
-def _descend(trials: Trials, box: Box, logs: np.ndarray, size: int) -> None:
+def _descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
     """Descend from log10 gains within a box with at most `size` accurate evaluations, until they
     gain too little.
     """
@@ -356,7 +356,7 @@ def _descend(trials: Trials, box: Box, logs: np.ndarray, size: int) -> None:
     costs = [trials.cost(logs)]
     window = 2 * len(logs) + 2
 
-    def cost(z: np.ndarray) -> float:
+    def cost(z: Array) -> float:
         costs.append(trials.cost(trials.drawn_back(np.clip(z, low, high), logs)))
         if len(costs) > 2 * window and min(costs[:-window]) <= min(costs) * (1.0 + PATIENCE):
             raise _Enough
@@ -384,7 +384,7 @@ class Task(NamedTuple):
     budget: int
     seed: int
     threads: int | None
-    inside: np.ndarray  # log10 gains in the box that hold the conditions
+    inside: Array  # log10 gains in the box that hold the conditions
     outside_theorem: bool
     device: str = "cpu"
 
@@ -418,7 +418,7 @@ class Task(NamedTuple):
         i: int,
         failure: str,
         report: Report,
-        folder: str | os.PathLike[str] | None,
+        folder: AnyPath | None,
         codes: Any,
     ) -> SearchResult:
         """Return what search i finds, or has found in an earlier call with this folder."""
@@ -473,7 +473,7 @@ class Task(NamedTuple):
         _descend(trials, self.searched, logs, self.size - trials.count)
         return trials
 
-    def _on_record(self, gains: tuple[float, ...], cases: Sequence[Scenario]) -> Evaluation:
+    def _on_record(self, gains: Floats, cases: Sequence[Scenario]) -> Evaluation:
         """Return the evaluation of a set of gains by MuJoCo."""
         law = with_gains(self.law, tuple(self.box), gains)
         cases = [dataclasses.replace(case, law=law) for case in cases]

@@ -44,6 +44,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import Numbers, Pair
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import Gain, Unit
@@ -86,7 +87,7 @@ def without_unit(law: Component) -> dict[str, float]:
     }
 
 
-def _scales_of(gain: Gain, scales: Mapping[str, float]) -> Mapping[str, float]:
+def _scales_of(gain: Gain, scales: Numbers) -> Numbers:
     """Return F, X and T of the channels that a gain is of; of a plant without a pose there is one
     set.
     """
@@ -152,7 +153,7 @@ def left_out(law: Component, name: str) -> bool:
     return law.source.kind != source.DEFAULT and law.gains[name] == 0.0
 
 
-def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+def box(law: Component, plant_scales: Numbers) -> dict[str, Pair]:
     """Return gain -> lowest and highest start of the search, for all gains of a law that are
     searched.
     """
@@ -177,7 +178,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
     return bounds
 
 
-def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
+def at_bound(gains: Numbers, bounds: Box) -> dict[str, str]:
     """Return gain -> "lower" or "upper" for gains within 2 % of a bound in log space."""
     places = {
         name: math.log(gains[name] / low) / math.log(high / low)
@@ -190,7 +191,7 @@ def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
     return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
 
 
-def force_limits(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
+def force_limits(law: Component, gains: Numbers, u_max: float) -> dict[str, float]:
     """Return the largest value of each gain k that the law divides by another one, b: that of a
     force, times b.
     """
@@ -204,7 +205,7 @@ def force_limits(law: Component, gains: Mapping[str, float], u_max: float) -> di
     }
 
 
-def widened(bounds: Box) -> dict[str, tuple[float, float]]:
+def widened(bounds: Box) -> dict[str, Pair]:
     """Return bounds a decade wider on either side."""
     factor = 10**WIDENING
     return {name: (low / factor, high * factor) for name, (low, high) in bounds.items()}

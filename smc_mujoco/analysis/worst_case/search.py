@@ -32,7 +32,7 @@ import numpy as np
 
 from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.kinds import Array, Pair
 from smc_mujoco.metrics.catalogue import CATALOGUE, arrived
 from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.simulation.run import stream
@@ -73,7 +73,7 @@ class Tried(NamedTuple):
     """A member that was run."""
 
     member: Member
-    key: tuple[float, float]  # its metric, then its rms error, which decides between equal metrics
+    key: Pair  # its metric, then its rms error, which decides between equal metrics
     origin: int  # as in `Case`; a new member is its own origin
     by_mujoco: bool = True
 
@@ -167,9 +167,7 @@ class Search:
             return done + self.run(replays)
         return done
 
-    def _scored(
-        self, cases: Sequence[Case], scenarios: Sequence[Scenario]
-    ) -> dict[int, tuple[float, float]]:
+    def _scored(self, cases: Sequence[Case], scenarios: Sequence[Scenario]) -> dict[int, Pair]:
         """Return index -> key of the cases that the fast engine runs: whose trace nobody needs."""
         found = {}
         for i, case in enumerate(cases):
@@ -182,7 +180,7 @@ class Search:
                 found[i] = self._value(values[0]), values[-1]
         return found
 
-    def _key(self, trace: Trace) -> tuple[float, float]:
+    def _key(self, trace: Trace) -> Pair:
         if trace.failure is not None:
             self.broken = self.broken or trace.broken
             return FAILED_KEY

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows
@@ -65,7 +66,7 @@ class Overlay:
     right, bottom px.
     """
 
-    def __init__(self, stage: Stage, room: np.ndarray, newton: float):
+    def __init__(self, stage: Stage, room: Array, newton: float):
         self.stage = stage
         self.trace = trace = stage.track.trace
         self.edges = edges = stage.track.edges
@@ -99,7 +100,7 @@ class Overlay:
         """
         return self.errors is None or bool(self.errors[frame] > MAX_TIP_ERROR)
 
-    def over(self, picture: np.ndarray, frame: int) -> np.ndarray:
+    def over(self, picture: Array, frame: int) -> Array:
         """Return the picture of a frame with all this, as the machine stands on the stage."""
         time = float(self.edges[frame + 1])
         image = Image.fromarray(picture)
@@ -123,7 +124,7 @@ class Overlay:
     def trail(
         self,
         image: Image.Image,
-        points: np.ndarray,
+        points: Array,
         colour: str,
         width: float,
         opacity: float = 1.0,
@@ -140,9 +141,7 @@ class Overlay:
         ImageDraw.Draw(mask).line(places, round(255 * opacity), thick, joint="curve")
         image.paste(style.rgb(colour), (0, 0), mask.reduce(fine))
 
-    def arrow(
-        self, image: Image.Image, tail: np.ndarray, tip: np.ndarray, force: float, after: bool
-    ) -> None:
+    def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, after: bool) -> None:
         """Draw an arrow with smooth edges between two points, (3,) m, and its force, N, beyond it
         or before it, within the picture.
         """
@@ -161,7 +160,7 @@ class Overlay:
         rim = {"stroke_width": round(2 * s), "stroke_fill": style.PAPER}
         ImageDraw.Draw(image).text((x, y), words, style.REACTION, letters, anchor="lm", **rim)
 
-    def beside(self, picture: np.ndarray, frame: int) -> np.ndarray:
+    def beside(self, picture: Array, frame: int) -> Array:
         """Return the whole picture with the arm's bars, and how far its tip is off its path, below
         its label.
         """
@@ -213,7 +212,7 @@ def room(traces: Sequence[Trace]) -> tuple[float, float]:
     return bars + number, BARS_HEIGHT
 
 
-def overlays(stages: Sequence[Stage], rooms: np.ndarray) -> list[Overlay]:
+def overlays(stages: Sequence[Stage], rooms: Array) -> list[Overlay]:
     """Return what is drawn over each stage; arrows of forces have one scale."""
     largest = 0.0
     for stage in stages:

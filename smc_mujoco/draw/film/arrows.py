@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
@@ -70,7 +71,7 @@ class Arrow(NamedTuple):
     layer: int = 0  # distance from the body, in arrows
     size: float = 1.0  # of its shaft
     head: bool = True
-    way: np.ndarray | None = None  # of a force on a free body, (3,), in the axes of the world
+    way: Array | None = None  # of a force on a free body, (3,), in the axes of the world
 
 
 class Mount(NamedTuple):
@@ -79,7 +80,7 @@ class Mount(NamedTuple):
     joint: int
     unit: float  # longest arrow at a slide, m; at a hinge, a factor on HINGE_LENGTH
     thick: float  # at a slide, m
-    front: np.ndarray | None  # to the camera, (3,), for a slide that carries something
+    front: Array | None  # to the camera, (3,), for a slide that carries something
     beyond: bool = False  # on the other side of a hinge than the body, in a network
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
 
@@ -89,7 +90,7 @@ def mounts(
     joints: Sequence[int],
     slides: Sequence[bool],
     rail: float,
-    front: np.ndarray,
+    front: Array,
 ) -> list[Mount]:
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points
     to the camera.
@@ -119,7 +120,7 @@ def mounts(
     return found
 
 
-def loads(trace: Trace, edges: np.ndarray) -> dict[str, Envelope]:
+def loads(trace: Trace, edges: Array) -> dict[str, Envelope]:
     """Return ranges and means of forces and torques on a machine between consecutive edges, s, by
     their names.
     """
@@ -245,7 +246,7 @@ def arrows(
 
 def path(
     model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow
-) -> tuple[np.ndarray, float] | None:
+) -> tuple[Array, float] | None:
     """Return the line of an arrow, (m, 3) m, and the width of its shaft, m; None where it has no
     place.
     """
@@ -300,7 +301,7 @@ def path(
     return place + start * out + reach * along * way, arrow.size * width
 
 
-def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
+def outline(line: Array, width: float, head: bool = True) -> Array:
     """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width`
     px wide.
     """
@@ -316,7 +317,7 @@ def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
     return np.concatenate([shaft + across, tip, (shaft - across)[::-1]])
 
 
-def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int = 0) -> None:
+def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:
     """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
     corner = np.floor(edge.min(axis=0)).astype(int) - rim
     far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
+from smc_mujoco.common.kinds import Array
 
 FOVY = 9.0  # degrees, chosen: a long lens
 TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen
@@ -31,8 +32,8 @@ class View(NamedTuple):
     """A camera's picture, px, its turn and its place, (3,) m, before a machine."""
 
     size: tuple[int, int]
-    turn: np.ndarray
-    place: np.ndarray
+    turn: Array
+    place: Array
 
 
 def checked(chosen: Camera | None) -> Camera | None:
@@ -52,7 +53,7 @@ def checked(chosen: Camera | None) -> Camera | None:
     )
 
 
-def turn(azimuth: float, elevation: float) -> np.ndarray:
+def turn(azimuth: float, elevation: float) -> Array:
     """Return the turn of a camera that looks as MuJoCo's free camera does.
 
     The azimuth, degrees, is 0 along x and 90 along y; at an elevation, degrees, below 0 it looks
@@ -64,7 +65,7 @@ def turn(azimuth: float, elevation: float) -> np.ndarray:
     return np.column_stack([right, np.cross(right, ahead), -ahead])
 
 
-def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room) -> np.ndarray:
+def fit(points: Array, turn: Array, size: tuple[int, int], room: Room) -> Array:
     """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a
     picture of `size` px.
 
@@ -93,9 +94,7 @@ def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room)
     return turn @ np.array([*centre, distance])
 
 
-def project(
-    points: np.ndarray, turn: np.ndarray, place: np.ndarray, size: tuple[int, int]
-) -> np.ndarray:
+def project(points: Array, turn: Array, place: Array, size: tuple[int, int]) -> Array:
     """Return where points (m, 3) are in the picture of a camera at `place`: (m, 2) px from the top
     left.
     """
@@ -113,9 +112,9 @@ def tiles(
     size: tuple[int, int],
     top: float,
     strip: Callable[[float], float],
-    points: np.ndarray,
-    turn: np.ndarray,
-) -> tuple[np.ndarray, View]:
+    points: Array,
+    turn: Array,
+) -> tuple[Array, View]:
     """Return the tiles of so many machines below `top` px of a picture, (count, 4) px, and the view
     of points (m, 3) m in each.
 

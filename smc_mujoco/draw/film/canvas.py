@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw.film import camera, scene
 
 THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape would be undefined
@@ -48,7 +49,7 @@ class Canvas:
         """Close the renderer."""
         self.renderer.close()
 
-    def draw(self, add: Add = lambda scene: None) -> np.ndarray:
+    def draw(self, add: Add = lambda scene: None) -> Array:
         """Return the picture of `data` as it is, (height, width, 3) uint8.
 
         `add` adds shapes to the scene, such as ghosts.
@@ -60,7 +61,7 @@ class Canvas:
         return self.renderer.render()
 
 
-def casting(model: mujoco.MjModel, pixel: float, arms: bool) -> np.ndarray:
+def casting(model: mujoco.MjModel, pixel: float, arms: bool) -> Array:
     """Return which geoms cast shadows if opaque, (geoms,): not thin or flat ones.
 
     `pixel` is the size of one, m.
@@ -72,7 +73,7 @@ def casting(model: mujoco.MjModel, pixel: float, arms: bool) -> np.ndarray:
     return (half[:, 1] > thinnest) & (half[:, 0] > flattest) & (model.geom_type != scene.PLANE)
 
 
-def add_shadows(shown: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> None:
+def add_shadows(shown: mujoco.MjvScene, way: Array, casts: Array, extent: float) -> None:
     """Add the shadows of a scene's opaque geoms, (geoms,) as `casting` returns, and tendons.
 
     `way` is the direction of the light, (3,).

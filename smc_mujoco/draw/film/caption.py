@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
+from smc_mujoco.common.kinds import Array, Pair
 from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.arrows import Scale
@@ -56,7 +57,7 @@ class Caption:
         scale: float,
         scales: Mapping[Group, Scale],
         states: Sequence[Sequence[State | None]] = (),
-        below: tuple[float, float] | None = None,
+        below: Pair | None = None,
         parts: Sequence[str] | None = None,
         factor: float = 1.0,
     ):
@@ -88,9 +89,7 @@ class Caption:
         foot = 4 if lines else 0
         self.top = (KEY_TOP + KEY_PITCH * lines + foot) * s
 
-    def badges_sizes(
-        self, states: Sequence[Sequence[State | None]], below: tuple[float, float] | None
-    ) -> np.ndarray:
+    def badges_sizes(self, states: Sequence[Sequence[State | None]], below: Pair | None) -> Array:
         """Return width and height of what is shown below each label, (machines, 2) px.
 
         It is a machine's state, or what others draw.
@@ -118,7 +117,7 @@ class Caption:
             return f"{self.names[k]}: {style.ending(trace)}"
         return self.names[k]
 
-    def widths(self, least: bool = False) -> np.ndarray:
+    def widths(self, least: bool = False) -> Array:
         """Return the widths of the labels, (machines,) px: on one line, or the least."""
         found = []
         for k in range(len(self.names)):
@@ -144,7 +143,7 @@ class Caption:
             return max(PILL * self.scale, tall) + GAP * self.scale
         return PILL * self.scale + tall + 1.5 * GAP * self.scale
 
-    def place(self, tiles: np.ndarray) -> None:
+    def place(self, tiles: Array) -> None:
         """Place labels and badges at the feet of tiles, (machines, 4) px: beside each other where
         the strip is low, else the badge below.
         """
@@ -168,13 +167,13 @@ class Caption:
 
     def over(
         self,
-        picture: np.ndarray,
+        picture: Array,
         time: float,
         failed: Sequence[bool],
         states: Sequence[State | None] = (),
         speed: float = 1.0,
         factor: float = 1.0,
-    ) -> np.ndarray:
+    ) -> Array:
         """Return the picture with the text on it: machines that have failed, their states, the
         playback speed, and by how much deflections are enlarged.
         """
@@ -234,7 +233,7 @@ class Caption:
     def box(
         self,
         draw: ImageDraw.ImageDraw,
-        box: Sequence[float] | np.ndarray,
+        box: Sequence[float] | Array,
         words: str,
         fill: str,
         rim: str | None,
@@ -269,7 +268,7 @@ class Caption:
         draw.text(place, text, style.INK, **look)
 
 
-def dashes(look: Any, width: float) -> Iterator[tuple[float, float]]:
+def dashes(look: Any, width: float) -> Iterator[Pair]:
     """Yield where the dashes of a sample of a line begin and end."""
     if look == "-":
         yield 0.0, SAMPLE
@@ -281,7 +280,7 @@ def dashes(look: Any, width: float) -> Iterator[tuple[float, float]]:
             at += (dash + gap) * width
 
 
-def around(x: np.ndarray, y: np.ndarray, wide: np.ndarray, high: np.ndarray | float) -> np.ndarray:
+def around(x: Array, y: Array, wide: Array, high: Array | float) -> Array:
     """Return boxes of these sizes about places, (n, 4) px: left, top, right, bottom."""
     return np.stack([x - wide / 2, y - high / 2, x + wide / 2, y + high / 2], axis=1)
 

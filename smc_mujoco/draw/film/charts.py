@@ -20,6 +20,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.film import arrows
@@ -153,7 +154,7 @@ class Charts:
         if self.window < self.end:
             ax.axvspan(self.window, self.end, color=style.BAND, lw=0, zorder=0.5)
 
-    def at(self, time: float) -> np.ndarray:
+    def at(self, time: float) -> Array:
         """Return the charts at a time in s, (height, width, 3) uint8."""
         time -= self.start
         charts = self.faint.copy()
@@ -272,13 +273,13 @@ def set_titles(ax: Axes, panel: Panel, point: float) -> None:
     panels.note(ax, fitting[0] if fitting else "")
 
 
-def picture(canvas: FigureCanvasAgg) -> np.ndarray:
+def picture(canvas: FigureCanvasAgg) -> Array:
     """Return what the canvas shows, (height, width, 3) uint8."""
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def path(ax: Axes, trace: Trace, name: str, height: int) -> tuple[np.ndarray, np.ndarray]:
+def path(ax: Axes, trace: Trace, name: str, height: int) -> tuple[Array, Array]:
     """Return the path of a trace's dot: times in s and px from the top, kept within the axes."""
     t, y = panels.curve(trace, panels.QUANTITIES[name](trace).mean(axis=1), name)
     y = np.clip(y, *ax.get_ylim())

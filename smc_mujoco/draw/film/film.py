@@ -11,7 +11,6 @@ Frames are made and written one by one, so that memory does not grow with a film
 import contextlib
 import dataclasses
 import itertools
-import os
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -22,6 +21,7 @@ from PIL import Image
 from smc_mujoco.common import errors, extras, gl
 from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import replacing, with_ending
+from smc_mujoco.common.kinds import AnyPath, Array, Pair
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end, finite
@@ -76,7 +76,7 @@ class Frames:
     speed: float | None = None
     camera: Camera | None = None
     at: float | None = None
-    span: tuple[float, float] | None = None
+    span: Pair | None = None
 
     def __post_init__(self) -> None:
         self.camera = checked(self.camera)
@@ -102,7 +102,7 @@ class Frames:
         close = self.clock.close
         return len(self.clock.times) + (len(close.times) if close else 0)
 
-    def __iter__(self) -> Generator[np.ndarray]:
+    def __iter__(self) -> Generator[Array]:
         return pictures(self)
 
     def __repr__(self) -> str:
@@ -121,7 +121,7 @@ class Frames:
 @overload
 def film(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike[str],
+    path: AnyPath,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: tuple[int, int] | None = None,
@@ -130,7 +130,7 @@ def film(
     camera: Camera | None = None,
     *,
     at: float | None = None,
-    span: tuple[float, float] | None = None,
+    span: Pair | None = None,
 ) -> Path: ...
 
 
@@ -146,13 +146,13 @@ def film(
     camera: Camera | None = None,
     *,
     at: float | None = None,
-    span: tuple[float, float] | None = None,
+    span: Pair | None = None,
 ) -> Frames: ...
 
 
 def film(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike[str] | None = None,
+    path: AnyPath | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: tuple[int, int] | None = None,
@@ -161,7 +161,7 @@ def film(
     camera: Camera | None = None,
     *,
     at: float | None = None,
-    span: tuple[float, float] | None = None,
+    span: Pair | None = None,
 ) -> Path | Frames:
     """Film traces of one plant, from t = 0 to the end of the longest, and return the path of the
     file.
@@ -224,20 +224,20 @@ def write(frames: Frames, path: Path) -> Path:
     return path
 
 
-def _counted(made: Iterator[np.ndarray], progress: Bar) -> Iterator[np.ndarray]:
+def _counted(made: Iterator[Array], progress: Bar) -> Iterator[Array]:
     for picture in made:
         yield picture
         progress.advance(1)
 
 
-def _write_mp4(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
+def _write_mp4(frames: Frames, made: Iterator[Array], part: Path) -> None:
     first = next(made)
     with encoder(part, first.shape[:2], frames.fps) as write_frame:
         for picture in itertools.chain([first], made):
             write_frame(picture)
 
 
-def _write_webp(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
+def _write_webp(frames: Frames, made: Iterator[Array], part: Path) -> None:
     count = len(frames)
     if count > MAX_WEBP_FRAMES:
         raise ScenarioError(
@@ -250,7 +250,7 @@ def _write_webp(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
     )
 
 
-def _write_png(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
+def _write_png(frames: Frames, made: Iterator[Array], part: Path) -> None:
     Image.fromarray(next(made)).save(part, optimize=True)
 
 
@@ -274,7 +274,7 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     return int(sides[0]), int(sides[1])
 
 
-def pictures(frames: Frames) -> Generator[np.ndarray]:
+def pictures(frames: Frames) -> Generator[Array]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
     traces = style.same_plant(frames.traces)
     names = style.labels(traces, frames.labels)
@@ -323,9 +323,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
             yield from drawn(close, stages, overlays, caption, charts)
 
 
-def tracks_at(
-    times: np.ndarray, traces: Sequence[Trace], colours: Sequence[str]
-) -> list[MachineTrack]:
+def tracks_at(times: Array, traces: Sequence[Trace], colours: Sequence[str]) -> list[MachineTrack]:
     """Return what the runs do at the times of frames, s."""
     step = times[1] - times[0] if len(times) > 1 else 1 / FPS
     edges = np.append(times[0] - step, times)
@@ -344,7 +342,7 @@ def drawn(
     overlays: Sequence["arm.Overlay"],
     caption: Caption,
     charts: Charts,
-) -> Generator[np.ndarray]:
+) -> Generator[Array]:
     """Yield the pictures at the times of a clock."""
     width, height = caption.size
     for frame, time in enumerate(clock.times.tolist()):
@@ -362,7 +360,7 @@ def drawn(
 
 
 def staged(
-    tracks: Sequence[MachineTrack], chosen: Camera | None, caption: Caption, times: np.ndarray
+    tracks: Sequence[MachineTrack], chosen: Camera | None, caption: Caption, times: Array
 ) -> Iterator[Stage]:
     """Yield the stages of machines, whose tiles the caption learns."""
     turn = scene.turn(tracks[0].trace.scenario, chosen)
@@ -381,7 +379,7 @@ def staged(
         yield Stage(track, puppet, view, points, caption.scale, len(tracks) == 1, path)
 
 
-def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> np.ndarray:
+def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> Array:
     """Return the picture of a machine at a frame.
 
     A machine that has failed is grey, without a ghost or arrows. An arm has a ghost where its tip

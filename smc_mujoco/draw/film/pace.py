@@ -16,6 +16,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from smc_mujoco.common.constraints import Number, constrained
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.metrics.catalogue import chattering_amplitude, chattering_frequency
@@ -53,8 +54,8 @@ class Clock(NamedTuple):
     `factor` times as large.
     """
 
-    times: np.ndarray  # of the run, (frames,) s, ascending
-    speeds: np.ndarray  # of playback, (frames,), 1 for real time
+    times: Array  # of the run, (frames,) s, ascending
+    speeds: Array  # of playback, (frames,), 1 for real time
     close: "Clock | None" = None
     factor: float = 1.0
 
@@ -118,7 +119,7 @@ def close_up(traces: Sequence[Trace], fps: float) -> Clock | None:
     return Clock(times, np.full(len(times), speed), factor=factor)
 
 
-def visible_sizes(scenario: Scenario) -> np.ndarray:
+def visible_sizes(scenario: Scenario) -> Array:
     """Return deflections of channels that are seen well, (n,) rad or m."""
     extent = models.compile_model(scenario).stat.extent
     units = np.array(scenario.plant.units)
@@ -131,7 +132,7 @@ def rounded(value: float) -> float:
     return power * max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9))
 
 
-def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]:
+def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     """Return the playback speed from each time on: times in s, (m,), the first is 0, and speeds,
     (m,).
     """
@@ -166,7 +167,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     return grid, playback
 
 
-def travel_of(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
+def travel_of(runs: Sequence[Trace], edges: Array) -> Array:
     """Return how far the machines move between times, (edges - 1,): the largest share of a
     channel's range.
     """

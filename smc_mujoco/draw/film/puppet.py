@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.states import shapes
@@ -25,7 +26,7 @@ FOLLOWED_TRAVEL = 1.0  # sizes of a machine: one that goes farther is followed; 
 FOLLOW_TIME = 0.5  # s, over which the followed place is a mean; chosen
 
 
-def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | np.ndarray) -> list[int]:
+def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | Array) -> list[int]:
     """Return the bodies that joints move, in order: their own and all that hang on these."""
     moved = set(model.jnt_bodyid[np.asarray(joints, int)].tolist())
     for body in range(1, model.nbody):
@@ -39,7 +40,7 @@ class Puppet:
     picture's normal is `front`, (3,).
     """
 
-    def __init__(self, scenario: Scenario, front: np.ndarray):
+    def __init__(self, scenario: Scenario, front: Array):
         self.scenario = scene.first_channels(scenario)
         plant = self.scenario.plant
         self.shown = plant.n
@@ -68,9 +69,7 @@ class Puppet:
         self.mounts = arrows.mounts(self.scenario, ids, self.slides, self.rail, front)
         self.height = 0.0  # m, of the machine over the film's floor
 
-    def qpos(
-        self, x: np.ndarray, ahead: np.ndarray | float = 0.0, rest: np.ndarray | None = None
-    ) -> np.ndarray:
+    def qpos(self, x: Array, ahead: Array | float = 0.0, rest: Array | None = None) -> Array:
         """Return the pose, (nq,), with the channels at x, (shown,) rad or m; a cart stays on its
         rail.
 
@@ -90,7 +89,7 @@ class Puppet:
         return pose
 
     def posed(
-        self, track: MachineTrack, data: Sequence[mujoco.MjData], x: np.ndarray, time: float
+        self, track: MachineTrack, data: Sequence[mujoco.MjData], x: Array, time: float
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Return the shape of the machine at a time, s, and its data with the channels at x."""
         now = self.shape(time)
@@ -148,7 +147,7 @@ class Puppet:
         way = np.array([points.mean(axis=0) for points in self.places])
         return float(np.ptp(way, axis=0).max()) > FOLLOWED_TRAVEL * own
 
-    def path(self, times: np.ndarray) -> np.ndarray:
+    def path(self, times: Array) -> Array:
         """Return the places to which the camera follows the machine, (times, 3) m, at times in
         s.
         """
@@ -160,7 +159,7 @@ class Puppet:
         means = [np.interp(at, self.times, part).mean(axis=1) for part in way.T]
         return np.stack(means, axis=1) + np.array([0.0, 0.0, self.height])
 
-    def reach(self, track: MachineTrack, followed: bool) -> np.ndarray:
+    def reach(self, track: MachineTrack, followed: bool) -> Array:
         """Return what must be in the picture, (points, 3) m over the film's floor, and find the
         machine's height over it.
 
@@ -194,7 +193,7 @@ class Puppet:
         if not on_stage:
             far = MAX_FIXED_SIZE * size
 
-            def close(boxes: np.ndarray) -> np.ndarray:
+            def close(boxes: Array) -> Array:
                 inside = ((boxes < high + far) & (boxes > low - far)).all(axis=(1, 2))
                 return boxes[inside & (np.ptp(boxes, axis=1).max(axis=1) < far)]
 
@@ -213,7 +212,7 @@ class Puppet:
             points[:, 2] = points[:, 2].clip(0.0)
         return points
 
-    def lines(self, track: MachineTrack, sides: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    def lines(self, track: MachineTrack, sides: Array) -> list[tuple[float, Array]]:
         """Return the lines of arrows on a machine, (m, 3) m each, with their times, s; bent ones
         suit the `sides` of what moves, m.
         """

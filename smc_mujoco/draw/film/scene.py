@@ -14,6 +14,7 @@ import numpy as np
 
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import find
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw.film import camera
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.mechanisms.hardware.part import OWN, joint_ids
@@ -110,9 +111,7 @@ def users_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
     return machine
 
 
-def set_floor(
-    model: mujoco.MjModel, view: camera.View, points: np.ndarray, moved: np.ndarray
-) -> None:
+def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Array) -> None:
     """Suit the floor to machines whose points are (m, 3) m, moved with the camera: its grid, and
     the haze into which it fades behind them.
     """
@@ -138,7 +137,7 @@ def set_floor(
     model.vis.rgba.fog[:] = HAZE
 
 
-def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
+def turn(scenario: Scenario, chosen: Camera | None = None) -> Array:
     """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's
     own.
     """
@@ -189,7 +188,7 @@ def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         mujoco.mj_tendon(model, data)
 
 
-def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return the corners of each geom's box, (geoms, 8, 3) m."""
     half = model.geom_aabb[:, 3:].copy()
     rods = model.geom_type == CAPSULE  # their compiled boxes are not those of a run that changes it
@@ -199,12 +198,12 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return turned + data.geom_xpos[:, None]
 
 
-def still(model: mujoco.MjModel) -> np.ndarray:
+def still(model: mujoco.MjModel) -> Array:
     """Return which geoms do not move, planes left out, (geoms,)."""
     return (model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE)
 
 
-def fixed_boxes(model: mujoco.MjModel) -> np.ndarray:
+def fixed_boxes(model: mujoco.MjModel) -> Array:
     """Return the corners of each geom that does not move, planes left out, (geoms, 8, 3) m."""
     data = mujoco.MjData(model)
     forward(model, data)
@@ -232,9 +231,7 @@ def restyle(model: mujoco.MjModel) -> None:
         field[np.isin(names, "bob")] *= 1.3
 
 
-def cut(
-    machines: Sequence[mujoco.MjModel], points: np.ndarray, slides: np.ndarray, own: bool
-) -> float:
+def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: bool) -> float:
     """Shorten columns, and rails along `slides`, (k, 3), to what moves, whose points are (m, 3) m,
     in all models.
 

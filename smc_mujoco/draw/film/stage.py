@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
@@ -40,10 +41,10 @@ class Stage:
         track: MachineTrack,
         puppet: Puppet,
         view: camera.View,
-        points: np.ndarray,
+        points: Array,
         scale: float = 1.0,
         alone: bool = True,
-        followed: np.ndarray | None = None,
+        followed: Array | None = None,
     ):
         self.track = track
         self.puppet = puppet
@@ -92,7 +93,7 @@ class Stage:
     def __exit__(self, *_: object) -> None:
         self.canvas.close()
 
-    def find_joints(self, visible: np.ndarray, radius: float) -> None:
+    def find_joints(self, visible: Array, radius: float) -> None:
         """Find the geoms that the joints move, and the mounts of arrows; bent ones have at most
         this radius, m.
         """
@@ -150,12 +151,12 @@ class Stage:
         own = (1.0 - LAW_SHARE) * self.paint[links, :3]
         self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + own
 
-    def rest(self, time: float) -> np.ndarray | None:
+    def rest(self, time: float) -> Array | None:
         """Return the pose at a time, s, in joints that have no channel."""
         motion = self.track.motion
         return None if motion is None else motion.at(time)
 
-    def aim(self, r: np.ndarray | None, time: float = 0.0) -> None:
+    def aim(self, r: Array | None, time: float = 0.0) -> None:
         """Show where the reference r, (shown,) rad or m, wants the machine, as a ghost; None: show
         no ghost.
         """
@@ -163,7 +164,7 @@ class Stage:
         if r is not None:
             self.goal.qpos[:] = self.puppet.qpos(r, rest=self.rest(time))
 
-    def arrange(self, x: np.ndarray, ahead: np.ndarray | float = 0.0, time: float = 0.0) -> None:
+    def arrange(self, x: Array, ahead: Array | float = 0.0, time: float = 0.0) -> None:
         """Put the channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their
         joints.
 
@@ -171,7 +172,7 @@ class Stage:
         """
         self.data.qpos[:] = self.puppet.qpos(x, ahead, self.rest(time))
 
-    def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> np.ndarray:
+    def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> Array:
         """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
         read-only.
         """
@@ -204,11 +205,11 @@ class Stage:
             rim = round(arrows.RIM * self.scale)
         arrows.paint(image, arrows.outline(line, thick, arrow.head), arrow.rgba, rim)
 
-    def project(self, points: np.ndarray) -> np.ndarray:
+    def project(self, points: Array) -> Array:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""
         return camera.project(points, self.turn, self.place, self.size)
 
-    def find(self, name: str) -> np.ndarray:
+    def find(self, name: str) -> Array:
         """Return where a site of the machine is, or the centre of mass of a body, (3,) m."""
         if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, f"m/{name}") >= 0:
             return self.data.site(f"m/{name}").xpos

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import states
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, scene
@@ -26,10 +27,10 @@ class Drawn(NamedTuple):
 class Motion(NamedTuple):
     """Poses of a mechanism, (times, nq), at times in s."""
 
-    times: np.ndarray
-    poses: np.ndarray
+    times: Array
+    poses: Array
 
-    def at(self, time: float) -> np.ndarray:
+    def at(self, time: float) -> Array:
         """Return the pose at a time, (nq,): the one before."""
         return self.poses[max(int(np.searchsorted(self.times, time + 1e-9)) - 1, 0)]
 
@@ -46,8 +47,8 @@ class MachineTrack:
         self,
         trace: Trace,
         colour: str,
-        edges: np.ndarray,
-        grid: np.ndarray,
+        edges: Array,
+        grid: Array,
         scales: Mapping[Group, arrows.Scale],
     ):
         arms = bool(trace.scenario.plant.tip)
@@ -79,14 +80,12 @@ class MachineTrack:
         return self.trace.diverged_at is not None and time >= self.trace.diverged_at
 
 
-def sampled(trace: Trace, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+def sampled(trace: Trace, values: Array, times: Array) -> Array:
     """Return values (K+1, n) at times, s, linear between samples; after a failure the last one."""
     return np.stack([np.interp(times, trace.t, channel) for channel in values.T], axis=1)
 
 
-def drawn(
-    trace: Trace, edges: np.ndarray, sizes: Sequence[arrows.Scale], colour: str
-) -> list[Drawn]:
+def drawn(trace: Trace, edges: Array, sizes: Sequence[arrows.Scale], colour: str) -> list[Drawn]:
     """Return the arrows of a machine in each frame between `edges`, s, for what acts on its
     channels.
     """
@@ -103,7 +102,7 @@ def drawn(
     return frames
 
 
-def motion(trace: Trace, times: np.ndarray) -> Motion | None:
+def motion(trace: Trace, times: Array) -> Motion | None:
     """Return how joints of a user's machine move that are neither channels nor rotors of drives, at
     times in s.
 

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.constraints import Boolean, Bound, Number, constrain
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -22,6 +23,7 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
+from smc_mujoco.common.kinds import Floats, Names, Numbers, Pair
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import BASE, PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
@@ -44,7 +46,7 @@ MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot 
 CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@named_data
 class Channel:
     """How a joint of a user's model is driven.
 
@@ -192,7 +194,7 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 
 def measured_joints(
     label: str, model: mujoco.MjModel, channels: Pairs, measured: Iterable[str] | None
-) -> tuple[str, ...]:
+) -> Names:
     """Return the names of the joints that are measured beside the channels; "base" is the model's
     only free joint.
     """
@@ -249,8 +251,8 @@ def starts(
 
 
 def places(
-    model: mujoco.MjModel, joints: Sequence[str], start: Mapping[str, float], keyframe: str | None
-) -> tuple[list[str], tuple[str, ...], tuple[float, ...]]:
+    model: mujoco.MjModel, joints: Sequence[str], start: Numbers, keyframe: str | None
+) -> tuple[list[str], Names, Floats]:
     """Return the joint of each channel, its unit and its x0; `start` has x0 of hinges and slides.
 
     A free joint has six channels.
@@ -302,7 +304,7 @@ def thrusters(model: mujoco.MjModel, joint: str) -> list[int]:
     return [i for i, site in sites.items() if model.body_rootid[model.site_bodyid[site]] == root]
 
 
-def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]:
+def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
     """Return the largest force in any direction, three times, N, and the largest torque about each
     axis, N m.
     """
@@ -357,7 +359,7 @@ def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "
     return "all" if rank == len(PLACES) else "heading"
 
 
-def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> tuple[float, ...]:
+def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> Floats:
     """Return position, m, and rotation vector, rad, of a free body in the model or its keyframe,
     (6,).
     """
@@ -464,7 +466,7 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
     return ""
 
 
-def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
+def _limit(who: str, cure: str, *ranges: Floats) -> float:
     """Return the largest force that all ranges allow in both directions, N m or N, because |u| has
     one bound.
     """
@@ -475,7 +477,7 @@ def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
     return min(-low, high)
 
 
-def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
+def _of_actuator(model: mujoco.MjModel, i: int) -> Pair:
     """Return the least and the largest force of an actuator at its joint, N m or N."""
     gain = model.actuator_gainprm[i, 0]
     gear = model.actuator_gear[i, 0]
@@ -491,7 +493,7 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
     return low, high
 
 
-def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
+def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
     """Return the least and the largest force that a joint's actuators allow together by their
     forceranges, and motors by their ctrlranges, N m or N.
 
@@ -549,7 +551,7 @@ def add_motor(spec: mujoco.MjSpec, name: str, joint: str) -> mujoco.MjsActuator:
 
 def goals(
     model: mujoco.MjModel, joints: Sequence[str], keyframe: str | None
-) -> tuple[tuple[float, ...], list[str]]:
+) -> tuple[Floats, list[str]]:
     """Return where the joints end by default, rad or m: in the keyframe, else as the model is
     drawn, else in the middle of the range, and the joints of which that is so.
     """

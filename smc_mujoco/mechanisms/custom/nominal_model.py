@@ -34,7 +34,7 @@ import dataclasses
 import functools
 import math
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
@@ -45,6 +45,7 @@ from numba import carray, types
 from smc_mujoco.common import fingerprint, libmujoco
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, Key, floats, pointer, record_at
+from smc_mujoco.common.kinds import Array, Numbers, Pair
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids
@@ -121,9 +122,7 @@ class NominalModel:
     build: Callable[[int], mujoco.MjSpec]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
 
-    def __call__(
-        self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
-    ) -> tuple[float, float]:
+    def __call__(self, x: Array, v: Array, i: int, p: Any, /, u: Array | None = None) -> Pair:
         """Return f and g of channel i, given the last commands u, (n,), of the others."""
         with self._placed(x, p) as (model, places, data):
             data.qvel[places["qvel"]] = v
@@ -145,9 +144,7 @@ class NominalModel:
             return float(data.qacc_smooth[dof]), float(moved[0, dof])
 
     @contextlib.contextmanager
-    def _placed(
-        self, x: np.ndarray, p: Any
-    ) -> Iterator[tuple[mujoco.MjModel, np.ndarray, mujoco.MjData]]:
+    def _placed(self, x: Array, p: Any) -> Iterator[tuple[mujoco.MjModel, Array, mujoco.MjData]]:
         """Yield the model, its channels' indices and an mjData at rest at positions x, which no
         other thread has.
         """
@@ -163,7 +160,7 @@ class NominalModel:
             mujoco.mj_fwdPosition(model, data)
             yield model, places, data
 
-    def native(self, parameters: Mapping[str, float]) -> Native:
+    def native(self, parameters: Numbers) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
@@ -176,9 +173,7 @@ class NominalModel:
             native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays)
         )
 
-    def _borrow(
-        self, parameters: Mapping[str, float]
-    ) -> "tuple[mujoco.MjModel, np.ndarray, BorrowedData]":
+    def _borrow(self, parameters: Numbers) -> "tuple[mujoco.MjModel, np.ndarray, BorrowedData]":
         """Return the model, its channels' indices, and an mjData for one simulation."""
         model, places, _, spare = prepared(self, frozen(parameters))
         try:
@@ -188,7 +183,7 @@ class NominalModel:
             data = mujoco.MjData(model)
         return model, places, BorrowedData(data, spare)
 
-    def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
+    def dynamics(self, x: Array, v: Array, p: Any) -> Dynamics:
         """Return M, h and g of all channels, at their x and v, (n,) each."""
         with self._placed(x, p) as (model, places, data):
             dense = np.zeros((model.nv, model.nv))
@@ -203,7 +198,7 @@ class NominalModel:
                 ]
         return Dynamics(dense[np.ix_(places["qvel"], places["qvel"])], forces["h"], forces["g"])
 
-    def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
+    def coriolis(self, x: Array, v: Array, w: Array, p: Any) -> Array:
         """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
         forces = np.zeros(len(x))
         with self._placed(x, p) as (model, places, data):
@@ -213,7 +208,7 @@ class NominalModel:
                 forces += sign * 0.25 * data.qfrc_bias[places["qvel"]]
         return forces
 
-    def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
+    def jacobian(self, x: Array, p: Any, tip: str) -> Array:
         """Return how the position of a site, the tip, depends on the channels, (3, n)."""
         with self._placed(x, p) as (model, places, data):
             rows = np.zeros((3, model.nv))
@@ -225,9 +220,7 @@ class NominalModel:
         """Return the addresses of the C functions of C and of the tip's Jacobian."""
         return {"coriolis": native_coriolis().address, "jacobian": native_jacobian().address}
 
-    def native_dynamics(
-        self, parameters: Mapping[str, float], tip: str, at_rest: bool = True
-    ) -> Native:
+    def native_dynamics(self, parameters: Numbers, tip: str, at_rest: bool = True) -> Native:
         """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest. The tip
         is a site or "".
         """
@@ -264,8 +257,8 @@ class BorrowedData:
 
 @functools.lru_cache(maxsize=32)
 def prepared(
-    nominal: NominalModel, parameters: Mapping[str, float]
-) -> tuple[mujoco.MjModel, np.ndarray, mujoco.MjData, list[mujoco.MjData]]:
+    nominal: NominalModel, parameters: Numbers
+) -> tuple[mujoco.MjModel, Array, mujoco.MjData, list[mujoco.MjData]]:
     """Return the model with nominal parameters, its channels' indices, an MjData for Python, and
     the pool.
     """
@@ -290,7 +283,7 @@ def prepared(
     return model, places, data, []
 
 
-def driven(places: np.ndarray) -> np.ndarray:
+def driven(places: Array) -> Array:
     """Return the indices of the driven channels in ctrl, (driven,)."""
     return places["ctrl"][places["ctrl"] >= 0]
 

@@ -23,14 +23,16 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import OneOf, Timeout, constrained
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
+from smc_mujoco.common.kinds import Array, Fields, Names
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
@@ -75,7 +77,7 @@ def _touches(model: mujoco.MjModel) -> bool:
     return bool(np.any((masks != 0) & ~kin))
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class UserModel:
     """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
 
@@ -87,7 +89,7 @@ class UserModel:
     # indices of the actuators of a free joint, which is then the only channel
     thrusters: tuple[int, ...] = ()
     others: str = ""  # one of others.OTHERS, or "" if not given
-    measured: tuple[str, ...] = ()  # joints that are measured beside the channels
+    measured: Names = ()  # joints that are measured beside the channels
 
     def edited(self) -> mujoco.MjSpec:
         """Return the model without sensors, and with its other joints as wanted."""
@@ -162,7 +164,7 @@ class UserModel:
         return data
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class UserFields:
     """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and
     gravity.
@@ -282,7 +284,7 @@ def soft(label: str, made: Plant) -> list[str]:
     mujoco.mj_forward(model, data)
     parts = []
 
-    def tell(what: str, option: str, solref: np.ndarray, solimp: np.ndarray, load: float) -> None:
+    def tell(what: str, option: str, solref: Array, solimp: Array, load: float) -> None:
         first, second = solref.T
         # a time constant and a damping ratio, or a stiffness and a damping, both negative
         w = np.where(first > 0.0, 1.0 / np.abs(first * second), np.sqrt(np.abs(first)))
@@ -419,7 +421,7 @@ def _plant(
 
 def _places(
     plant: str, model: mujoco.MjModel, joints: list[str], pairs: Pairs, keyframe: str | None
-) -> tuple[tuple[str, ...], dict[str, Any]]:
+) -> tuple[Names, Fields]:
     """Return the units of the channels, and the plant's fields on where they start, end and may
     go.
     """
@@ -432,7 +434,7 @@ def _places(
     names, units, x0 = own.places(model, joints, start, keyframe)
     goals = dict(zip(alone, own.goals(model, alone, keyframe)[0], strict=True))
     rest = own.places(model, joints, goals, keyframe)[2]
-    fields: dict[str, Any] = {"x0": x0, "ranges": own.ranges(model, names)}
+    fields: Fields = {"x0": x0, "ranges": own.ranges(model, names)}
     if any(rest):
         fields |= {"rest": rest, "goal": rest[len(pairs) :]}
     fields["measured"] = len(names) - len(own.joints_of(pairs))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.kinds import Array, Floats
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT
 from smc_mujoco.mechanisms.hardware.part import dof_ids, driven_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant
@@ -28,12 +29,12 @@ ROUNDS = 4  # of T and the mobility, which depend on each other
 class AtGoal(NamedTuple):
     """M a + D v + K x = force about the goal, of all degrees of freedom, (nv, nv) each."""
 
-    M: np.ndarray
-    D: np.ndarray
-    K: np.ndarray
-    dofs: np.ndarray  # of the driven channels, (driven,)
-    load: np.ndarray  # N m or N, of the driven channels, (driven,), as the next
-    dry: np.ndarray
+    M: Array
+    D: Array
+    K: Array
+    dofs: Array  # of the driven channels, (driven,)
+    load: Array  # N m or N, of the driven channels, (driven,), as the next
+    dry: Array
     strayed: float  # how far the base moves while it is held, in its own sizes; 0 if it is fixed
 
 
@@ -46,7 +47,7 @@ def _goal(plant: Plant) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, data
 
 
-def _forces(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+def _forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return what springs, servos, dampers and gravity exert, (nv,)."""
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
@@ -93,8 +94,8 @@ def _free_base(model: mujoco.MjModel) -> int:
 
 
 def _held(
-    model: mujoco.MjModel, data: mujoco.MjData, base: int, load: np.ndarray, inertia: np.ndarray
-) -> tuple[np.ndarray, float]:
+    model: mujoco.MjModel, data: mujoco.MjData, base: int, load: Array, inertia: Array
+) -> tuple[Array, float]:
     """Hold the goal by a stiff PD. Return its force, (driven,), and how far the base moves, in its
     sizes.
     """
@@ -135,7 +136,7 @@ def falls(plant: Plant) -> str:
 
 
 @functools.lru_cache(maxsize=32)
-def beside_goal(plant: Plant) -> tuple[float, ...]:
+def beside_goal(plant: Plant) -> Floats:
     """Return a start beside the default goal, (n,): the driven joints move towards the limit with
     more room.
     """
@@ -153,7 +154,7 @@ def beside_goal(plant: Plant) -> tuple[float, ...]:
 
 
 @functools.lru_cache(maxsize=32)
-def needs(plant: Plant) -> tuple[float, ...]:
+def needs(plant: Plant) -> Floats:
     """Return the force with which each driven joint arrives from its start and holds, N m or N,
     with two digits: 2 load + (60/s^2 M + 8/s D) X + 1.5 dry friction.
     """
@@ -169,7 +170,7 @@ def needs(plant: Plant) -> tuple[float, ...]:
     return tuple(float(f"{value:.2g}") for value in need)
 
 
-def mobility(plant: Plant, u_max: float, reach: float) -> tuple[float, ...]:
+def mobility(plant: Plant, u_max: float, reach: float) -> Floats:
     """Return x'' of each driven joint for a unit of its force, 1/(kg m^2) or 1/kg.
 
     Other joints answer as they would in the time T in which the motor moves the joint by `reach`:

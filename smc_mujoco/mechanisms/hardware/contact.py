@@ -21,7 +21,6 @@ blow meets. If this mass changes during the blow, as between two swinging bobs t
 other, such a spring would create energy. With a low impedance it sets a force instead.
 """
 
-import dataclasses
 import functools
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
@@ -31,6 +30,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.constraints import Number
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Field, Plant
@@ -67,7 +67,7 @@ TURNING_FRICTION = (0.005, 0.0001, 0.0001)
 SLIDING_FRICTION = slice(0, 2)  # of a pair's five friction coefficients
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Obstacle(Part):
     """Base of what a mechanism may touch."""
 
@@ -90,7 +90,7 @@ class Obstacle(Part):
         return ""
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Contact(Obstacle):
     """One of the contacts that a plant offers.
 

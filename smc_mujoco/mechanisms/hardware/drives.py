@@ -16,7 +16,6 @@ exact for a speed that changes linearly there.
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a property here)
-import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -27,6 +26,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Bound, Number, OneOf
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import floats, record_at
 from smc_mujoco.mechanisms.hardware.moments import Run, Torque, channel_at, drive_at, state_at
@@ -54,7 +54,7 @@ COMMANDS = ("torque", "voltage")
 COGGING = slice(0, 2)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Lag(Actuator):
     """First-order lag, tau f' = u - f, from f = 0.
 
@@ -79,7 +79,7 @@ class Lag(Actuator):
         return self.tau
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class RateLimit(Actuator):
     """A force that follows u no faster than `rate`, from 0: f(t + h) = u clipped to f(t) +- rate h.
 
@@ -101,7 +101,7 @@ class RateLimit(Actuator):
         return self.rate < math.inf
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class DCMotor(Actuator):
     """Motor and gearbox on a voltage amplifier:
 
@@ -363,7 +363,7 @@ factors_at = record_at(floats(DriveStep._fields))
 kept_at = record_at(floats(("first", "second", "rise")))
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Series(Part):
     """The drives, in series, of joints that the callback simulates."""
 

@@ -6,7 +6,6 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
-import dataclasses
 import math
 from collections.abc import Iterator
 
@@ -14,6 +13,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
@@ -33,7 +33,7 @@ LEVELS = slice(3, 6)  # of actuator_biasprm: coulomb, static, stribeck
 RELATIVE_DAMPING = 0.2  # default damping of bristles over sqrt(stiffness inertia)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Viscous(Friction):
     """Friction -b v, on top of the plant's own damping.
 
@@ -50,7 +50,7 @@ class Viscous(Friction):
         yield Field("dof_damping", self.dofs(model), self.b, adds=True)
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Coulomb(Friction):
     """Dry friction: -level sign(v) on a sliding joint; on a joint at rest, the force up to level
     that holds it.
@@ -170,7 +170,7 @@ def with_rise(y, memory, force):
     return force + memory[RISE] if y.stage == 3.0 else force
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class DryFriction(Part):
     """Dry friction, at every stage of RK4, of joints that move alone and whose level is in the
     model: of a plant's own, and of Coulomb.
@@ -192,7 +192,7 @@ class DryFriction(Part):
         return at_stage(y, memory), held
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class LuGre(Friction):
     """Friction of elastic bristles: stiction, the Stribeck drop with speed, and a stuck joint that
     does not creep.

@@ -21,11 +21,13 @@ this friction diverges where stiffness |y.v| y.h exceeds 2 level.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 from smc_mujoco.common.constraints import Each, Number
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.kinds import Fields, Floats, Names, Numbers
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
@@ -43,7 +45,7 @@ def of_joint(value: Any, i: int) -> float:
     return math.nan if value is None else value
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class JointPart(Part):
     """Base of parts that are a function of one joint.
 
@@ -53,16 +55,16 @@ class JointPart(Part):
     """
 
     @property
-    def per_joint(self) -> tuple[str, ...]:
+    def per_joint(self) -> Names:
         """Names of the fields that are numbers of a joint."""
         return tuple(field.name for field in dataclasses.fields(self) if not field.kw_only)
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def names(self) -> Names:
         """The fields, which the function reads as p."""
         return self.per_joint
 
-    def parameters(self, i: int) -> tuple[float, ...]:
+    def parameters(self, i: int) -> Floats:
         """Return the numbers of its joint i; NaN for None."""
         return tuple(of_joint(getattr(self, name), i) for name in self.per_joint)
 
@@ -82,7 +84,7 @@ class JointPart(Part):
                 )
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class JointForce(JointPart, Friction):
     """Base of frictions that are a function of one joint."""
 
@@ -97,7 +99,7 @@ class JointForce(JointPart, Friction):
         self.check_lengths(plant, len(joints))
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Drive(JointPart, Actuator):
     """Base of drives that are a function of one joint: among others of its command y.u."""
 
@@ -115,7 +117,7 @@ class Drive(JointPart, Actuator):
 
 
 def friction_function(
-    *, numbers: Mapping[str, float] | None = None, memory: int = 0
+    *, numbers: Numbers | None = None, memory: int = 0
 ) -> Callable[[Callable], Callable[..., JointForce]]:
     """Turn a function (y, p, memory) -> force on a joint, N m (N), into a kind of friction.
 
@@ -131,7 +133,7 @@ def friction_function(
 
 
 def actuator_function(
-    *, numbers: Mapping[str, float] | None = None, memory: int = 0, delay: float = 0.0
+    *, numbers: Numbers | None = None, memory: int = 0, delay: float = 0.0
 ) -> Callable[[Callable], Callable[..., Drive]]:
     """Turn a function (y, p, memory) -> force of a drive, N m (N), into a kind of actuator.
 
@@ -146,9 +148,9 @@ def actuator_function(
 
 def _made(
     base: type[JointPart],
-    numbers: Mapping[str, float],
+    numbers: Numbers,
     memory: int,
-    space: dict[str, Any],
+    space: Fields,
     function: Callable,
 ) -> Any:
     name = function.__name__

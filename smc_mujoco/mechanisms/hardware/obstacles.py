@@ -19,8 +19,10 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.constraints import Number, Range
+from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Array
 from smc_mujoco.mechanisms.hardware import contact
 from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, Pair, solref
 from smc_mujoco.mechanisms.hardware.part import OWN, Positive, moving_joints, state_with
@@ -46,7 +48,7 @@ UNTOUCHED = {"contype": 0, "conaffinity": 0}  # by other geoms
 HIDDEN = UNTOUCHED | {"group": 5, "rgba": (0.0, 0.0, 0.0, 0.0)}
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Stops(Obstacle):
     """End stops of joints, in place of their own limits.
 
@@ -105,7 +107,7 @@ class Stops(Obstacle):
         return ""
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class OfBody(Obstacle):
     """Base of what a body hits: something that is added to the world."""
 
@@ -137,12 +139,12 @@ class OfBody(Obstacle):
         """Add it to the world, as a body and a geom of the same name."""
         raise NotImplementedError
 
-    def way(self, model: mujoco.MjModel) -> tuple[np.ndarray, float]:
+    def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return the direction from the body to it, (3,), and how far it is at the start, m."""
         raise NotImplementedError
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Wall(OfBody):
     """A wall before a body, flat and without an end, which only this body hits.
 
@@ -166,7 +168,7 @@ class Wall(OfBody):
             raise ScenarioError(f"{what} is {way}: give three numbers, not all 0, as (0, 0, -1)")
         object.__setattr__(self, "direction", way)
 
-    def way(self, model: mujoco.MjModel) -> tuple[np.ndarray, float]:
+    def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return its direction and the gap."""
         return np.array(self.direction) / np.linalg.norm(self.direction), self.gap
 
@@ -190,7 +192,7 @@ class Wall(OfBody):
         return "" if away > 0.0 else f"body {self.body!r} {-1e3 * away:.3g} mm in its wall"
 
 
-@dataclasses.dataclass(frozen=True)
+@frozen_data
 class Ball(OfBody):
     """A ball that falls from rest onto a body, and hits only this body.
 
@@ -211,7 +213,7 @@ class Ball(OfBody):
     height: Positive = 0.5
     radius: Positive = 0.03
 
-    def way(self, model: mujoco.MjModel) -> tuple[np.ndarray, float]:
+    def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return the way up and the height."""
         if not model.opt.gravity.any():
             raise ScenarioError("a Ball does not fall without gravity: leave it out")
@@ -245,7 +247,7 @@ def _placed(part: OfBody, plant: Plant) -> Placed:
 
 
 @functools.lru_cache(maxsize=64)
-def _posts(stops: Stops, plant: Plant) -> list[tuple[str, np.ndarray]]:
+def _posts(stops: Stops, plant: Plant) -> list[tuple[str, Array]]:
     """Return joint and place, (3,) m in the axes of the body before it, of what shows each stop:
     a ball that the moved body touches there.
     """
@@ -276,8 +278,8 @@ def _posts(stops: Stops, plant: Plant) -> list[tuple[str, np.ndarray]]:
 
 
 def _meeting(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int, shape: int, away: np.ndarray
-) -> np.ndarray | None:
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, shape: int, away: Array
+) -> Array | None:
     """Return where a geom meets a body, on its way from afar to the centre of mass, (3,) m; None if
     it passes.
     """

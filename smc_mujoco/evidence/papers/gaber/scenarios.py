@@ -11,11 +11,11 @@ plants' parameters are in their files.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.simulation.conditions import (  # noqa: F401
     CONTROL_PERIOD,
@@ -40,7 +40,7 @@ def scenario(
     condition: str | Condition = "nominal",
     seed: int = 0,
     duration: float = DURATION,
-    changes: Mapping[str, Any] = frozen({}),
+    changes: Data = frozen({}),
     gains: str = "study",
 ) -> Scenario:
     """Return the scenario of one plant under one law in one condition.
@@ -67,7 +67,7 @@ def comparison(
     condition: str | Condition = "nominal",
     laws: Sequence[str] = LAWS,
     duration: float = DURATION,
-    changes: Mapping[str, Any] = frozen({}),
+    changes: Data = frozen({}),
     gains: str = "study",
 ) -> dict[str, Scenario]:
     """Return law name -> scenario, for one plant in one condition; arguments as of `scenario`."""
