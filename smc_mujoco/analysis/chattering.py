@@ -169,10 +169,7 @@ def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
     """Return the amplitude of x of the largest unstable cycle within a stable one in the same turn
     of L, or 0.
     """
-    smaller = []
-    for other in unstable:
-        if other[0] < one[0]:
-            smaller.append(other)
+    smaller = [other for other in unstable if other[0] < one[0]]
     *turns, turn = _turns(loop, [*smaller, one])
     return max(
         (a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0),
@@ -344,10 +341,9 @@ def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
     later = loop.later(-shift / wave.omega)
     stable, _ = cycles(later)
     sign = math.copysign(1.0, shift)
-    beside = []
-    for cycle in stable:
-        if sign * math.log(cycle[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE:
-            beside.append(cycle)
+    beside = [
+        cycle for cycle in stable if sign * math.log(cycle[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE
+    ]
     if not beside and shift > 0.0:
         beside = _of_two_samples(later)
     nearest = min(beside, key=lambda one: abs(one[1] - wave.omega), default=None)
@@ -410,9 +406,7 @@ def _turns(loop: Loop, balances: Sequence[Balance]) -> Array:
     between = np.exp(
         np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP)
     )
-    phases = []
-    for omega in between:
-        phases.append(np.angle(loop.response(omega * (1.0 - RESONANCE_DAMPING * 1j))))
+    phases = [np.angle(loop.response(omega * (1.0 - RESONANCE_DAMPING * 1j))) for omega in between]
     return np.interp(omegas, between, np.unwrap(phases)) / math.tau
 
 

@@ -129,10 +129,11 @@ class Loop:
         gaps.
         """
         s = self.scenario.resolved
-        motors = []
-        for part in s.actuator:
-            if isinstance(part, DCMotor):
-                motors.append(dataclasses.replace(part, inductance=0.0))
+        motors = [
+            dataclasses.replace(part, inductance=0.0)
+            for part in s.actuator
+            if isinstance(part, DCMotor)
+        ]
         chain = s.chains[self.channel]
         ideal = dataclasses.replace(
             self.scenario,
@@ -385,9 +386,9 @@ class Controller:
 
     def __init__(self, *parts: Component | None):
         try:
-            functions = []
-            for one in parts:
-                functions.append(None if one is None else cfunctions.compile_component(one))
+            functions = [
+                None if one is None else cfunctions.compile_component(one) for one in parts
+            ]
         except NotCompilable as error:
             raise ScenarioError(
                 f"chattering is not predicted for a law that does not compile: {error}"

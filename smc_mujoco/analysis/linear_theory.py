@@ -225,18 +225,14 @@ def restoring_force(
     linear(plant)  # raises for a plant without linear theory
     p = SimpleNamespace(**plant.parameters)
     v = np.zeros(plant.n)
-    ratios = []
-    for i in range(plant.n):
-        ratios.append(plant.nominal(np.full(plant.n, 1.0), v, i, p))
+    ratios = [plant.nominal(np.full(plant.n, 1.0), v, i, p) for i in range(plant.n)]
     if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (
         1.0 + abs(ratios[0][0] / ratios[0][1])
     ):
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
     def force(x: Array) -> Array:
-        nominal = []
-        for each in x:
-            nominal.append(plant.nominal(np.full(plant.n, each), v, 0, p))
+        nominal = [plant.nominal(np.full(plant.n, each), v, 0, p) for each in x]
         return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
 
     return force

@@ -309,9 +309,10 @@ def _more_fail(failed: Array, within: Array, left: Array) -> bool:
     """
     from scipy.stats import fisher_exact
 
-    counts = []
-    for side in (within, left & ~within):
-        counts.append([int((failed & side).sum()), int((~failed & side).sum())])
+    counts = [
+        [int((failed & side).sum()), int((~failed & side).sum())]
+        for side in (within, left & ~within)
+    ]
     return float(np.asarray(fisher_exact(counts, "greater"))[1]) < REGION_ERROR
 
 

@@ -97,10 +97,7 @@ def read(folder: AnyPath) -> Entry:
     if folder in known_laws() and not os.path.isdir(folder):
         return _of_library(str(folder))
     folder = Path(folder)
-    laws = []
-    for name in FILES:
-        if (folder / name).is_file():
-            laws.append(folder / name)
+    laws = [folder / name for name in FILES if (folder / name).is_file()]
     if len(laws) != 1:
         names = " and ".join(path.name for path in laws) or "none of them"
         raise ScenarioError(f"entry {str(folder)!r} has {names}: give one of {', '.join(FILES)}")

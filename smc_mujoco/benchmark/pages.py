@@ -48,9 +48,7 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
             why = "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
     made = _environment()
-    left_out = []
-    for error in refused:
-        left_out.append(str(error).replace(f"{results}{os.sep}", ""))
+    left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused]
     for found in suites:
         folder = suite.folder(found.suite, found.seed)
         page = {"found": found, "folder": folder}

@@ -189,9 +189,7 @@ class Problem:
         x0 = []
         for place, origin in zip(base.resolved.x0, rest, strict=True):
             x0.append(origin + drawn.side * drawn.start * (place - origin))
-        disturbance = []
-        for signal in base.disturbance:
-            disturbance.append(_scaled(signal, force))
+        disturbance = [_scaled(signal, force) for signal in base.disturbance]
         scenario = dataclasses.replace(
             base, x0=x0, mismatch=mismatch, disturbance=disturbance, seed=drawn.seed
         )
@@ -220,9 +218,7 @@ class Problem:
             values = dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
             return {"failed": 1.0} | values | dict.fromkeys(self._names(), math.nan)
         groups = conventions.by_group(trace).values()
-        relative = []
-        for part in groups:
-            relative.append(np.abs(conventions.error(part)) / conventions.scale(part))
+        relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
         plant = trace.scenario.plant
@@ -263,8 +259,7 @@ class Problem:
         """List the names of the targets' times."""
         names = []
         for measure in MEASURES:
-            for i in range(1, len(self.targets.get(measure, ())) + 1):
-                names.append(f"{measure}_{i}")
+            names.extend(f"{measure}_{i}" for i in range(1, len(self.targets.get(measure, ())) + 1))
         return names
 
 
@@ -310,11 +305,9 @@ def cells(version: int) -> list[str]:
         conditions[plant] = fields["conditions"]
     listed = []
     for plant, of_plant in conditions.items():
-        for condition in of_plant:
-            listed.append(f"{plant}/{condition}")
+        listed.extend(f"{plant}/{condition}" for condition in of_plant)
     for plant in plants:
-        for condition in _attacks(version):
-            listed.append(f"{plant}/{condition}")
+        listed.extend(f"{plant}/{condition}" for condition in _attacks(version))
     return listed
 
 

@@ -159,8 +159,7 @@ class Result:
         for name in problems:
             columns = self.runs.columns(name)
             levels = problem(name).targets.get(measure, ())
-            for i in range(1, len(levels) + 1):
-                times.append(columns[f"{measure}_{i}"])
+            times.extend(columns[f"{measure}_{i}"] for i in range(1, len(levels) + 1))
         return np.nan_to_num(np.concatenate(times), nan=np.inf)
 
 
@@ -265,8 +264,7 @@ class Results:
         changes = []
         for name in self.entries:
             if name in other.entries:
-                for question in self.boards():
-                    changes.append(self._change(other, name, question))
+                changes.extend(self._change(other, name, question) for question in self.boards())
         return Changes(changes=tuple(changes))
 
     def _change(self, old: "Results", name: str, question: str) -> "Change":

@@ -25,8 +25,7 @@ VALUES = "failed", "accuracy", "itae", "settling", "calm"
 LEVELS = 5  # targets of a measure
 COLUMNS: list[str] = list(VALUES)
 for measure in MEASURES:
-    for level in range(1, LEVELS + 1):
-        COLUMNS.append(f"{measure}_{level}")
+    COLUMNS.extend(f"{measure}_{level}" for level in range(1, LEVELS + 1))
 Row = dict[str, Any]
 
 

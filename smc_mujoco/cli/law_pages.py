@@ -55,9 +55,11 @@ def print_pages(name: str, console: Console) -> None:
         if name in templates:
             pages.append((templates[name], templates.package(name)))
     if not pages and "." in name:
-        for law in from_text.laws(name):
-            if isinstance(law, Law) and law.template:
-                pages.append((law.template, ""))
+        pages.extend(
+            (law.template, "")
+            for law in from_text.laws(name)
+            if isinstance(law, Law) and law.template
+        )
     if not pages:
         raise unknown("law, surface or velocity estimator", name, known)
     for template, package in pages:

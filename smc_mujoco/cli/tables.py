@@ -346,9 +346,9 @@ def with_package(line: str, package: str) -> str:
 
 def margins(kind: str, results: Sequence[Margin]) -> Table:
     """Return the margins of one kind: a line for each plant and law."""
-    numbers = []
-    for head in ("margin", "to within", "theory"):
-        numbers.append(Column(head, justify="right", no_wrap=True))
+    numbers = [
+        Column(head, justify="right", no_wrap=True) for head in ("margin", "to within", "theory")
+    ]
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
     for margin in results:

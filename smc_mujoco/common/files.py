@@ -193,10 +193,11 @@ def csv_rows(path: AnyPath) -> list[tuple[int, list[str]]]:
             semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
             text.seek(0)
             reader = csv.reader(text, strict=True, delimiter=";" if semicolons else ",")
-            rows = []
-            for row in reader:
-                if len(row) > 1 or any(row):
-                    rows.append((reader.line_num, [cell.strip() for cell in row]))
+            rows = [
+                (reader.line_num, [cell.strip() for cell in row])
+                for row in reader
+                if len(row) > 1 or any(row)
+            ]
         if any("\0" in "".join(row) for _, row in rows):
             raise ScenarioError("it is not text")
     if semicolons:

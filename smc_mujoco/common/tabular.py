@@ -187,10 +187,9 @@ class Tabular:
         """Return a tabular, which needs the package booktabs, below comments with the title and the
         notes; the lines `under` the table are in print.
         """
-        lines = []
-        for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT):
-            if text:
-                lines.append(f"% {text}")
+        lines = [
+            f"% {text}" for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT) if text
+        ]
         lines += [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",

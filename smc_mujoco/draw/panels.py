@@ -222,8 +222,9 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
     found = []
     for group, parts in style.split(traces).items():
         size = max(map(scale, parts))
-        for panel in by_channel(Panel("e", group, parts)):
-            found.append((mean_error(panel) / size, panel))
+        found.extend(
+            (mean_error(panel) / size, panel) for panel in by_channel(Panel("e", group, parts))
+        )
     found.sort(key=lambda one: -one[0])
     return [panel for _, panel in found]
 
@@ -528,9 +529,7 @@ def agreements(lines: Sequence[Line], limits: Pair, logarithmic: bool = False) -
     if len(lines) < 2:
         return []
     last = max(float(t[-1]) for t, _ in lines)
-    until = []
-    for one in lines:
-        until.append([_parting(one, other, limits, logarithmic) for other in lines])
+    until = [[_parting(one, other, limits, logarithmic) for other in lines] for one in lines]
     found = []
     left = list(range(len(lines)))
     if MIN_AGREEMENT * last <= min(until[0]) < last:

@@ -143,10 +143,7 @@ def group_trace(trace: Trace, group: Group) -> Trace:
         return dataclasses.replace(trace, **whole) if whole["x"] is trace.v else trace
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
-    columns = []
-    for i in group.channels:
-        if i in trace.scenario.scored_channels:
-            columns.append(i)
+    columns = [i for i in group.channels if i in trace.scenario.scored_channels]
     arrays = {}
     for name, array in whole.items():
         if name != "t":

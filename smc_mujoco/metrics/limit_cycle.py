@@ -101,9 +101,7 @@ def largest_cycle(trace: Trace) -> Pair:
     """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where
     none has one.
     """
-    cycles = []
-    for i in range(trace.s.shape[1]):
-        cycles.append(channel_cycle(trace, i))
+    cycles = [channel_cycle(trace, i) for i in range(trace.s.shape[1])]
     return max((cycle for cycle in cycles if not math.isnan(cycle[0])), default=NO_CYCLE)
 
 

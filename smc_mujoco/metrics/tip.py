@@ -105,11 +105,11 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
-    found = []
-    for part in scenario.actuator:
-        if part.in_callback or part.delay or part.accelerates or not part.drives:
-            found.append(part)
-    return found
+    return [
+        part
+        for part in scenario.actuator
+        if part.in_callback or part.delay or part.accelerates or not part.drives
+    ]
 
 
 @once_per_trace
@@ -133,10 +133,11 @@ def contacts(trace: Trace) -> Contacts:
     drives = model.actuator_ctrladr[drive_ids(model)]
     n = scenario.plant.driven
     scale = np.array(scenario.scales)
-    pushes = []
-    for d in scenario.disturbance:
-        if isinstance(d, Push) and scenario.plant.direct:
-            pushes.append((model.body(d.body).id, d))
+    pushes = [
+        (model.body(d.body).id, d)
+        for d in scenario.disturbance
+        if isinstance(d, Push) and scenario.plant.direct
+    ]
     contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)

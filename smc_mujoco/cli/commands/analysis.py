@@ -150,9 +150,10 @@ def margins(
         from smc_mujoco.simulation.conditions import PLANTS
 
     terminal = Terminal(json)
-    machines = []
-    for text in options.plants(plants, QUICK_MARGINS["plants"] if quick else PLANTS):
-        machines.append(as_plant(text))
+    machines = [
+        as_plant(text)
+        for text in options.plants(plants, QUICK_MARGINS["plants"] if quick else PLANTS)
+    ]
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
     with bar("margins") as progress:

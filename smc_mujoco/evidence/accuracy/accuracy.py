@@ -94,14 +94,13 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
     """
     first, *_, last = rows[0].periods
     gains = {row.law: row.gains for row in rows}
-    cells = []
-    for row in rows:
-        cells.append(
-            [
-                Cell(row.law + "*" * bool(row.why), colour=law_colour(row.law)),
-                *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
-            ]
-        )
+    cells = [
+        [
+            Cell(row.law + "*" * bool(row.why), colour=law_colour(row.law)),
+            *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
+        ]
+        for row in rows
+    ]
     return Tabular(
         headings=[
             "law",
@@ -164,19 +163,19 @@ def accuracy(
     setups = []
     for plant in listed("plants", plants):
         for condition in listed("conditions", conditions):
-            for law in listed_laws(laws):
-                setups.append(
-                    _setup(
-                        as_plant(plant),
-                        find_condition(condition),
-                        law,
-                        descending,
-                        numbers,
-                        gains,
-                        duration,
-                        starts,
-                    )
+            setups.extend(
+                _setup(
+                    as_plant(plant),
+                    find_condition(condition),
+                    law,
+                    descending,
+                    numbers,
+                    gains,
+                    duration,
+                    starts,
                 )
+                for law in listed_laws(laws)
+            )
     scenarios = []
     for setup in setups:
         scenarios += setup.scenarios
@@ -200,9 +199,7 @@ def _longest_first(periods: Sequence[float]) -> Floats:
     """Return the control periods in descending order; refuse fewer than two, equal ones, and what
     is no period.
     """
-    numbers = []
-    for h in items_of("periods", periods):
-        numbers.append(number("a period", h, above=0.0, low=MIN_TIME))
+    numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in items_of("periods", periods)]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise ScenarioError(
             f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}"
@@ -290,18 +287,14 @@ def _setup(
 
     runs = []
     for seed in seeds:
-        for h in periods:
-            runs.append(scenario(seed, h))
+        runs.extend(scenario(seed, h) for h in periods)
     return Setup(runs, periods, len(seeds))
 
 
 def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
     base = setup.scenarios[0]
-    failures = []
-    for run in runs:
-        if run.failure:
-            failures.append(run.failure)
+    failures = [run.failure for run in runs if run.failure]
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     no_promise = _why_no_promise(base)

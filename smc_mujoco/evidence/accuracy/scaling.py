@@ -95,9 +95,7 @@ class Accuracy:
         """The orders of e and s that theory promises, as text: one number if they are the same, ""
         for none.
         """
-        promised = []
-        for one in (self.e, self.s):
-            promised.append("" if one.theory is None else f"{one.theory:.2g}")
+        promised = ["" if one.theory is None else f"{one.theory:.2g}" for one in (self.e, self.s)]
         return ", ".join(dict.fromkeys(promised))
 
     def error(self, k: int) -> str:

@@ -48,10 +48,7 @@ def document(audit: Any) -> Fields:
                     about["scores"] = run.scores
                 if run.trace:
                     about["trace"] = run.trace
-    sealed = []
-    for claim in audit.claims:
-        if not audit.paper.claims[claim.id].varies:
-            sealed.append(claim)
+    sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
     data = {
         "format": FORMAT,
         "paper": {

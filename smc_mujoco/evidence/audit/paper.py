@@ -145,9 +145,7 @@ class Paper:
     @property
     def contents(self) -> str:
         """How many claims of each kind it has, and what of the paper was read, in a few words."""
-        kinds = []
-        for claim in self.claims.values():
-            kinds.append(claim.whose)
+        kinds = [claim.whose for claim in self.claims.values()]
         counts = []
         for kind, word in KINDS_OF_CLAIM.items():
             if kind in kinds:
@@ -343,10 +341,11 @@ def _module(folder: Path, package: str) -> ModuleType:
 
 def _place(error: BaseException, folder: Path) -> str:
     """Return the file and line of a paper's folder at which an exception was raised."""
-    frames = []
-    for f in traceback.extract_tb(error.__traceback__):
-        if Path(f.filename).is_relative_to(folder.resolve()):
-            frames.append(f)
+    frames = [
+        f
+        for f in traceback.extract_tb(error.__traceback__)
+        if Path(f.filename).is_relative_to(folder.resolve())
+    ]
     if frames:
         return f"{frames[-1].filename}, line {frames[-1].lineno}"
     return str(folder / CODE_FILE)

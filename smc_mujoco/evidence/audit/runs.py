@@ -258,10 +258,7 @@ class Runs:
         nothing in a run.
         """
         plants: Hashes = {}
-        keyed = []
-        for scenario in scenarios:
-            keyed.append((key(scenario.named(None), plants=plants), scenario))
-        return keyed
+        return [(key(scenario.named(None), plants=plants), scenario) for scenario in scenarios]
 
     def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:
         """Return name -> trace of named scenarios, such as those of `grid`."""

@@ -37,10 +37,7 @@ class Tried(NamedTuple):
     @property
     def rank(self) -> tuple[bool, float]:
         """Key that orders gains: whether all checks hold, then the least slack."""
-        checks = []
-        for check in self.evidence:
-            if isinstance(check, Check):
-                checks.append(check)
+        checks = [check for check in self.evidence if isinstance(check, Check)]
         return all(check.holds for check in checks), min(
             (check.slack for check in checks), default=math.inf
         )

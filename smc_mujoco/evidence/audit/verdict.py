@@ -344,10 +344,7 @@ class Claims(list[Claim]):
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:
     """Return verdict -> how many of the paper's own sentences have it, without zeros."""
-    of_paper = []
-    for claim in claims:
-        if claim.whose == PAPER:
-            of_paper.append(claim.verdict)
+    of_paper = [claim.verdict for claim in claims if claim.whose == PAPER]
     return {kind: of_paper.count(kind) for kind in VERDICTS if kind in of_paper}
 
 

@@ -162,10 +162,7 @@ class Certificate:
         sentences = []
         for part in self.data["parts"]:
             theorem = part["theorem"]
-            rows = []
-            for row in self.conditions:
-                if row.theorem == theorem and not row.holds:
-                    rows.append(row)
+            rows = [row for row in self.conditions if row.theorem == theorem and not row.holds]
             fails = ", ".join(row.name for row in rows)
             if theorem == "level sets":  # the region is proven also where the start lies outside
                 fails = ""

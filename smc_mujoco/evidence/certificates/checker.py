@@ -421,9 +421,7 @@ def reaching(doc, part, e, f):
         return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
 
     edges = [X * i / 64 for i in range(65)]
-    strips = []
-    for j in range(-8, 8):
-        strips.append(hull(S * j / 8, S * (j + 1) / 8))
+    strips = [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
     least = min((f.K - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
     need(bool(X > 0) is bool(least > 0), "reaching")
     return {"reaching": (least, f.force), "actuator": f.room}

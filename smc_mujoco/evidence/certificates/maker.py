@@ -114,10 +114,7 @@ def _check(scenario: Scenario) -> None:
             f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} "
             f"on one of {', '.join(PLANTS)}"
         )
-    zero = []
-    for name in POSITIVE_GAINS:
-        if law.uniform and law.gains.get(name, 1.0) <= 0.0:
-            zero.append(name)
+    zero = [name for name in POSITIVE_GAINS if law.uniform and law.gains.get(name, 1.0) <= 0.0]
     refused = {
         f"{law.name} with {' and '.join(zero)} not above 0": zero,
         "model='nominal'": scenario.resolved.model != "none",
@@ -275,9 +272,7 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
     if smallest < 1.0:
         margin -= MARGIN_SHARE * max(abs(smallest), 0.1)
     for count in BOX_COUNTS:
-        edges = []
-        for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2:
-            edges.append(float(f"{edge:.9g}"))
+        edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
         boxes = [*map(list, itertools.pairwise(edges)), [edges[-1], None]]
         yield {"name": "restoring", "margin": margin, "boxes": boxes}
 

@@ -61,8 +61,7 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
     """
     sets = list(claims[0].verdicts)
     columns = [Column("id", justify="right", style="cyan")]
-    for name in sets:
-        columns.append(Column(name, justify="center"))
+    columns.extend(Column(name, justify="center") for name in sets)
     words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains"
     table = titled("", *columns, words, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
     for claim in claims:

@@ -314,9 +314,7 @@ def method(work: Work, compared: Compared) -> Section:
     for name in plan.grid.conditions:
         fields = find_condition(name).brief(plant, plan.grid.duration)
         conditions.append((name, fields or "nothing"))
-    meanings = []
-    for metric in metrics():
-        meanings.append((metric.label, metric.unit_for("rad"), metric.summary))
+    meanings = [(metric.label, metric.unit_for("rad"), metric.summary) for metric in metrics()]
     shown = [
         Tabular(headings=["fact", ""], rows=list(facts.items()), title="What was run", left=2),
         Tabular(

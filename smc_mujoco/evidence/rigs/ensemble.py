@@ -61,8 +61,7 @@ def runs(
             base += all_combinations(
                 [plant], lambda _: found, nominal, range(seeds), duration, around
             )
-        for scenario in base:
-            scenarios.append(dataclasses.replace(scenario, **fields).named(name))
+        scenarios.extend(dataclasses.replace(scenario, **fields).named(name) for scenario in base)
     return scenarios
 
 

@@ -296,12 +296,8 @@ def _starting_states(
         return [replays.state(point, k) for k in range(len(data))]
     repeats = Replays(fitted, [], data, False, whole=True)
     repeats.steps = replays.short_steps
-    of_records = []
-    for piece in replays.pieces:
-        of_records.append(piece.record)
-    firsts = []
-    for i in range(len(data)):
-        firsts.append(of_records.index(i))
+    of_records = [piece.record for piece in replays.pieces]
+    firsts = [of_records.index(i) for i in range(len(data))]
     none = np.zeros(0)
     candidates = [repeats.start, Point(none, point.states[firsts])]
     for candidate in tuple(candidates):
@@ -316,10 +312,7 @@ def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[D
     """Return the rig to identify, and its records as columns."""
     if isinstance(given, str):
         given = find_rig(given)
-    traces = []
-    for record in many:
-        if isinstance(record, Trace):
-            traces.append(record)
+    traces = [record for record in many if isinstance(record, Trace)]
     if isinstance(given, Plant):
         given = _of_plant(given, traces[0].scenario if traces else None)
     if not isinstance(given, Rig):

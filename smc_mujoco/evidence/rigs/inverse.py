@@ -98,9 +98,9 @@ def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     state = mujoco.MjData(model)
     joints = joint_ids(model)
     dofs = dof_ids(model)
-    motion = []
-    for order in range(3):
-        motion.append(np.column_stack([filtered.cubic(name, order) for name in columns.x]))
+    motion = [
+        np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3)
+    ]
     x, v, a = motion
     forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]

@@ -92,9 +92,7 @@ def _csv(file: Path) -> Record:
         raise ScenarioError(
             f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples"
         )
-    heads = []
-    for name in rows[0]:
-        heads.append(name.split("[")[0].strip().lstrip("# "))
+    heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
     values = []
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
@@ -125,9 +123,7 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
         if sensor is not None:
             x = x + sensor.bias
         if noisy and s.noise.position:
-            normals = []
-            for k in range(len(x)):
-                normals.append(philox.normals(s.seed, i, philox.MEASUREMENT, k)[0])
+            normals = [philox.normals(s.seed, i, philox.MEASUREMENT, k)[0] for k in range(len(x))]
             x = x + s.noise.position * np.array(normals)
         if sensor is not None and (quantum := sensor.quantum(s.plant.units[i] == "rad")):
             x = quantum * np.floor(x / quantum + 0.5)
@@ -231,9 +227,7 @@ def noise(data: Record, columns: Columns) -> float:
     have the standard deviation sqrt(70) sigma for white noise of sigma. Their median ignores short
     transients.
     """
-    medians = []
-    for name in columns.x:
-        medians.append(np.median(np.abs(np.diff(data[name], 4))))
+    medians = [np.median(np.abs(np.diff(data[name], 4))) for name in columns.x]
     return float(min(medians)) / (NORMAL_MEDIAN * math.sqrt(70.0))
 
 
@@ -266,9 +260,7 @@ def state(data: Record, columns: Columns, period: float, at: int) -> ArrayPair:
     first = max(0, at - STATE_SAMPLES)
     last = min(len(data[columns.time]), at + STATE_SAMPLES + 1)
     times = period * (np.arange(first, last) - at)
-    cubics = []
-    for name in columns.x:
-        cubics.append(np.polyfit(times, data[name][first:last], 3))
+    cubics = [np.polyfit(times, data[name][first:last], 3) for name in columns.x]
     x = np.array([cubic[3] for cubic in cubics])
     if not at:
         x = np.array([data[name][0] for name in columns.x])

@@ -220,9 +220,7 @@ class Replays:
 
     def costs(self, points: Sequence[Point]) -> Array:
         """Return the sum of squares of each piece at each point, (points, pieces)."""
-        found = []
-        for by_piece in self.residuals(points):
-            found.append([cost([rows]) for rows in by_piece])
+        found = [[cost([rows]) for rows in by_piece] for by_piece in self.residuals(points)]
         return np.array(found)
 
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
@@ -230,9 +228,9 @@ class Replays:
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            predictions = []
-            for rig in rigs:
-                predictions.append([columns for columns, _, _ in rig.predictions(self.data)])
+            predictions = [
+                [columns for columns, _, _ in rig.predictions(self.data)] for rig in rigs
+            ]
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
@@ -252,9 +250,9 @@ class Replays:
         if not (plain := rig.repeated(self._part(0))).realistic:
             return False
         self.steps = _steps(plain, 0)
-        found = []
-        for k in (0, halvings - 1, halvings):
-            found.append(self._replayed([rig], [point], _steps(plain, k))[0])
+        found = [
+            self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings)
+        ]
         self.corrections = []
         for plain_steps, coarse, fine in zip(*found, strict=True):
             self.corrections.append(
@@ -323,8 +321,9 @@ class Replays:
             for e in np.eye(p):
                 values = np.clip(point.values + step * e, self.low, self.high)
                 moved.append(Point(values, point.states))
-            for e in np.eye(len(self.free)):
-                moved.append(Point(point.values, point.states + step * e))
+            moved.extend(
+                Point(point.values, point.states + step * e) for e in np.eye(len(self.free))
+            )
         residuals, *rows = self.residuals([point, *moved])
         count = len(moved) // 2
         gaps = np.full(count, 2.0 * DIFFERENCE_STEP)
@@ -359,9 +358,7 @@ class Replays:
             count = max(1, int((last - first) * period / shortest + 0.01))
         ends = np.linspace(first, last, count + 1).round().astype(int)
         x = [data[name] for name in twin.columns.x]
-        rates = []
-        for column in x:
-            rates.append(records.rate(column, period))
+        rates = [records.rate(column, period) for column in x]
         varied = np.array([column.std() or 1.0 for column in (*x, *rates)])
         names = [*twin.columns.x]
         skipped = 0

@@ -357,10 +357,7 @@ class Rig:
 
         It repeats a trace by its law, from its start.
         """
-        traces = []
-        for record in many:
-            if isinstance(record, Trace):
-                traces.append(record)
+        traces = [record for record in many if isinstance(record, Trace)]
         if not traces:
             return self, [record for record in many if not isinstance(record, Trace)]
         law = traces[0].scenario.law

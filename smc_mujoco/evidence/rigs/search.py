@@ -165,9 +165,7 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
 
     Each piece chooses the best move of its own states.
     """
-    groups = []
-    for damping in DAMPINGS:
-        groups.append(_variants(replays, slopes, _moved(replays, slopes, damping)))
+    groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
     costs = replays.costs(list(itertools.chain(*groups)))
     reached = []
     for group, of_group in zip(groups, np.split(costs, len(groups)), strict=True):

@@ -218,8 +218,7 @@ def _try(library: sandbox.Library, about: "About") -> None:
     """Call a law in a separate process."""
     gains = []
     for gain in about.gains.values():
-        for i in range(max(1, about.joints)):
-            gains.append(gain_at(gain.default, i))
+        gains.extend(gain_at(gain.default, i) for i in range(max(1, about.joints)))
     fields = ARRAYS if about.joints else Measurement._fields
     trial = {"fields": fields, "gains": gains, "memory": about.memory}
     sandbox.load(library, trial | {"joints": about.joints, "modelled": about.modelled})

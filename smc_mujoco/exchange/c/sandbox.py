@@ -293,9 +293,9 @@ class Trial:
         M = [MASS_COUPLING] * (n * n)
         M[:: n + 1] = [1.0] * n
         known = {"M": M, "h": [0.0] * n, "g": [0.0] * n}
-        arrays = []
-        for name in self.fields:
-            arrays.append(known.get(name) or [channel.get(name, 0.0) for channel in seen])
+        arrays = [
+            known.get(name) or [channel.get(name, 0.0) for channel in seen] for name in self.fields
+        ]
         head = [seen[0][name] for name in ("t", "dt", "model")]
         return stored(head, self.requests, arrays)
 

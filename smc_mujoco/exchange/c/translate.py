@@ -287,9 +287,9 @@ class Program:
                 f"the constant {plain(name)}, which is not a one-dimensional array of numbers,",
             )
         of = {"i": "int", "f": "real"}[data.dtype.kind]
-        items = []
-        for number in data.tolist():
-            items.append(literal(number, self.single, ast.Constant(number)).text)
+        items = [
+            literal(number, self.single, ast.Constant(number)).text for number in data.tolist()
+        ]
         content = f"[{len(items)}] = {{\n{rows(items)}\n}};"
         if content not in self.constants:
             self.constants[content] = self.unique_name(name)
@@ -1129,9 +1129,7 @@ class Function:
         no = self.alone(self.number, node.orelse)
         if yes.kind.fields is None:
             return chosen(test, yes, no)._replace(sources=yes.sources | no.sources)
-        items = []
-        for pair in zip(yes.elements(), no.elements(), strict=True):
-            items.append(chosen(test, *pair))
+        items = [chosen(test, *pair) for pair in zip(yes.elements(), no.elements(), strict=True)]
         return gathered(items)
 
     def _tuple(self, node: ast.Tuple) -> Value:

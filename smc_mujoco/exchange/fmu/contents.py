@@ -147,8 +147,7 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     if exported.estimator:
         computed["v_estimated"] = "estimated velocity, rad/s or m/s"
     for name, words in computed.items():
-        for place in places:
-            listed.append(Variable(name + place, "SMC_COMPUTED", words))
+        listed.extend(Variable(name + place, "SMC_COMPUTED", words) for place in places)
     for i in range(exported.actuators):
         words = "command of an actuator, for u"
         listed.append(Variable(f"control[{i + 1}]", "SMC_COMPUTED", words))

@@ -34,8 +34,6 @@ def second_order(runs):
     traces = runs.traces(
         runs.scenario(plant, law, condition, control_period=period) for period in periods
     )
-    largest = []
-    for trace in traces:
-        largest.append(float(np.abs(trace.s[-int(END_SHARE * len(trace.s)) :]).max()))
+    largest = [float(np.abs(trace.s[-int(END_SHARE * len(trace.s)) :]).max()) for trace in traces]
     exponent = np.polyfit(np.log(periods), np.log(largest), 1)[0]
     return {"exponent": exponent, "largest |s|": dict(zip(map(str, periods), largest, strict=True))}
