@@ -149,7 +149,7 @@ def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0
     high = texts[max(values, key=size)]
     numbers = [math.inf if value is None else value for value in values]
     if low != high and differ(numbers, least, first_order(scenario)):
-        return Text(f"{low}{MARK} to {high}")
+        return Text(f"{low}{MARK} (..{high})")
     return FAILED if values[0] is None else Text(texts[values[0]])
 
 

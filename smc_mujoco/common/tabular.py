@@ -83,8 +83,10 @@ class Tabular:
         if self.title:
             yield Text(self.title, "bold")
         for part in _parts(list(map(_widest, columns)), options.max_width, self.left):
+            tall = any("\n" in cell.plain for i in part for cell in columns[i][1:])
             table = Table(
-                box=box.SIMPLE_HEAD,
+                box=box.HORIZONTALS if tall else box.SIMPLE_HEAD,  # a rule below each row of lines
+                show_lines=tall,
                 padding=0,
                 pad_edge=False,
                 show_edge=False,

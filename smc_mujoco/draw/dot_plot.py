@@ -154,7 +154,7 @@ def _key(
     """Return the entries of the legend, law by law, and where all gains come from if that is the
     same.
     """
-    known = sources(table)
+    known = sources(table, np.arange(len(table.column("law"))))
     key: list[Handle] = []
     line: Fields = {"lw": style.points(1.5)}
     gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])

@@ -81,7 +81,7 @@ def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
     assert MARK in lines[0]
     assert MARK not in lines[1]
     bound = smc.score(trace)["ultimate_bound"]
-    assert f"to {tables.number(1.5 * bound)}" in lines[0]
+    assert f"(..{tables.number(1.5 * bound)}" in lines[0]
     assert "half the physics step" in str(table.caption)
 
 
@@ -126,7 +126,7 @@ def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
         cells(table),
         cells(*tables.answers(["tv_rate"], {"nominal": runs}, {"nominal": again})),
     ):
-        assert [f"{shown}{MARK} to failed" in row for row in said] == [True, True, False]
+        assert [f"{shown}{MARK} (..failed)" in row for row in said] == [True, True, False]
         assert "failed" in said[2]
 
 
