@@ -53,7 +53,7 @@ C_TYPES = {
 }
 MAGIC = 7263.0  # the first number of this package's userdata: chosen
 PROBE_MODEL = """<mujoco><size nuserdata="12345" nuser_actuator="1" nuser_body="1"/>
-  <worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
+  <worldbody><body><joint name="j" frictionloss="1"/><geom size="1"/></body></worldbody>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
 
 OF_MODEL = (
@@ -123,7 +123,9 @@ def checked_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
 def offsets() -> Offsets:
     """Return the offsets, checked with a small model."""
     model = mujoco.MjModel.from_xml_string(PROBE_MODEL)
-    return checked_offsets(model, mujoco.MjData(model))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)  # which has the arrays of constraints
+    return checked_offsets(model, data)
 
 
 @functools.cache
@@ -157,6 +159,8 @@ def callback():
             pointer(integers(data + at.qfrc_passive)[0]),
             pointer(integers(data + at.qfrc_actuator)[0]),
             pointer(integers(data + at.qLDiagInv)[0]),
+            pointer(integers(data + at.efc_frictionloss)[0]),
+            pointer(integers(data + at.efc_aref)[0]),
             pointer(integers(model + at.dof_frictionloss)[0]),
             integers(model + at.actuator_user)[0],
             integers(model + at.body_user)[0],

@@ -51,7 +51,12 @@ from smc_mujoco.simulation.state import INSTANT, simulation_at
 SERIES = floats(("address", "count"))  # of a series' points; they follow its parameters
 instant_at, seen_at, series_at = map(record_at, (INSTANT, SEEN, SERIES))
 # Functions of a part on one joint, with what they read and how many numbers they return.
-OF_JOINTS = {"force": (JointState, 1), "stage_force": (JointState, 2), "read": (Sight, 2)}
+OF_JOINTS = {
+    "force": (JointState, 1),
+    "brake": (JointState, 3),
+    "stage_force": (JointState, 2),
+    "read": (Sight, 2),
+}
 
 
 @functools.cache

@@ -60,7 +60,7 @@ Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis
     actuator_force qfrc_constraint qfrc_bias qfrc_spring qfrc_passive qfrc_actuator qLDiagInv
-    dof_frictionloss actuator_user body_user""",
+    efc_frictionloss efc_aref dof_frictionloss actuator_user body_user""",
 )
 
 
@@ -599,8 +599,6 @@ def _zero_inputs(sim, data):
         _zero_disturbance(data, channel)
         if channel.ctrl >= 0:
             data.ctrl[channel.ctrl] = 0.0
-        if channel.friction_ctrl >= 0:
-            data.ctrl[channel.friction_ctrl] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
@@ -792,10 +790,14 @@ def _exert(address, sim, data, part):
     y.u = state.delayed
     y.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
     y.load += data.qfrc_constraint[joint] + pushed
+    held = data.qfrc_constraint[joint]
     if (
         channel.shaft >= 0 and channel.shaft != joint
     ):  # the stops of a play pass on the drive's force
         y.load += data.qfrc_constraint[channel.shaft]
+        held += data.qfrc_constraint[channel.shaft]
+    if part.row >= 0:  # without what dry friction took of the constraints' force
+        y.load -= min(max(held, -state.level), state.level)
     y.motor = 0.0
     weight = 1.0
     if part.staged != 0:
@@ -815,6 +817,13 @@ def _exert(address, sim, data, part):
         return 1
     if sim.stage == 0 and not abs(out.force) < MAX_CONTROL:
         return 1
+    if part.row >= 0:
+        state.level = data.dof_frictionloss[joint] + out.held
+        if not state.level < MAX_CONTROL:
+            return 1
+        if place(data.efc_frictionloss) != 0:  # MuJoCo has had room for its constraints
+            data.efc_frictionloss[part.row] = state.level
+            data.efc_aref[part.row] -= out.away / (sim.step * sim.step)
     if part.ctrl >= 0:
         data.ctrl[part.ctrl] = out.force
         return 0

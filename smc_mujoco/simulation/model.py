@@ -191,8 +191,6 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         }
     if friction >= 0:
         indices["friction_force"] = model.actuator_outadr[friction]
-        if model.actuator_ctrlnum[friction] > 0:  # by a formula
-            indices["friction_ctrl"] = model.actuator_ctrladr[friction]
     if direct:
         indices["qfrc"] = model.jnt_dofadr[joint]
     if hinge:

@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
@@ -501,17 +502,26 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
         numbers = [buffer.put(row) for row in part.numbers(run)]
         memories = [buffer.put(row) for row in part.start(run)]
         compiled = buffer.part(part, kind)
+        frictions = _frictions(run.load()) if kind == "brake" else []
         for place, i in enumerate(part.channels(s.plant)):
             ctrl = -1
             if kind == "force" and part.is_drive:
                 ctrl = channels["ctrl"][i]
-            elif kind == "force" and part.brakes:
-                ctrl = channels["friction_ctrl"][i]
             function = {"address": compiled.address, "memory": memories[place]}
             function["parameters"] = numbers[place if len(numbers) > 1 else 0]
-            row = {"function": function, "channel": i, "ctrl": ctrl}
+            row = {"function": function, "channel": i, "ctrl": ctrl, "row": -1}
+            if frictions and run.dofs[place] in frictions:
+                row["row"] = frictions.index(run.dofs[place])
             rows.append(row | {"acts": kind == "act", "staged": kind == "stage_force"})
     return rows
+
+
+def _frictions(model: mujoco.MjModel) -> list[int]:
+    """Return the degree of freedom of each row of constraints that is its dry friction, else -1."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    dry = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+    return np.where(dry, data.efc_id, -1).tolist()
 
 
 def _drives(s: Resolved) -> list[dict[str, Any]]:

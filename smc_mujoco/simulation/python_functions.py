@@ -404,7 +404,7 @@ def of_part(part: Part, kind: str) -> PythonFunction:
         if kind == "force":
             values = as_floats(name, [out], "a force", 1)
         else:
-            values = as_floats(name, out, "two numbers", 2)
+            values = as_floats(name, out, "numbers", 3 if kind == "brake" else 2)
         if kind == "force" and not math.isfinite(values[0]):
             raise Failure(f"{name} returned {values[0]:g}", channel=0)
         return values

@@ -376,7 +376,7 @@ class Scenario:
 
         It knows all other forces on joints that move alone: behind lags and rate limits, and for
         friction by a formula also behind a DC motor without cogging and ripple. In other scenarios
-        Coulomb friction is MuJoCo's, and joints with a formula stick by bristles.
+        Coulomb friction is MuJoCo's, and so is what holds joints with a formula.
         """
         return bool(self.exact_parts)
 
@@ -404,7 +404,7 @@ class Scenario:
     @functools.cached_property
     def acting(self) -> tuple[tuple[Part, str], ...]:
         """The parts that the callback simulates, in the order in which they act, with what they do:
-        "act", "force" or "stage_force", see hardware/moments.py.
+        "act", "force", "brake" or "stage_force", see hardware/moments.py.
         """
         drives: list[Part] = [Rotors()] if flies(self.plant) else []
         s = self.resolved
@@ -416,8 +416,11 @@ class Scenario:
             elif part.force is not None:
                 acting.append((part, "force"))
         for part in self.friction:
-            if part.force is not None and part not in self.exact_parts:
-                acting.append((part, "force"))
+            if part in self.exact_parts:
+                continue
+            for kind in ("force", "brake"):
+                if getattr(part, kind) is not None:
+                    acting.append((part, kind))
         return (*acting, *((part, "stage_force") for part in self.exact_parts))
 
     @functools.cached_property

@@ -41,7 +41,7 @@ MODEL = floats(("f", "g"))
 SIGHT = floats(Sight._fields)
 RAW = floats(("x", "v"))
 JOINT_STATE = floats(JointState._fields)
-EXERTED = floats(("force", "held"))
+EXERTED = floats(("force", "held", "away"))
 
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
 # and of its arrays.

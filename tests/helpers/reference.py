@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, drive_ste
 from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.moments import torque
 from smc_mujoco.mechanisms.hardware.part import joint_names
-from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding, bristle
+from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
@@ -142,7 +142,6 @@ class Loop:
         self.middle, self.rise = np.zeros((2, n))
         names = joint_names(scenario.plant)
         self.formulas: list[Sliding | None] = [None] * n
-        self.bristles = [(0.0, 0.0, 0.0)] * n
         self.numbers: list[tuple] = [()] * n
         for formula in self.scenario.friction:
             if not isinstance(formula, Sliding):
@@ -151,11 +150,10 @@ class Loop:
             for place, joint in enumerate(formula.joint_names(scenario.plant)):
                 i = names.index(joint)
                 self.formulas[i] = formula
-                self.bristles[i] = bristle(self.model, int(self.channels["qvel"][i]))
                 self.numbers[i] = record(*(formula.parameters(place) or [0.0]))
-        self.stuck_at = [math.nan] * n  # positions of joints that stick, or NaN
         self.speed = [0.0] * n  # at the step before
-        self.slid = [0.0] * n  # and the force of the friction
+        self.stuck_at = [math.nan] * n
+        self.level = [0.0] * n  # of MuJoCo's dry friction, in the step before
         # of dry friction, see `apply_exact_friction`: None while a formula gives it at every stage
         self.rubbing: list[tuple | None] = [None] * n
         self.stuck = [False] * n
@@ -451,37 +449,45 @@ class Loop:
         for i, dof in enumerate(at["qvel"]):
             if self.formulas[i] is None:
                 continue
-            x = float(data.qpos[at["qpos"][i]])
             v = float(data.qvel[dof])
             if self.has_drive[i]:
                 motor = float(data.actuator_force[at["force"][i]])
             else:
                 motor = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
-            load += float(data.qfrc_constraint[dof] + d[i])
+            held = float(data.qfrc_constraint[dof])
+            load += held + d[i]
             if (shaft := at["shaft"][i]) not in (-1, dof):
                 load += data.qfrc_constraint[shaft]
+                held += data.qfrc_constraint[shaft]
+            load -= min(max(held, -self.level[i]), self.level[i])
             friction, low, high = self.evaluate(i, v, motor, load)
-            stuck = not math.isnan(self.stuck_at[i])
-            before = self.speed[i]
-            slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
-            stiffness, damping, inertia = self.bristles[i]
-            if not stuck and (slows or v * before < 0.0):
-                stuck = True
-                self.stuck_at[i] = x
-                if before != 0.0:
-                    needed = (
-                        self.slid[i] + inertia * (v - before) / self.scenario.resolved.physics_step
-                    )
-                    self.stuck_at[i] -= min(max(needed, low), high) / stiffness
-            if stuck:
-                spring = stiffness * (x - self.stuck_at[i])
-                if low < high and low <= spring <= high:
-                    friction = min(max(spring + damping * v, low), high)
-                else:
-                    self.stuck_at[i] = math.nan
-            self.speed[i], self.slid[i] = v, friction
-            data.ctrl[at["friction_ctrl"][i]] = -friction
+            slow = abs(v) < STICKING_SPEED or v * self.speed[i] < 0.0
+            self.speed[i] = v
+            force = 0.0
+            level = abs(friction)
+            away = 0.0
+            if low >= high:
+                force = -friction
+                level = 0.0
+            elif not slow:
+                self.stuck_at[i] = math.nan
+            else:
+                x = float(data.qpos[at["qpos"][i]])
+                if math.isnan(self.stuck_at[i]):
+                    self.stuck_at[i] = x
+                away = x - self.stuck_at[i]
+                force = -0.5 * (low + high)
+                level = 0.5 * (high - low)
+            self.level[i] = float(self.model.dof_frictionloss[dof]) + level
+            row = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF) & (
+                data.efc_id == dof
+            )
+            data.efc_frictionloss[row] = self.level[i]
+            h = self.scenario.resolved.physics_step
+            data.efc_aref[row] -= away / (h * h)
+            data.qfrc_applied[dof] = force + (d[i] if self.scenario.plant.direct else 0.0)
+            self.forces[1, i] += force
 
     def apply_exact_friction(self, data: mujoco.MjData, d: np.ndarray, stage: int) -> None:
         """Give the joints their dry friction at a stage of RK4, by its formula or by its moments in

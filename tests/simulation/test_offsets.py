@@ -38,8 +38,11 @@ def nothing_left_behind():
 
 @pytest.fixture
 def live():
-    model = smc.plant("quadrotor").load(nuserdata=17)  # none of the arrays is empty
-    return model, mujoco.MjData(model)
+    # none of the arrays is empty
+    model = mujoco.MjModel.from_xml_string(callback.PROBE_MODEL.replace("12345", "17"))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
 
 
 def doctored(monkeypatch, name, change):

@@ -5,7 +5,7 @@ A callback is a stage of a physics step. At each, in this order:
     stage 0: the sums of the step before; at a sample the readings (`read`), law and delay buffer;
       the command whose delay has passed arrives
     every stage: disturbances, and what a part makes of the wind (`push`); at a sample, the log
-    every stage: the parts act, actuators in their order, then frictions: `act`, `force` or
+    every stage: the parts act, actuators in their order, then frictions: `act`, `force`, `brake` or
       `stage_force`
 
 A part acts by compiled functions:
@@ -13,6 +13,8 @@ A part acts by compiled functions:
     force(y, p, memory) -> force on one joint, N m (N), once a physics step, and held over it
     stage_force(y, p, memory) -> the force on one joint at a stage of RK4, and for how many s it
       holds the joint at rest in this step
+    brake(y, p, memory) -> a force, as above, the level of MuJoCo's dry friction on the joint, and
+      how far the joint is from where that holds it, rad (m)
     read(y, p, memory) -> position and velocity that a sensor gives for a Sight
     act(sim, data, part), push(sim, data, part) -> nothing, once a stage
 
@@ -44,8 +46,7 @@ from smc_mujoco.common.jit import floats, record_at
 # horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of
 # the world, 0 or 1
 #   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
-# friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the
-# callback computes it
+# friction_force: of a friction's actuator, in actuator_force
 #   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
 #   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
 #   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
@@ -67,7 +68,6 @@ CHANNEL = np.dtype(
             "hinge_body",
             "anchor",
             "friction_force",
-            "friction_ctrl",
             "qfrc",
             "shaft_qpos",
             "turn",
@@ -82,7 +82,8 @@ CHANNEL = np.dtype(
 #   middle: the force of a drive in the middle of a step of RK4, if the drive sums its force itself
 #   exerted: what frictions exert on the joint at this stage
 #   held: s of a control period for which friction held the joint
-CHANNEL_STATE = floats(("delayed", "force", "reaction", "middle", "exerted", "held"))
+#   level: of MuJoCo's dry friction in the step before, as a part set it
+CHANNEL_STATE = floats(("delayed", "force", "reaction", "middle", "exerted", "held", "level"))
 
 
 class Torque(NamedTuple):
@@ -119,7 +120,8 @@ FUNCTION = np.dtype(
 # The sensor of a channel: its function, 0 without one; s between readings, and until one arrives.
 READER = np.dtype([("function", FUNCTION), ("period", "f8"), ("delay", "f8")], align=True)
 # What a part does on one joint, or as a whole (channel -1): its function, whether this is `act`,
-# whether a force is of every stage, and where in ctrl a force goes (-1: to qfrc_applied).
+# whether a force is of every stage, where in ctrl a force goes (-1: to qfrc_applied), and which
+# row of constraints is the joint's dry friction (-1: none).
 PART = np.dtype(
     [
         ("function", FUNCTION),
@@ -127,6 +129,7 @@ PART = np.dtype(
         ("acts", "i8"),
         ("staged", "i8"),
         ("ctrl", "i8"),
+        ("row", "i8"),
     ],
     align=True,
 )

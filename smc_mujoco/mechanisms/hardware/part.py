@@ -60,6 +60,7 @@ class Part:
 
     force: ClassVar[Callable[..., float] | None] = None
     stage_force: ClassVar[Callable[..., tuple[float, float]] | None] = None
+    brake: ClassVar[Callable[..., tuple[float, float, float]] | None] = None
     act: ClassVar[Callable[..., None] | None] = None
     push: ClassVar[Callable[..., None] | None] = None
     read: ClassVar[Callable[..., tuple[float, float]] | None] = None
@@ -68,7 +69,6 @@ class Part:
     memory: ClassVar[int] = 0  # numbers that it keeps for each joint
     is_drive: ClassVar[bool] = False  # whether its function gives the force of the drive
     sums_force: ClassVar[bool] = False  # whether it then adds it to the sum of a channel's state
-    brakes: ClassVar[bool] = False  # whether its force is the control of an actuator `passive:`
 
     def __post_init__(self) -> None:
         constrain(self)
@@ -119,7 +119,7 @@ class OnJoints(Part):
         words = [f"{name}={value!r}" for name, value in stated(self).items()]
         return f"{type(self).__name__}({', '.join(words)})"
 
-    def structure(self) -> Hashable:
+    def structure(self) -> tuple[Hashable, ...]:
         return type(self), self.on
 
     def channels(self, plant: Plant) -> Sequence[int]:
@@ -136,8 +136,8 @@ class OnJoints(Part):
 class Friction(OnJoints):
     """Base of frictions, which resist a joint's motion beside the plant's own damping."""
 
-    # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most
-    # one friction may.
+    # Whether it holds a joint at rest by bristles or by MuJoCo's dry friction, which RK4 would not
+    # make more accurate. At most one friction may.
     bristles: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to

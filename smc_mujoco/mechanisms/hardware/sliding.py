@@ -11,29 +11,13 @@ step in which it stops, rests or turns back the moments of `friction.dry_step`. 
 falls below STICKING_SPEED is stopped by the bound of the force that holds it at rest. See
 `Scenario.exact_friction`.
 
-On all others:
+On all others the force is the level of MuJoCo's dry friction, whose solver finds which joints stop
+or rest, all together, as it does for Coulomb friction. A joint whose speed changes sign, or is
+below STICKING_SPEED, is held within the bounds. It is brought back to where it came to rest, so it
+does not creep.
 
-    slides:  friction = -F(v, motor, load)
-    sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high),
-             like a LuGre bristle that does not slip
-
-A joint sticks when its speed changes sign or is small. x_s is then such that the spring ends the
-acceleration of the step before, within the bounds: the joint rests where it stops. For a joint at
-rest from the start of a run, x_s is its position. It slides again when stiffness (x - x_s) leaves
-the bounds. So a stuck joint does not creep, because its friction depends on its position. Under a
-new load it turns by load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower
-if other joints move with it.
-
-A joint that slides keeps sliding at the speed at which F equals the load.
-
-Limit: bristles are critically damped for each joint alone. Stuck joints that move together have
-less damping. A sudden load makes them overshoot, and may tear a joint loose below the limit that
-holds it at rest. Rigid dry friction would hold. With M at the pose and D the inertias that
-`bristle` gets, a mode of M w = L D w has the damping L^-1/2. On the Panda in its ready pose L is up
-to 13, so a sudden load in that mode tears a joint loose from 71 % of its limit on. A load that
-rises within 0.5 s does not, up to 97 %.
-
-The bristles' friction is the control of an actuator `passive:<joint>`, held over each physics step.
+Limit: the force of limits and contacts at a joint counts in its load only as far as friction cannot
+be what exerted it.
 """
 
 # pyright: reportIncompatibleVariableOverride=false
@@ -41,45 +25,45 @@ The bristles' friction is the control of an actuator `passive:<joint>`, held ove
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Iterator
 from typing import Annotated, Any
 
 import mujoco
+import numpy as np
 from numba import njit
 
 from smc_mujoco.common.constraints import Each, Number
-from smc_mujoco.mechanisms.hardware.friction import HIGH, RISE, at_stage, begin_step, with_rise
+from smc_mujoco.mechanisms.hardware.friction import (
+    HIGH,
+    RISE,
+    Coulomb,
+    at_stage,
+    begin_step,
+    with_rise,
+)
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce, PerJoint
-from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, Actuator
-from smc_mujoco.mechanisms.plant import MAX_PARAMETER
+from smc_mujoco.mechanisms.hardware.part import Actuator
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
-# rad/s, natural, of a stuck joint, critically damped: chosen, two steps of 1 ms resolve it
-BRISTLE_FREQUENCY = 200.0
 MAX_EXPONENT = 700.0  # exp of more overflows
 
 NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETER))]
 PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
 
-# What a joint keeps: of bristles whether it sticks, where they are unbent, speed and force at the
-# step before; at stages of RK4 the same speed, whether it was held, and whether it slides.
-STUCK, STUCK_AT, SPEED, FORCE = range(4)
+# What a joint keeps: its speed at the step before, whether it is stuck and where; at stages of RK4
+# the same speed, whether it was held, and whether it slides.
+SPEED, STUCK, STUCK_AT = range(3)
 STAGE_SPEED, WAS_HELD, SLIDES = range(HIGH + 1, HIGH + 4)
+TINY = 1e-14  # N m (N): a level with which MuJoCo has a constraint
 
 
 @dataclasses.dataclass(frozen=True)
 class Sliding(JointForce):
     """Base of frictions by a formula."""
 
-    bristles = True  # of joints that do not move alone
-    brakes = True
+    bristles = True
     memory = SLIDES + 1
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The fields, which the formula reads as p, and the numbers of the bristles."""
-        return (*self.per_joint, "bristle_stiffness", "bristle_damping", "bristle_inertia")
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
@@ -93,18 +77,14 @@ class Sliding(JointForce):
         raise NotImplementedError
 
     @property
-    def force(self) -> Callable:
-        """The friction that is held over a step."""
-        return _by_bristles(type(self).value)
+    def brake(self) -> Callable:
+        """The friction that MuJoCo holds over a step."""
+        return _brake(type(self).value)
 
     @property
     def stage_force(self) -> Callable:
         """The friction at a stage of RK4."""
         return _at_stages(type(self).value)
-
-    def numbers(self, run: Run) -> list[Sequence[float]]:
-        model = run.model
-        return [(*self.parameters(i), *bristle(model, dof)) for i, dof in enumerate(run.dofs)]
 
     @property
     def exact(self) -> "Sliding":
@@ -114,49 +94,45 @@ class Sliding(JointForce):
         """Return whether it knows the force of a drive within a step."""
         return actuator.in_callback or actuator.even
 
+    @property
+    def zero(self) -> bool:
+        """Whether all its fields that are forces are 0."""
+        forces = [getattr(self, name) for name in self.forces]
+        return bool(forces) and not any(np.any(force or 0.0) for force in forces)
+
+    def structure(self) -> tuple[Hashable, ...]:
+        return *super().structure(), self.zero
+
     def edit(self, spec: mujoco.MjSpec) -> None:
-        for joint in self.joints(spec):
-            brake = spec.add_actuator(
-                name=PASSIVE + joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
-            )
-            brake.set_to_motor()
+        if not self.zero:  # the callback writes levels of constraints, of which islands are copies
+            spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND.value
 
-
-def bristle(model: mujoco.MjModel, dof: int) -> tuple[float, float, float]:
-    """Return stiffness and critical damping of a degree of freedom that sticks, and the inertia
-    that a force on it moves, kg m^2 (kg), all in qpos0.
-    """
-    inertia = model.dof_M0[dof]
-    stiffness = inertia * BRISTLE_FREQUENCY**2
-    return stiffness, 2.0 * math.sqrt(stiffness * inertia), 1.0 / model.dof_invweight0[dof]
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        if not self.zero:
+            yield from Coulomb(TINY, on=self.on).fields(model)
 
 
 @functools.cache
-def _by_bristles(formula: Callable) -> Callable:
-    """Return the force on a joint that slides by a formula, or sticks by a bristle."""
+def _brake(formula: Callable) -> Callable:
+    """Return the force on a joint that slides by a formula, the level of its dry friction, and
+    how far it is from where it came to rest.
+    """
     formula = njit(formula)
 
-    def force(y, p, memory):
+    def brake(y, p, memory):
         f, low, high = formula(y.v, y.motor, y.load, p)
-        stuck = memory[STUCK]
-        if stuck == 0.0:
-            slows = abs(y.v) < STICKING_SPEED and abs(y.v) <= abs(memory[SPEED])
-            if slows or y.v * memory[SPEED] < 0.0:
-                stuck = 1.0
-                memory[STUCK_AT] = y.x
-                if memory[SPEED] != 0.0:  # it stops, else it is at rest from the start
-                    load = memory[FORCE] + p.bristle_inertia * (y.v - memory[SPEED]) / y.h
-                    memory[STUCK_AT] -= min(max(load, low), high) / p.bristle_stiffness
-        if stuck != 0.0:
-            spring = p.bristle_stiffness * (y.x - memory[STUCK_AT])
-            if low <= spring <= high and low < high:
-                f = min(max(spring + p.bristle_damping * y.v, low), high)
-            else:
-                stuck = 0.0
-        memory[STUCK], memory[SPEED], memory[FORCE] = stuck, y.v, f
-        return -f
+        slow = abs(y.v) < STICKING_SPEED or y.v * memory[SPEED] < 0.0
+        memory[SPEED] = y.v
+        if not low < high:  # nothing holds it
+            return -f, 0.0, 0.0
+        if not slow:
+            memory[STUCK] = 0.0
+            return 0.0, abs(f), 0.0
+        if memory[STUCK] == 0.0:
+            memory[STUCK], memory[STUCK_AT] = 1.0, y.x
+        return -0.5 * (low + high), 0.5 * (high - low), y.x - memory[STUCK_AT]
 
-    return force
+    return brake
 
 
 @functools.cache

@@ -15,6 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.control.units import Gain
 from smc_mujoco.mechanisms.hardware.servos import SERVOS
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.mechanisms.plants.double_pendulum import accelerations
 
 # Gaz et al. 2019, table of the Panda's friction: N m, s/rad, rad/s
 P1 = np.array([0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489])
@@ -137,29 +138,19 @@ def pulls(y, gains, memory):
     return gains.torque * min(y.t / gains.rise, 1.0), y.e
 
 
-def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
-    """A limit of the bristles: rigid dry friction would hold any load below its limits, however
-    suddenly it comes.
-
-    The load is that mode of M w = L D w, with D the inertias of the bristles, which has the largest
-    L. In it the bristles bend by 1 + exp(-pi z / sqrt(1 - z^2)) times the load, z = L^-1/2.
+@pytest.mark.parametrize("rise", [1e-9, 0.5])
+def test_joints_that_move_together_hold_a_load_below_their_limits_however_sudden(rise):
+    """The load is that mode of M w = L D w, with D the joints' own inertias, which has the largest
+    L: bristles on each joint of its own give way to it by 1.4 times the load.
     """
     panda = smc.plant("panda", grav=0.0)
     M = panda.nominal.dynamics(np.array(panda.rest), np.zeros(7), panda.values({})).M
     roots = np.sqrt(panda.load().dof_M0[:7])
-    largest, modes = np.linalg.eigh(M / np.outer(roots, roots))
-    damping = largest[-1] ** -0.5
-    overshoot = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
-    assert overshoot == pytest.approx(1.41, abs=0.01)
-    load = roots * modes[:, -1]
+    load = roots * np.linalg.eigh(M / np.outer(roots, roots))[1][:, -1]
     holds = np.array([limits(i)[int(one > 0.0)] for i, one in enumerate(load)])
     load = load / (load / holds).max()  # one joint is at its limit
     runs = []
-    for share, rise in (
-        (0.96 / overshoot, 1e-9),
-        (1.04 / overshoot, 1e-9),
-        (0.97, 0.5),
-    ):
+    for share in (0.97, 1.03):
         runs.append(
             weightless(
                 law=pulls(torque=share * load, rise=rise),
@@ -168,8 +159,8 @@ def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
                 duration=1.0,
             )
         )
-    held, torn, slow = (np.abs(trace.v[-1]).max() for trace in smc.run(runs))
-    assert max(held, slow) < 1e-6
+    held, torn = (np.abs(trace.v[-1]).max() for trace in smc.run(runs))
+    assert held < 1e-6
     assert torn > 0.01
 
 
@@ -218,21 +209,6 @@ def test_a_joint_at_rest_stays_and_one_torn_loose_slides():
     assert sigmoid(v[-1], P1[0], P2[0], P3[0]) == pytest.approx(-0.15, rel=1e-3)
 
 
-def test_stuck_joints_are_critically_damped():
-    load = 0.1
-    part = smc.hardware.Sigmoid(P1[0], P2[0], P3[0])
-    fields = {
-        "disturbance": smc.Constant(load),
-        "integrator": "implicitfast",
-        "duration": 0.4,
-        "control_period": 5e-4,
-    }
-    trace = flywheel(0.1, 0.0, friction=part, **fields)
-    expected = load / (0.1 * 200.0**2)
-    assert trace.x[-1, 0] == pytest.approx(expected, rel=1e-6)
-    assert trace.x.max() <= expected * (1 + 1e-9)
-
-
 # load, kg, gains of the loop, and friction, N: the load swings near the limit that holds the trolley
 @pytest.mark.parametrize(
     ("load", "kp", "kd", "level"),
@@ -248,8 +224,73 @@ def test_a_joint_that_moves_with_others_rests_where_mujocos_set_valued_friction_
         on = {"slide": part}
         runs.append(smc.Scenario(plant=crane, law=law, friction=on, x0=(0.3, 0.0), duration=8.0))
     ours, theirs = smc.run(runs)
-    gives_way = level / ((1.0 + load) * 200.0**2)  # m, a bristle at its limit
-    assert np.abs(ours.x - theirs.x)[4000:, 0].max() < 4.0 * gives_way
+    # m; MuJoCo's creeps
+    assert np.abs(ours.x - theirs.x)[4000:, 0].max() < 2e-6
+
+
+def by_tiny_steps(values, numbers, start, kp, kd, seconds):
+    """Angles at the end of a run of a double pendulum under a PD law with a period of 1 ms: steps
+    of 20 us, at the end of each of which the friction of both joints is in its set.
+    """
+    h = 2e-5
+    x = np.array(start)
+    v = np.zeros(2)
+    u = np.zeros(2)
+    P = np.zeros(2)
+    for j in range(round(seconds / h)):
+        if j % 50 == 0:
+            u = np.clip(-kp * x - kd * v, -6.0, 6.0)
+        a1, a2, W11, W12, W22 = accelerations(*x, *v, *values)
+        W = np.array([[W11, W12], [W12, W22]])
+        levels = []
+        for speed, one in zip(v, numbers, strict=True):
+            f, low, _ = Stribeck.value(float(speed), 0.0, 0.0, one)
+            levels.append(abs(f) if abs(speed) > 1e-9 else -low)
+        new = v + h * (np.array([a1, a2]) + W @ u)
+        for _ in range(100):
+            before = P.copy()
+            for i in range(2):
+                P[i] -= (new[i] + W[i] @ P) / W[i, i]
+                P[i] = min(max(P[i], -h * levels[i]), h * levels[i])
+            if np.abs(P - before).max() < 1e-15:
+                break
+        new = new + W @ P
+        x = x + 0.5 * h * (v + new)
+        v = new
+    return x
+
+
+@dataclasses.dataclass(frozen=True)
+class Stribeck(Sliding):
+    """Friction that is larger at rest."""
+
+    c: float | tuple[float, ...] = 0.1
+    static: float | tuple[float, ...] = 0.2
+
+    @staticmethod
+    def value(v, motor, load, p):
+        dry = p.c + (p.static - p.c) * math.exp(-((v / 0.1) ** 2))
+        return math.copysign(dry, v), -p.static, p.static
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_joints_that_move_together_rest_where_a_set_valued_integration_does(seed):
+    random = np.random.default_rng(seed)
+    plant = smc.plant("double_pendulum")
+    kp, kd = random.uniform(8.0, 20.0), random.uniform(1.0, 1.5)
+    c = random.uniform(0.1, 0.4, 2)
+    static = c * random.uniform(1.0, 1.4, 2)
+    part = Stribeck(tuple(c), tuple(static))
+    start = random.uniform(-0.5, 0.5, 2)
+    law = smc.law_from(np.hstack([kp * np.eye(2), kd * np.eye(2)]), name="pd")
+    run = smc.Scenario(plant=plant, law=law, friction=part, x0=tuple(start), duration=2.0)
+    trace = smc.run(run)
+    values = [v for name, v in plant.parameters.items() if not name.startswith("cf")]
+    numbers = [SimpleNamespace(c=c[i], static=static[i]) for i in range(2)]
+    truth = by_tiny_steps(values, numbers, start, kp, kd, 2.0)
+    assert np.abs(trace.v[-1]).max() < 1e-5
+    np.testing.assert_allclose(trace.x[-1], truth, rtol=0.02, atol=2e-5)
 
 
 # both loops, threads, numbers of a simulation's own
