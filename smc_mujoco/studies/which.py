@@ -114,8 +114,8 @@ class Advice(Tables):
         notes = [*last.notes, ""]
         if self.left_out:
             notes.append(
-                f"Left out after one search and {FEW} runs in each condition: "
-                f"{', '.join(self.left_out)}"
+                f"Left out after one search and {FEW} runs in each condition, though the best may "
+                f"be among them: {', '.join(self.left_out)}"
             )
         return [*others, dataclasses.replace(last, notes=notes + self.answer)]
 
