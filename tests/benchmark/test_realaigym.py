@@ -5,7 +5,6 @@ Numbers without a formula are those of the published code, run unchanged on 2026
 dfki-ric-underactuated-lab/double_pendulum, commit 1e8544e).
 """
 
-import dataclasses
 import math
 import re
 from types import SimpleNamespace
@@ -15,12 +14,11 @@ import numpy as np
 import pytest
 import realaigym as boards
 from helpers.pages import ROOT
-from realaigym import entries, global_policy, simulator, swing_ups
+from realaigym import global_policy, swing_ups
 from realaigym.scoring import VERSIONS
-from realaigym.simulator import Case, Machine, stepped
+from realaigym.simulator import Case, Machine
 
 import smc_mujoco as smc
-from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
 # channels of shoulder and elbow
@@ -35,8 +33,6 @@ DRAWN = {  # seed -> first times of resets, and goals
     777: ((4.0065, 6.5967, 10.3490, 15.6826, 18.9549),
           ((-2.18237812, -1.24183005), (2.10646, 2.6829), (-1.45013, 0.90496))),
 }  # fmt: skip
-# Three standard deviations of a row whose gains differ in their 13th digit.
-CHAOS = 0.08
 STATES = {  # seed -> time, s -> state under u = 0
     333: {
         4.2: (0.069803, 0.853357, 1.722369, 2.993765),
@@ -82,12 +78,6 @@ def test_published_criteria_give_their_published_score(robot, version):
         assert boards.score(row, version) == pytest.approx(row.score, abs=0.0023), row.name
 
 
-@ROBOTS
-def test_a_published_score_of_robustness_is_the_mean_of_its_tests(robot):
-    for row in boards.ROBUSTNESS[robot]:
-        assert np.mean(row[1:-1]) / 100.0 == pytest.approx(row.score, abs=0.0011), row.name
-
-
 def of_arrays(t, q, v, u, robot):
     """Criteria of a motion of shoulder and elbow."""
     scenario = smc.Scenario(plant=robot, law="none")
@@ -118,13 +108,6 @@ def test_criteria_of_a_motion_are_those_of_its_formula():
     assert not of_arrays(t, q, v, u, "acrobot").success
 
 
-def test_a_run_that_stays_down_or_diverges_scores_nothing():
-    down = dataclasses.replace(boards.on_board("acrobot", "none"), duration=0.1)
-    fast = smc.run(dataclasses.replace(down, v0=99e4))
-    assert fast.failure
-    assert boards.score(smc.run(down)) == boards.score(fast, "v1") == 0.0
-
-
 @pytest.mark.slow
 @ROBOTS
 def test_the_published_simulator_is_mujocos(robot, traces):
@@ -133,15 +116,6 @@ def test_the_published_simulator_is_mujocos(robot, traces):
     np.testing.assert_allclose(states[:, :2], traces[robot].x[:, order], atol=1e-8)
     np.testing.assert_allclose(states[:, 2:], traces[robot].v[:, order], atol=1e-7)
     np.testing.assert_allclose(torque, traces[robot].u[:-1, 0], atol=1e-7)
-
-
-@pytest.mark.parametrize("k", range(4))
-def test_upright_is_within_the_published_bounds_after_any_turns(k):
-    bound = np.array([0.35, 0.35, 1.0, 1.0])[k] * np.eye(4)[k]
-    top = np.array([3.0 * math.pi, -4.0 * math.pi, 0.0, 0.0])
-    for sign in (1.0, -1.0):
-        assert simulator.upright(top + sign * 0.999 * bound)
-        assert not simulator.upright(top + sign * 1.001 * bound)
 
 
 # the board of 2025
@@ -183,25 +157,6 @@ def test_a_minute_is_that_of_the_published_simulator(seed):
     assert first[:, 1] == pytest.approx(6.0 if seed == 333 else -6.0)
 
 
-@pytest.mark.parametrize(
-    ("model", "end", "digits"),
-    [
-        (MODEL_1_1, (-0.529998, -0.408896, -4.793177, 1.031446), (6, 6, 6, 6)),
-        (MODEL_1_0, (-0.423207, -0.165304, -1.811, -1.129962), (6, 6, 3, 6)),
-    ],
-)
-def test_a_free_swing_ends_where_the_published_one_does(model, end, digits):
-    # of cf arctan(100 q')
-    published = model | {name: model[name] * 2.0 / math.pi for name in ("cf1", "cf2")}
-    x = (1.0, 0.5, 0.0, 0.0)
-    for _ in range(1000):
-        x = stepped(x, 0.0, 0.0, tuple(published.values()))
-    rounded = []
-    for value, places in zip(x, digits, strict=True):
-        rounded.append(round(value, places))
-    assert rounded == pytest.approx(end, abs=2e-6)
-
-
 @ROBOTS
 def test_the_linear_law_is_the_published_one(robot):
     law, _ = swing_ups.upright_law(robot)
@@ -227,50 +182,6 @@ def test_scores_of_the_page_are_those_of_the_boards(robot):
     for name, *values in cells:
         assert values[column] == f"{score[name]:.3f}", name
         assert float(values[column + 1]) == pytest.approx(robust[name], abs=0.005), name
-
-
-@ROBOTS
-def test_rows_of_2025_are_those_of_the_page(robot):
-    """Ours is below three published ones and above the last; no control experiment comes near but
-    the linear one.
-    """
-    rows = boards.global_experiments(robot)
-    made = {name: boards.global_row(name, scenario) for name, scenario in rows.items()}
-    page = (ROOT / "docs" / "boards.md").read_text(encoding="utf-8")
-    cells = re.findall(r"^\| ([^|]+) \| ([.0-9]+) \| ([.0-9]+) \|$", page, re.MULTILINE)
-    stated = {name: values for name, *values in cells}
-    published = {row.name: row for row in boards.GLOBAL[robot]}
-    assert set(stated) == {*made, *published}
-    for name, row in (made | published).items():
-        tolerance = 5.1e-4 if name in published else CHAOS
-        value = float(stated[name][boards.ROBOTS.index(robot)])
-        assert value == pytest.approx(row.score, abs=tolerance), name
-    names = [row.name for row in boards.global_board(robot, [*made.values()])]
-    ours = names.index(boards.GLOBAL_NAME)
-    assert names.index("AcadosMpc") < ours < names.index("prx_analytical")
-
-
-def trajectory(robot):
-    """The arrays of a trajectory's file."""
-    table = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json")
-    return {key: np.array(values) for key, values in table.items() if key != "about"}
-
-
-@ROBOTS
-def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
-    """Its accelerations are those of the plant's nominal model."""
-    table = trajectory(robot)
-    plant = smc.plant(robot)
-    p = type("P", (), dict(plant.parameters))
-    x, v, q, dq, u = (table[key] for key in ("x", "v", "q", "dq", "u"))
-    for k in range(len(u)):
-        for i, key in enumerate(("a", "ddq")):
-            f, g = plant.nominal(np.array([x[k], q[k]]), np.array([v[k], dq[k]]), i, p)
-            assert f + g * u[k] == pytest.approx(table[key][k], abs=1e-6)
-    assert np.abs(u).max() <= 6.0
-    assert [x[0], v[0], q[0], dq[0], u[0], u[-1], v[-1], dq[-1]] == pytest.approx(
-        [0.0] * 8, abs=1e-8
-    )
 
 
 def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(capsys):

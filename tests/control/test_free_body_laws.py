@@ -192,46 +192,6 @@ def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_w
     assert -heavy.e[-1, 2] == pytest.approx(0.34, rel=0.01)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("law", ["super_twisting_attitude", "indi_attitude", "adrc_attitude"])
-def test_an_unknown_torque_leaves_no_error_where_something_integrates_it(drone, law):
-    """The mean of the last 2 s: the rotors' lag leaves a limit cycle under super-twisting."""
-    trace = smc.run(
-        smc.Scenario(
-            plant=drone,
-            law=pushed(smc.law(law)),
-            duration=12.0,
-            control_period=2e-3,
-        )
-    )
-    assert np.abs(trace.e[-1000:, :3].mean(axis=0)).max() < 1e-3
-    assert np.abs(trace.e[: len(trace.t) // 10, 1]).max() > 0.01
-
-
-@pytest.mark.slow
-def test_an_unknown_torque_turns_the_cascade_without_integrals_by_its_closed_form(drone):
-    law = smc.law(
-        "cascaded_pid",
-        Iz=0.0,
-        Iv=0.0,
-        Ivz=0.0,
-        Ia=0.0,
-        Iaz=0.0,
-        Ir=0.0,
-        Irz=0.0,
-    )
-    trace = smc.run(
-        smc.Scenario(
-            plant=drone,
-            law=pushed(law),
-            duration=10.0,
-            control_period=2e-3,
-        )
-    )
-    angle = 2.0 * math.asin(TORQUE / (J * 103.0 * 6.0) / 2.0)
-    assert math.atan(4.28 * 2.0 * abs(trace.e[-1, 1]) / G) == pytest.approx(angle, rel=1e-3)
-
-
 LEMNISCATES = {  # of that coding, rms in m: periods of 6, 4 and 3 s
     "adaptive_quaternion_sliding": (0.0018, 0.0080, 0.0249),
     "quaternion_sliding": (0.0016, 0.0068, 0.0217),

@@ -11,7 +11,6 @@ from helpers import reference
 from helpers.sketch import failed
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.draw import decimate, panels
@@ -217,18 +216,6 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_line_is_the_same_read_backwards(seed):
-    rng = np.random.default_rng(seed)
-    lengths = rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03])
-    # a long hold is no chattering at the start, but is at the end
-    u = switching([*[1] * 9, *lengths, *[1] * 9])
-    u += np.sin(np.arange(len(u)) / 50) + rng.normal(0.0, 0.02, len(u))
-    np.testing.assert_allclose(
-        decimate.smooth(u[::-1], 40)[::-1], decimate.smooth(u, 40), atol=1e-12
-    )
-
-
 def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
     k = np.arange(2001)
     noise = np.random.default_rng(0).normal(0.0, 0.03, 2001)
@@ -240,23 +227,6 @@ def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
         assert np.abs(line - truth).mean() < 0.02
     u = switching([45, *[1, 2, 2, 1] * 200])
     assert (decimate.smooth(u, 100)[:45] == -6.0).all()
-
-
-@pytest.mark.slow
-def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(
-    pair, tmp_path
-):
-    alone = figure(pair[0], tmp_path / "deep" / "lam_0.5", None)
-    listed = figure(pair[:1], tmp_path / "b.png", None)
-    assert [path.name for path in (*alone, *listed)] == [
-        "lam_0.5.svg",
-        "lam_0.5.png",
-        "b.svg",
-        "b.png",
-    ]
-    with Image.open(alone[1]) as image:
-        assert image.size[0] == 1760
-    assert [path.read_bytes() for path in alone] == [path.read_bytes() for path in listed]
 
 
 @pytest.mark.parametrize("level", [-0.596, 0.0])

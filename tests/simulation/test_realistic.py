@@ -18,7 +18,7 @@ from helpers.runs import assert_loops_agree, assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import suits
-from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
+from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import REALISTIC_STEP
@@ -26,7 +26,6 @@ from smc_mujoco.simulation.trace import ARRAYS
 
 PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
 TWO = pytest.mark.parametrize("name", ["duffing", "pendulum_network"])
-ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]
 LUGRE = smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
 # motors of any strength
 pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.errors.ScenarioWarning")
@@ -518,24 +517,6 @@ def test_under_friction_a_smooth_law_rests_where_friction_holds_the_rest(name):
     assert far >= 5
 
 
-@pytest.mark.slow
-@TWO
-def test_without_friction_a_smooth_law_does_not_rest_off_balance(name):
-    """The claim above is about friction: a tenth of the friction lets go of where more held."""
-    strong = [t for t in rested(name) if t.scenario.friction[0] == smc.Coulomb(8.0)]
-    held = [t for t in strong if np.abs(t.v[-200:]).max() < 1e-3 and np.abs(balance(t)).max() > 1.0]
-    assert len(held) >= 2
-    weaker = []
-    for t in held:
-        weaker.append(
-            dataclasses.replace(
-                t.scenario, friction=smc.Coulomb(0.8), x0=tuple(t.x[-1]), duration=0.2
-            )
-        )
-    for trace in smc.run(weaker):
-        assert np.abs(trace.v).max() > 0.01
-
-
 # energy
 
 
@@ -590,27 +571,6 @@ def test_a_passive_mechanism_never_gains_energy(name, part):
 
 
 @PLANTS
-def test_a_jump_of_the_mass_leaves_the_parts_as_they_are(name):
-    rotor = smc.DCMotor(rotor_inertia=1e-4)
-    extra = smc.Viscous(0.3)
-    s = scenario(
-        name, actuator=rotor, friction=(extra, smc.Coulomb(0.2)), jump=smc.Jump(0.05, {"mass": 3.0})
-    )
-    compiled = models.compile_model(s)
-    before = models.with_values(compiled, s)
-    after = models.with_values(compiled, s, s.jump_step)
-    dofs = dof_ids(compiled)
-    own = models.with_values(models.compile_model(scenario(name)), scenario(name))
-    for model in (before, after):
-        np.testing.assert_allclose(model.dof_damping[dofs], own.dof_damping[dofs] + 0.3)
-        np.testing.assert_allclose(
-            model.dof_armature[dofs], own.dof_armature[dofs] + rotor.gear**2 * 1e-4
-        )
-        np.testing.assert_array_equal(model.dof_frictionloss[dofs], 0.2)
-    assert after.body_mass.sum() > 1.5 * before.body_mass.sum()
-
-
-@PLANTS
 def test_a_jump_at_the_start_is_a_mismatch(name):
     fields = {
         "actuator": MOTOR,
@@ -659,21 +619,6 @@ def test_the_reaction_that_holds_a_stuck_joint_balances_all_other_forces(name, f
     np.testing.assert_allclose(
         trace.reaction[-1], -(balance(trace) + trace.d[-1]), rtol=1e-3, atol=1e-3
     )
-
-
-@pytest.mark.parametrize("name", ONE_JOINT)
-def test_the_reaction_of_a_sliding_joint_is_its_friction(name):
-    fast = smc.run(
-        scenario(
-            name,
-            friction=smc.Coulomb(0.3),
-            v0=2.0,
-            x0=0.3,
-            duration=0.04,
-        )
-    )
-    assert (fast.v > 0.5).all()
-    np.testing.assert_allclose(fast.reaction[1:], -0.3, rtol=1e-3)
 
 
 @PLANTS

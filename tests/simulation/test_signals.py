@@ -195,26 +195,6 @@ def test_a_gust_is_a_smooth_bump():
     assert path(gust, [0.3, 1.0, 0.3001, 0.9999]).max() < 1e-6  # it begins and ends without a kink
 
 
-def test_a_gust_gives_a_free_mass_its_impulse():
-    free = smc.plant(
-        "duffing",
-        alpha=0.0,
-        beta=0.0,
-        delta=0.0,
-        M=1.3,
-    )
-    gust = Gust(2.0, 0.05, 0.1)
-    trace = smc.run(
-        scenario(
-            plant=free,
-            law="none",
-            x0=0.0,
-            disturbance=gust,
-        )
-    )
-    assert trace.v[-1, 0] == pytest.approx(0.5 * 2.0 * 0.1 / 1.3, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("name", "angle"),
     [
@@ -266,27 +246,6 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
 def test_an_impulse_has_its_integral_under_every_step(step, time):
     times = np.arange(round(2.0 / step)) * step
     assert path(Impulse(-0.3, time), times).sum() * step == pytest.approx(-0.3, rel=1e-12)
-
-
-@pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
-def test_an_impulse_changes_the_momentum_by_itself(integrator):
-    free = smc.plant(
-        "duffing",
-        alpha=0.0,
-        beta=0.0,
-        delta=0.0,
-        M=1.3,
-    )
-    common = {
-        "plant": free,
-        "law": "none",
-        "v0": 0.1,
-        "integrator": integrator,
-        "physics_step": 1e-3,
-    }
-    trace = smc.run(scenario(**common, disturbance=Impulse(0.26, 0.1)))
-    assert trace.v[99, 0] == pytest.approx(0.1, rel=1e-12)
-    assert trace.v[-1, 0] == pytest.approx(0.1 + 0.26 / 1.3, rel=1e-9)
 
 
 # band-limited noise

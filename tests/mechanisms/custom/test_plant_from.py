@@ -264,30 +264,6 @@ def test_the_plain_loop_gives_the_same_bits(arm, channels, fields):
     ] == []
 
 
-def test_threads_change_nothing(arm):
-    base = smc.Scenario(
-        plant=arm(),
-        law=TORQUE,
-        model="nominal",
-        duration=0.2,
-        u_max=20.0,
-    )
-    many = []
-    for i in range(6):
-        many.append(
-            dataclasses.replace(
-                base,
-                x0=(0.1 * i, -0.1 * i),
-                mismatch={"mass": 1.0 + 0.1 * i},
-            )
-        )
-    for one, two, alone in zip(
-        smc.run(many, threads=1), smc.run(many, threads=4), map(smc.run, many), strict=True
-    ):
-        np.testing.assert_array_equal(one.x, two.x)
-        np.testing.assert_array_equal(one.x, alone.x)
-
-
 def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
     """A constant d in every channel is what the same u does."""
     plant = arm(rest='<option gravity="0 0 0"/>' + ACTUATED)
