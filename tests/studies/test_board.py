@@ -204,7 +204,7 @@ def test_a_plot_has_a_ring_around_each_winner_and_no_other_dot():
     rings = []
     for ax in drawn.axes:
         hollow = [line for line in ax.lines if line.get_markerfacecolor() == "none"]
-        rings.append([float(line.get_xdata()[0]) for line in hollow])
+        rings.append([float(np.asarray(line.get_xdata())[0]) for line in hollow])
     of_third = table.column("itae")[table.column("law") == "third"]
     assert len(rings[0]) == 2
     assert min(of_third) <= min(rings[0]) <= max(rings[0]) <= max(of_third)

@@ -41,11 +41,13 @@ FILM_SIZE, FILM_RATE = (960, 540), 20  # px; 1/s
 UNBEATEN = (
     "A law is unbeaten in a condition if no other is shown to be better there, if each of its runs "
     "arrives, and if no other is shown to settle in more runs. It wins if it is shown to be better "
-    "than every other. A table names the laws that are unbeaten in the most conditions."
+    "than every other. A table names the laws that are unbeaten in the most conditions: 'unbeaten "
+    "in 5 of 9, 2 won' counts conditions, and bold wins in all of them."
 )
 FRONTS = (
-    "Of all gains that a law affords at a price, the least error under a load. In grey: below a "
-    "10,000th of the start, not ranked. Not of this report's runs: benchmarks/fronts.py."
+    "Up: the least rms error under a load, of all gains within a price. Across, the price: J over "
+    "the least J of any law, or u's variation a second over its bound. In grey: below a 10,000th "
+    "of the start, not ranked. Not of this report's runs: benchmarks/fronts.py."
 )
 LIMITS = (
     "Nothing was tried on hardware: all is simulated, from equations of the plants and models of "
