@@ -147,7 +147,11 @@ class Trial(NamedTuple):
         return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=self.starts)
 
     def check(self, laws: Mapping[str, Laws]) -> None:
-        """Refuse, before gains are searched, two things of one name, and what moves nothing."""
+        """Refuse, before gains are searched, two things of one name, what moves nothing, and a
+        device whose package is missing.
+        """
+        if self.device == "cuda":
+            from smc_mujoco.analysis.engine import gpu  # noqa: F401  # which refuses it
         for of_plant in laws.values():
             made = list(map(coerce.law, of_plant))
             check_names(self.plants, made, self.conditions)

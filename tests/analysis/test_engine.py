@@ -1,6 +1,7 @@
 """The fast engine against MuJoCo: one contract for laws, plants and conditions."""
 
 import dataclasses
+import random
 
 import numpy as np
 import pytest
@@ -137,6 +138,24 @@ def test_a_law_called_by_address_or_of_more_joints_runs_as_in_mujoco(kind, tmp_p
         law = smc.law_from(path)
     noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
     check(plant, law, {"plain": fields, "noise": fields | noisy}, duration=2.0)
+
+
+CONTINUOUS = sorted(name for name, law in laws().items() if law.continuous and not law.plants)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(5))
+def test_parts_that_are_drawn_together_run_as_in_mujoco(seed):
+    draw = random.Random(seed)
+    plant = draw.choice(["duffing", "inverted_pendulum", "pendulum_network", "van_der_pol"])
+    law = draw.choice([draw.choice(CONTINUOUS), draw.choice(sorted(laws()))])
+    while laws()[law].plants:
+        law = draw.choice(sorted(laws()))
+    parts = ALIKE | APART
+    fields = {}
+    for name in draw.sample(sorted(parts), 4):
+        fields |= parts[name]
+    check(plant, law, {"drawn": fields}, duration=3.0)
 
 
 @pytest.mark.slow

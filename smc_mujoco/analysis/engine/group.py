@@ -111,7 +111,7 @@ def _fixed(s: Resolved) -> tuple:
         s.plant.n,
         s.plant.driven,
         s.law.joint,
-        bool(_drives(s).any()),
+        bool(s.actuator),
         tuple(map(type, references(s))),
         None if s.feedforward is None else type(s.feedforward),
         tuple(None if error is None else type(error) for error in s.noise.errors),
