@@ -129,7 +129,10 @@ OTHERS = {  # plant, law, and what else the scenario has
 }
 
 
-@pytest.mark.parametrize("kind", OTHERS)
+SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("cart", "arm", "torque")]
+
+
+@pytest.mark.parametrize("kind", ["joints", "C", *SLOW])
 def test_a_law_called_by_address_or_of_more_joints_runs_as_in_mujoco(kind, tmp_path):
     plant, law, fields = OTHERS[kind]
     if kind == "C":

@@ -68,8 +68,11 @@ USES = [
 ]
 
 
-@pytest.mark.parametrize("wish", ["osmesa", "egl", "x"])
-@pytest.mark.parametrize("use", USES, ids=["smc", "make", "make_vec"])
+@pytest.mark.parametrize(
+    ("use", "wish"),
+    list(zip(USES, ("osmesa", "egl", "x"), strict=True)),
+    ids=["smc", "make", "make_vec"],
+)
 def test_a_script_runs_whatever_mujoco_gl_names_and_is_warned_once(wish, use):
     code = HIDE.format(words=ALL) + use
     command = [sys.executable, "-c", code + "import mujoco"]

@@ -132,7 +132,7 @@ MASS = """<mujoco model="mass"><worldbody><body><joint name="slide" type="slide"
 <motor joint="slide" ctrlrange="-9 9"/></actuator></mujoco>"""
 
 
-@pytest.mark.parametrize("kept", [1, 2])
+@pytest.mark.parametrize("kept", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_quick_drops_laws_after_few_runs_and_keeps_the_order(kept, tmp_path, monkeypatch):
     plant = smc.plant_from(MASS, ["slide"])
     laws = []

@@ -155,7 +155,14 @@ def test_the_golden_has_every_claim_of_every_paper():
     assert {name: list(golden(name)) for name in shipped()} == claims
 
 
-@pytest.mark.parametrize("name", [name for name in shipped() if name != "gaber"])
+QUICK = ["seeber_2020", "acary_2012"]  # the fewest steps
+OTHERS = []
+for name in shipped():
+    if name not in ("gaber", *QUICK):
+        OTHERS.append(pytest.param(name, marks=pytest.mark.slow))
+
+
+@pytest.mark.parametrize("name", [*QUICK, *OTHERS])
 def test_quick_verdicts_are_those_of_the_golden(name):
     with runs_made_once():
         check_golden(quick_verdicts(name), golden(name))

@@ -14,7 +14,7 @@ from tests.evidence.papers.test_quick_verdicts import (
 # of millions of steps each; with stubbed runs they are in test_gaber.py
 SEARCHES = ["12", "20", "24", "61", "T"]
 OTHERS = [id for id in paper("gaber").claims if ("gaber", id) not in TIMINGS and id not in SEARCHES]
-PARTS = [pytest.param(OTHERS[k::6], id=str(k)) for k in range(6)]
+PARTS = [pytest.param(OTHERS[k::6], id=str(k), marks=pytest.mark.slow) for k in range(5)]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -24,7 +24,7 @@ def once():
 
 
 @pytest.mark.parametrize(
-    "ids", [*PARTS, pytest.param(SEARCHES, id="searches", marks=pytest.mark.slow)]
+    "ids", [OTHERS[5::6], *PARTS, pytest.param(SEARCHES, id="searches", marks=pytest.mark.slow)]
 )
 def test_quick_verdicts_of_some_claims_are_those_of_the_golden(ids):
     expected = golden("gaber")

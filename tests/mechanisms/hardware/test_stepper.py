@@ -276,7 +276,11 @@ def test_the_steps_are_those_of_an_event_integration(kind):
     assert [t for t, _ in made] == pytest.approx([t for t, _ in steps], abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+MOVED = ("slips", "without queue", "jumps", "geared")  # the others: seconds each
+REST = [pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS if kind not in MOVED]
+
+
+@pytest.mark.parametrize("kind", [*MOVED, *REST])
 def test_the_joint_moves_as_behind_these_steps(kind):
     motor, push = KINDS[kind]
     one = scenario(
