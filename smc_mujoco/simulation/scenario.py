@@ -1096,8 +1096,8 @@ def _doubts(s: Resolved) -> Iterator[str]:
     too weak, and bristles that are too stiff.
     """
     for part in s.friction:
-        # bristles of the default stiffness are those of the named condition on the library's plants
-        if isinstance(part, LuGre) and (part.stiffness != LuGre.stiffness or s.plant.is_user_model):
+        # of the library's plants, softer bristles are those of a named condition or of a rig
+        if isinstance(part, LuGre) and (part.stiffness > LuGre.stiffness or s.plant.is_user_model):
             damping = part.damping
             if damping is None:
                 model = compiled(s.plant.spec())
