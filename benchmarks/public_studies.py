@@ -140,7 +140,7 @@ def pushing(y, p, memory):
 
 @smc.law_function(gains={"la": 5.0, "Kd": 10.0, "epsilon": 0.1})
 def layered(y, gains, memory):
-    """Torques of a hanging link of 1 kg and 1 m, and a layer."""
+    """The torques of a hanging link of 1 kg and 1 m, and a boundary layer."""
     s = y.de + gains.la * y.e
     layer = min(max(s / gains.epsilon, -1.0), 1.0)
     return (1.0 - gains.la) * y.de + 9.81 * math.sin(y.x) - gains.Kd * layer, s
@@ -148,7 +148,7 @@ def layered(y, gains, memory):
 
 @smc.law_function(gains={"c": 1.5, "alpha": 2.0, "epsilon": 0.01})
 def smoothed(y, gains, memory):
-    """A smooth sign, and the damping of the line that s = 0 is."""
+    """A smooth sign, and the equivalent control of s = 0."""
     s = y.de + gains.c * y.e
     return -gains.c * y.de - gains.alpha * s / (abs(s) + gains.epsilon), s
 

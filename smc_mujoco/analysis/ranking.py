@@ -82,7 +82,7 @@ MAX_RISE = 60.0
 POWER = 0.8  # with which the least visible lead is seen
 LEAD_RESAMPLES = 400  # for the least visible lead; chosen
 # of resamples that must see it, so that on average POWER of new samples do; chosen by samples of 51
-# shapes, and held by shapes drawn later, see docs/winners.md
+# shapes and confirmed on shapes drawn later, see docs/winners.md
 OWN_SHARE = 0.95
 MAX_SUMS = 10_000_000  # of pairs, in memory at once
 

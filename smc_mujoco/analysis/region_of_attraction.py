@@ -86,7 +86,7 @@ class Basin:
     def __repr__(self) -> str:
         share = f"{100 * self.share:.3g} % of {self.outcome.size} states"
         found = f"{self.law} on {self.plant}: {share} come to rest within {self.duration:g} s"
-        return f"Basin({found}{self.checked and '; '}{self.checked})"
+        return f"Basin({'; '.join(filter(None, (found, self.checked)))})"
 
     @property
     def share(self) -> float:

@@ -382,7 +382,7 @@ def _unpacked(path: Path) -> Path:
     """Return a temporary folder with the content of an archive."""
     folder = TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True)
     _UNPACKED.append(folder)
-    with reading(path, ".zip file", "give that of a folder of results") as file:
+    with reading(path, "zip archive of results", "zip a folder of results") as file:
         try:
             with zipfile.ZipFile(file) as archive:
                 archive.extractall(folder.name)

@@ -1,4 +1,4 @@
-"""Decorators of classes of data that does not change."""
+"""Decorators for classes of immutable data."""
 
 import dataclasses
 from typing import TypeVar, dataclass_transform

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 # called with the work done and the whole work, which may be an estimate
 Report = Callable[[float, float], None]
-KEPT = 0.1  # s; a piece of work that took less was read from a file, and tells no speed
+MIN_PIECE = 0.1  # s; a piece of work that took less was read from a file: it tells no speed
 LINE_PERIOD = 10.0  # s between two lines of a log
 
 
@@ -58,10 +58,10 @@ class Bar:
         self.advance(work)
 
     def finished(self, seconds: float, left: int) -> None:
-        """Say how long a piece of the work took, s, and how many are left: each is expected to
-        take the median.
+        """Record how long a piece of the work took, s, and how many are left, each of which is
+        expected to take the median.
         """
-        if seconds > KEPT:
+        if seconds > MIN_PIECE:
             self.pieces.append(seconds)
         if self.pieces:
             self.end = time.monotonic() + left * statistics.median(self.pieces)

@@ -85,7 +85,7 @@ class Tabular:
         for part in _parts(list(map(_widest, columns)), options.max_width, self.left):
             tall = any("\n" in cell.plain for i in part for cell in columns[i][1:])
             table = Table(
-                box=box.HORIZONTALS if tall else box.SIMPLE_HEAD,  # a rule below each row of lines
+                box=box.HORIZONTALS if tall else box.SIMPLE_HEAD,  # rules between tall rows
                 show_lines=tall,
                 padding=0,
                 pad_edge=False,

@@ -18,9 +18,9 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.kinds import Array, ArrayPair
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Pair, rest, reward, starts, tasks
+from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import callback, coerce, state
@@ -159,7 +159,7 @@ class Setting:
         """Return the context in which MuJoCo steps: with the callback, if it is called."""
         return callback.installed() if self.uses_callback else contextlib.nullcontext()
 
-    def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
+    def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> ArrayPair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options
         x0 and v0.
         """
@@ -199,7 +199,7 @@ class Setting:
         """
         return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
 
-    def errors(self, x: Array, v: Array, k: Any) -> Pair:
+    def errors(self, x: Array, v: Array, k: Any) -> ArrayPair:
         """Return the errors e and w of the task for x, v (..., n) at sample k, (..., n) each."""
         return self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected)
 
@@ -308,7 +308,7 @@ class Episode:
         counted = self.setting.counted
         return float(reward(e[counted], w[counted])), {"time": time, "error": e}
 
-    def errors(self) -> Pair:
+    def errors(self) -> ArrayPair:
         """Return the errors e and w of the task, (n,) each."""
         return self.setting.errors(self.x, self.v, self.sample)
 

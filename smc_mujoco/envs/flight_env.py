@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.kinds import ArrayPair
 from smc_mujoco.envs.gymnasium_env import PlantEnv, action_space
-from smc_mujoco.envs.tasks import Pair
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
 from smc_mujoco.mechanisms.plant import Plant
@@ -74,7 +74,7 @@ class FlightEnv(PlantEnv):
         self.v = data.qvel[dof : dof + 6].copy()
         self.diverged = bool(self.setting.diverged(self.x, self.v))
 
-    def errors(self) -> Pair:
+    def errors(self) -> ArrayPair:
         """Return the errors of the pose and of its velocity, (6,) each."""
         r = np.concatenate([self.setting.rest_x, np.zeros(6)])
         if self.setting.task.moving:

@@ -25,7 +25,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.kinds import Array, Fields
+from smc_mujoco.common.kinds import Array, ArrayPair, Fields
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.named import as_plant
@@ -41,8 +41,6 @@ TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, the default of `tr
 AMPLITUDE_SHARE = (
     0.5  # of the way to the end of a joint's range: bounds the default reference of an arm; chosen
 )
-
-Pair = tuple[np.ndarray, np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +75,7 @@ class Task:
         """Return the channels that `errors` treats differently from the rest, (n,) of bool."""
         return np.ones(plant.n, bool)
 
-    def spread(self, plant: Plant) -> Pair:
+    def spread(self, plant: Plant) -> ArrayPair:
         """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring
         joints' ranges.
         """
@@ -87,7 +85,7 @@ class Task:
         reach = np.abs(start - rest(plant))
         return -reach, reach
 
-    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:
         """Return e and w for x and v, (..., n) each; `r` has the references r, r' and r'', (..., 3
         m), m of each.
         """
@@ -116,7 +114,7 @@ class Track(Task):
         """Return the channels with an actuator."""
         return np.arange(plant.n) < plant.driven
 
-    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:
         """Return the distance of the driven channels from their references, and the state of the
         others.
         """
@@ -154,12 +152,12 @@ class SwingUp(Task):
         """Return the channels that topple."""
         return toppling(plant)
 
-    def spread(self, plant: Plant) -> Pair:
+    def spread(self, plant: Plant) -> ArrayPair:
         """Return starts about hanging."""
         down = toppling(plant)
         return (math.pi - SWING_UP_SPREAD) * down, (math.pi + SWING_UP_SPREAD) * down
 
-    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:
         """Return the distance of toppling channels from upright, and the state of others."""
         return np.where(selected, 1.0 - np.cos(x), x), v
 
@@ -171,12 +169,12 @@ class Synchronise(Task):
         """Return whether the plant is a network."""
         return plant.network and not plant.rest
 
-    def spread(self, plant: Plant) -> Pair:
+    def spread(self, plant: Plant) -> ArrayPair:
         """Return the same range for every channel."""
         reach = np.full(plant.n, max(np.abs(plant.x0)))
         return -reach, reach
 
-    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> Pair:
+    def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:
         """Return the distance of the channels from their mean."""
         return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
 
@@ -201,7 +199,7 @@ def tasks(plant: Plant | str) -> list[str]:
     return [name for name, task in TASKS.items() if task.applies_to(plant) and not plant.pose]
 
 
-def starts(task: Task, plant: Plant) -> Pair:
+def starts(task: Task, plant: Plant) -> ArrayPair:
     """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints'
     ranges.
     """
@@ -215,7 +213,7 @@ def rest(plant: Plant) -> Array:
     return np.array(plant.rest or (0.0,) * plant.n)
 
 
-def _ranges(plant: Plant) -> Pair:
+def _ranges(plant: Plant) -> ArrayPair:
     """Return the lowest and the highest positions of the joints, (n,) each."""
     if not plant.ranges:
         return np.full(plant.n, -math.inf), np.full(plant.n, math.inf)

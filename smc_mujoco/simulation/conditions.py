@@ -41,6 +41,7 @@ from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.kinds import Data
 from smc_mujoco.common.text import stated
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
@@ -75,9 +76,8 @@ from smc_mujoco.simulation.signals import (
     Step,
 )
 
-Fields = Mapping[str, Any]
 # fields, or a function of plant and duration that returns them
-Recipe = Fields | Callable[[Plant, float], Fields]
+Recipe = Data | Callable[[Plant, float], Data]
 
 MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "duration")  # that a grid sets itself
@@ -92,7 +92,7 @@ PLANTS = tuple(gain_sets.STUDY)  # the plants of the first paper
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 
 BOUNDS_PER_FRICTION = 60.0  # of u, on each driven joint
-BEND = 1e4  # 1/rad (1/m), stiffness of bristles over the friction at which a joint breaks away
+BRISTLE_STIFFNESS = 1e4  # 1/rad (1/m), of bristles over the friction at which a joint breaks away
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
@@ -399,7 +399,7 @@ def _jump(size: str) -> Recipe:
     "hard".
     """
 
-    def fields(plant: Plant, duration: float) -> Fields:
+    def fields(plant: Plant, duration: float) -> Data:
         if size not in plant.jumps:
             with_jump = [name for name, other in plants().items() if size in other.jumps]
             cure = f"choose another condition, or one of {', '.join(with_jump)}"
@@ -414,7 +414,7 @@ def _jump(size: str) -> Recipe:
     return fields
 
 
-def _contact(plant: Plant, duration: float) -> Fields:
+def _contact(plant: Plant, duration: float) -> Data:
     """Return a pulse that drives a plant against its obstacles: its neighbours, or stops."""
     if kinds := [kind for kind in ("bobs", "stops") if kind in plant.contacts]:
         return {"contact": kinds[0], "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
@@ -423,13 +423,13 @@ def _contact(plant: Plant, duration: float) -> Fields:
     )
 
 
-def _pulsed(plant: Plant, duration: float) -> Fields:
-    """Return a motor that steps."""
+def _pulsed(plant: Plant, duration: float) -> Data:
+    """Return a stepper motor, and its largest acceleration as the bound on u."""
     motor = of_rig(30.0 * default_u_max(plant))
     return {"actuator": motor, "u_max": motor.ramp}
 
 
-def _fault(plant: Plant, duration: float) -> Fields:
+def _fault(plant: Plant, duration: float) -> Data:
     """Return the loss of half the force, at 2 s, or at half of a run that is too short for it."""
     return {"fault": Fault(at=2.0 if duration > 2.0 else duration / 2, gain=0.5)}
 
@@ -455,7 +455,7 @@ def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) ->
     joint.
     """
 
-    def fields(plant: Plant, duration: float) -> Fields:
+    def fields(plant: Plant, duration: float) -> Data:
         limits = Scenario.recorded(plant=plant, law="none").limits
         parts = [make(limit / BOUNDS_PER_FRICTION, plant) for limit in limits]
         if len(set(limits)) == 1:
@@ -467,9 +467,9 @@ def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) ->
 
 def _bristles(level: float, plant: Plant) -> Friction:
     """Return bristles that bend by 0.1 mrad (mm) before a joint slides, as those of the study do.
-    On the library's plants they are as stiff as there.
+    On the library's plants they have the study's stiffness.
     """
-    stiffness = BEND * level if plant.is_user_model else LuGre.stiffness
+    stiffness = BRISTLE_STIFFNESS * level if plant.is_user_model else LuGre.stiffness
     return LuGre(0.5 * level, level, stribeck=0.05, stiffness=stiffness)
 
 

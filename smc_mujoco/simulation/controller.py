@@ -791,9 +791,8 @@ def _exert(address, sim, data, part):
     y.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
     y.load += data.qfrc_constraint[joint] + pushed
     held = data.qfrc_constraint[joint]
-    if (
-        channel.shaft >= 0 and channel.shaft != joint
-    ):  # the stops of a play pass on the drive's force
+    # the stops of a play pass on the drive's force: on shaft and joint they cancel
+    if channel.shaft >= 0 and channel.shaft != joint:
         y.load += data.qfrc_constraint[channel.shaft]
         held += data.qfrc_constraint[channel.shaft]
     if part.row >= 0:  # without what dry friction took of the constraints' force

@@ -256,7 +256,7 @@ def mixer(plant: Plant) -> np.ndarray:
     (actuators, 8).
 
     It is the pseudoinverse of what they nominally exert: exact for what they can exert together,
-    else nearest to it. (0, 8) of other plants.
+    else nearest to it. Empty, (0, 8), for other plants.
     """
     if not plant.pose:
         return np.zeros((0, 8))

@@ -25,6 +25,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
 from smc_mujoco.mechanisms.hardware.part import Actuator, Part
 from smc_mujoco.mechanisms.plant import SEEN, Plant, Values
+from smc_mujoco.simulation.cfunctions import OF_JOINTS
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Signal
 
@@ -404,7 +405,7 @@ def of_part(part: Part, kind: str) -> PythonFunction:
         if kind == "force":
             values = as_floats(name, [out], "a force", 1)
         else:
-            values = as_floats(name, out, "numbers", 3 if kind == "brake" else 2)
+            values = as_floats(name, out, "numbers", OF_JOINTS[kind][1])
         if kind == "force" and not math.isfinite(values[0]):
             raise Failure(f"{name} returned {values[0]:g}", channel=0)
         return values

@@ -24,9 +24,8 @@ LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search ha
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
-SAME_RUNS = (
-    "settle in the same runs"  # as far as these runs go: a share's interval is wider than 10 %
-)
+# as far as these runs go: a share's interval is wider than 10 %
+SAME_RUNS = "settle in the same runs"
 MEDIANS = (
     f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share; "
     f"of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less."
@@ -271,8 +270,8 @@ class Board(Tables):
 
     @property
     def alike(self) -> str:
-        """That the best laws are level or cannot be told apart, and the largest of the least leads
-        that would have been seen; which law is below the floor, where one is.
+        """That the best laws are level or statistically indistinguishable, and the largest of the
+        least leads that would have been seen; which law is below the floor, where one is.
         """
         if len(self.best) == 1:
             return f"{self.best[0]} is undefeated, but does not beat every rival"
@@ -423,7 +422,7 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
     samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
-    words = str([*cells.values()])
+    words = str([*map(tuple, itertools.chain(*cells.values()))])
     return Tabular(
         headings=["law", *map(heading, boards)],
         rows=rows,

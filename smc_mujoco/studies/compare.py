@@ -258,8 +258,8 @@ def compare(
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      searches: searches of a tuning, which share nothing. Default: 12, or 6 if quick, which few
-        verdicts follow from.
+      searches: independent searches of a tuning. Default: 12, or 6 if quick, from which few
+        verdicts follow.
       budget: largest number of sets of gains that a search tries, for each gain.
       quick: shorter runs and fewer searches; by default three plants and three conditions.
       threads, progress: as in `run`.

@@ -244,7 +244,7 @@ def sensitivity(
     scores = np.empty(len(design))
     held = np.empty(len(design), bool)
     work = len(design) * scenario.work
-    formulas = {metric: lambda trace: _score(trace, metric), "rest_share": _rest_share}
+    formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
     runs = Runs(formulas, device, threads, work, by_group=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
@@ -320,16 +320,12 @@ def default_points(scenario: Scenario, axes: int) -> int:
 
 
 def _score(trace: Trace, metric: str) -> float:
-    """Return the score of a run, the worst of its groups of channels; NaN or inf without one."""
-    if trace.failure is not None:
-        return math.inf
+    """Return the score of a run that did not fail, the worst of its groups of channels; NaN or inf
+    without one.
+    """
     entry = CATALOGUE[metric]
     value = entry.worst(by_group(trace))
     return entry.absent if math.isnan(value) else value
-
-
-def _rest_share(trace: Trace) -> float:
-    return math.inf if trace.failure is not None else rest_share(trace)
 
 
 def _rate(rate: Interval) -> str:

@@ -110,7 +110,7 @@ class WorstCase(Tables):
     def about(self) -> dict[str, Any]:
         """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
-        names = *names, "checked"
+        names += ("checked",)
         values = {name: getattr(self, name) for name in names}
         return values | {
             "within": dataclasses.asdict(self.within),

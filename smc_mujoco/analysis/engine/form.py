@@ -15,6 +15,7 @@ SETTINGS = ("samples", "steps", "step", "period", "delay", "jump_step", "seed", 
 SETTINGS += ("sigma_x", "sigma_v", "jitter", "missed", "pause", "pause_samples", "pause_phase")
 SETTINGS += ("early", "late", "logging")
 ACTIVE, STREAM, PARAMETERS = range(3)  # places in the numbers of a signal
+# rest: velocities of 0
 STATE = ("x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "rest", "d")
 MEASURED = ("seen_x", "seen_v", "seen_a")
 SAMPLED = ("sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r")

@@ -45,13 +45,13 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         f"{plant.name} is more than one equation a joint": bool(
             plant.by_mujoco or plant.unmodelled or plant.direct or plant.measured
         ),
-        "it has friction of MuJoCo's, contacts or another mechanism": not (
+        "it has MuJoCo's friction, contacts or another mechanism": not (
             s.plain_equation or (s.exact_friction and not plant.free)
         ),
         "it has an actuator other than lags and rate limits": not all(
             isinstance(part, Lag | RateLimit) for part in s.actuator
         ),
-        "its sensor reads at times of its own, or some joints": bool(s.readings)
+        "its sensor reads at its own times, or only some joints": bool(s.readings)
         or any(sensor.on for sensor in s.sensors),
         f"its integrator is {s.integrator}": s.integrator != "RK4",
         "a law of many joints, or in C, is for the processor": device == "cuda"

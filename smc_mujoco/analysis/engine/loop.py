@@ -689,7 +689,7 @@ def _driving(form: Form) -> Any:
 
 def _rubbing(form: Form, compile_user: Compiler) -> Any:
     """Return a compiled function (row, work, i, stage, step, f, at_rest, g) -> friction on channel
-    i, of f at its speed and at rest.
+    i; `f` is at its speed, `at_rest` is f at speed 0.
     """
     rub = own(lambda row, work, y, i: 0.0)
     for j, part in reversed(list(enumerate(form.frictions))):
@@ -815,7 +815,9 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
 
 
 def _keeping(form: Form) -> Any:
-    """Return a compiled function (work): keep the state of all channels at a sample."""
+    """Return a compiled function (work): keep the state of all channels at a sample, and begin the
+    next mean of friction.
+    """
     n = form.n
     rubs = bool(form.frictions)
     X, V, D, REACTION, SAMPLE_X, SAMPLE_V, SAMPLE_D = work_places(form).of(

@@ -47,7 +47,7 @@ class Runs:
     ):
         self.formulas = formulas
         self.device = device
-        self.worth = device != "cpu" or work >= MIN_WORK
+        self.worth_compiling = device != "cpu" or work >= MIN_WORK
         self.by_group = by_group
         self.threads = threads
         self.broken: dict[str, str] = {}  # law -> how it failed first, in a sentence
@@ -86,7 +86,7 @@ class Runs:
         """Return whether the fast engine can run a scenario."""
         from smc_mujoco.analysis.engine.group import key, why_not
 
-        if not self.worth or (self.by_group and len(groups(case)) > 1):
+        if not self.worth_compiling or (self.by_group and len(groups(case)) > 1):
             return False
         if why_not(case, tuple(self.formulas), self.device):
             return False

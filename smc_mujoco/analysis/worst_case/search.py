@@ -168,11 +168,13 @@ class Search:
         return done
 
     def _scored(self, cases: Sequence[Case], scenarios: Sequence[Scenario]) -> dict[int, Pair]:
-        """Return index -> key of the cases that the fast engine runs: whose trace nobody needs."""
+        """Return index -> key of the cases that the fast engine runs: those whose trace is not
+        needed.
+        """
         found = {}
         for i, case in enumerate(cases):
-            seen = case.relay or self.metric.command or not (self.members.forced or self.swing)
-            if not seen and self.fast.covers(scenarios[i]):
+            needed = case.relay or self.metric.command or not (self.members.forced or self.swing)
+            if not needed and self.fast.covers(scenarios[i]):
                 found[i] = FAILED_KEY
         scores = self.fast.scored([scenarios[i] for i in found], self.report)
         for i, (values, failed) in zip(found, scores, strict=True):
@@ -195,7 +197,7 @@ class Search:
         return self.metric.absent if math.isnan(value) else value
 
     def confirm(self) -> None:
-        """Have MuJoCo run those of the worst members that it did not run."""
+        """Have MuJoCo run those of the worst members that it has not run yet."""
         tried = self.tried
         worst = sorted(range(len(tried)), key=lambda i: tried[i].key, reverse=True)[:CONFIRMED]
         again = [i for i in worst if not tried[i].by_mujoco]

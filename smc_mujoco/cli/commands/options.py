@@ -170,7 +170,9 @@ SceneName = Annotated[
 Threads = Annotated[
     int | None, typer.Option(min=1, help="Simulations at once; default one per core.")
 ]
-Device = Annotated[str, typer.Option(help="Of the fast engine: cpu, or cuda for an NVIDIA card.")]
+Device = Annotated[
+    str, typer.Option(help="Where the fast engine runs: cpu, or cuda for an NVIDIA card.")
+]
 X0 = Annotated[
     float | None,
     typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start."),

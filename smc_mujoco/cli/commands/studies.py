@@ -56,7 +56,7 @@ def which(
     that is.
 
     All laws that suit the plant are compared by the rules of `compare`, with the package's gains
-    or with gains that are tuned now. On a model of your own tuning takes minutes for each law.
+    or with gains that are tuned now. On a model of your own, tuning takes minutes for each law.
     --quick takes a sixteenth of that time; --law names the laws to try. If you stop the command, it
     continues when you start it again.
 

@@ -42,12 +42,13 @@ UNBEATEN = (
     "A law is unbeaten in a condition if no other is shown to be better there, if each of its runs "
     "arrives, and if no other is shown to settle in more runs. It wins if it is shown to be better "
     "than every other. A table names the laws that are unbeaten in the most conditions: 'unbeaten "
-    "in 5 of 9, 2 won' counts conditions, and bold wins in all of them."
+    "in 5 of 9, 2 won' counts conditions, and a law in bold wins in all of them."
 )
 FRONTS = (
-    "Up: the least rms error under a load, of all gains within a price. Across, the price: J over "
-    "the least J of any law, or u's variation a second over its bound. In grey: below a 10,000th "
-    "of the start, not ranked. Not of this report's runs: benchmarks/fronts.py."
+    "Vertical axis: the least rms error under a load, of all gains within a price. Horizontal: "
+    "the price, which is J over the least J of any law, or u's variation a second over its bound. "
+    "In grey: below a 10,000th of the start, not ranked. From benchmarks/fronts.py, not from this "
+    "report's runs."
 )
 LIMITS = (
     "Nothing was tried on hardware: all is simulated, from equations of the plants and models of "
@@ -197,7 +198,7 @@ def comparison(compared: Compared) -> Section:
             f"Medians, {first}",
             winners=compared.leaderboard.winners,
         ),
-        f"The median of each law in condition {first}, with its 95 % interval; a ring: it wins.",
+        f"The median of each law in condition {first}, with its 95 % interval. A ring: it wins.",
     )
     every = page.folded("All medians, intervals, verdicts and gains", tables(compared.tables))
     parts = [*tables(matrices), medians, every]

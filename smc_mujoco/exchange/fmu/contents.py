@@ -100,7 +100,7 @@ class ExportedLaw:
     u_max: tuple[float, ...]  # bound on |u| of each joint; may be infinite
     modelled: bool  # whether the law reads the nominal model
     joints: int = 0  # of a law of many joints; 0 for a law of one channel
-    plant: Plant | None = None  # if it is a free body, it commands its actuators
+    plant: Plant | None = None  # of a free body the law commands the actuators
 
     @property
     def places(self) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ def target_of(actuator: mujoco.MjsActuator) -> str:
 
 def limp(spec: mujoco.MjSpec, seen: Iterable[str]) -> list[str]:
     """Return the joints that are not seen as channels and have motors, which nothing commands. In a
-    file without actuators, as a URDF, these are the joints with a bound on the force of motors.
+    file without actuators, such as a URDF, these are the joints whose force is bounded.
     """
     mine = {"", *seen}
     served = {target_of(actuator) for actuator in spec.actuators if is_servo(actuator)}
@@ -93,15 +93,16 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
                     model.geom(i).name or model.body(model.geom_bodyid[i]).name or f"geom {i}"
                     for i in contact.geom.tolist()
                 )
-                pair = [model.body(i).name or "GIVE-IT-A-NAME" for i in bodies.tolist()]
-                cure = (
-                    "a keyframe in which they do not touch, or <exclude "
-                    f'body1="{pair[0]}" body2="{pair[1]}"/> in the <contact> of the file'
-                )
                 if what == "start":
                     cure = "another x0"
                 elif of_urdf:
                     cure = "one of these links no <collision> in the file"
+                else:
+                    pair = [model.body(i).name or "GIVE-IT-A-NAME" for i in bodies.tolist()]
+                    cure = (
+                        "a keyframe in which they do not touch, or <exclude "
+                        f'body1="{pair[0]}" body2="{pair[1]}"/> in the <contact> of the file'
+                    )
                 raise ScenarioError(
                     f"the {what} of {source.label} has {first!r} {-1e3 * contact.dist:.0f} mm "
                     f"inside {second!r}: give {cure}"
@@ -215,7 +216,7 @@ def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.Mjs
 
 
 def _delete_orphans(spec: mujoco.MjSpec) -> None:
-    """Delete all keyframes, what names a joint that is gone, and what ties bodies that are one."""
+    """Delete all keyframes, what names a joint that is gone, and ties within one rigid body."""
     left = {"", *(joint.name for joint in spec.joints)}
     kinds = mujoco.mjtEq
     orphans = [*spec.keys]
@@ -234,15 +235,15 @@ def _delete_orphans(spec: mujoco.MjSpec) -> None:
         if (
             (equality.type == kinds.mjEQ_JOINT and not names <= left)
             or (equality.type == kinds.mjEQ_TENDON and names & gone)
-            or (equality.type in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and _tie_one(spec, equality))
+            or (equality.type in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and _rigid(spec, equality))
         ):
             orphans.append(equality)
     for orphan in reversed(orphans):  # a tendon after what names it
         spec.delete(orphan)
 
 
-def _tie_one(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> bool:
-    """Return whether an equality ties two bodies that the same joints carry, or none."""
+def _rigid(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> bool:
+    """Return whether no joint lies between the two bodies that an equality ties."""
     carriers = set()
     for name in (equality.name1, equality.name2):
         if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:

@@ -9,8 +9,8 @@ The load of a gearbox is the two torques on its sides, that of its motor and tha
 not their sum: if a motor holds a weight, the sum is 0 and the gearbox is loaded. The callback reads
 both torques before a physics step. The motor's torque is that of the joint's drive in the step
 before. The torque from outside is -qfrc_bias (gravity and gyration) + qfrc_spring + disturbances of
-the joint + qfrc_constraint (contacts and limits, of the step before). It has no `Push`, no inertia
-of what the joint moves, and not the stops of a play, which pass on the motor's own torque. The
+the joint + qfrc_constraint (contacts and limits, of the step before). It leaves out `Push`, the
+inertia of what the joint moves, and the stops of a play, which pass on the motor's own torque. The
 published code reads the same torques; it has no springs and disturbances.
 """
 

@@ -11,13 +11,13 @@ step in which it stops, rests or turns back the moments of `friction.dry_step`. 
 falls below STICKING_SPEED is stopped by the bound of the force that holds it at rest. See
 `Scenario.exact_friction`.
 
-On all others the force is the level of MuJoCo's dry friction, whose solver finds which joints stop
-or rest, all together, as it does for Coulomb friction. A joint whose speed changes sign, or is
+On all others the force is the level of MuJoCo's dry friction. MuJoCo's solver finds which joints
+stop or rest, all together, as it does for Coulomb friction. A joint whose speed changes sign, or is
 below STICKING_SPEED, is held within the bounds. It is brought back to where it came to rest, so it
 does not creep.
 
-Limit: the force of limits and contacts at a joint counts in its load only as far as friction cannot
-be what exerted it.
+Limit: MuJoCo gives the force of friction, limits and contacts at a joint as one sum. What friction
+may have exerted of it is not counted in the load.
 """
 
 # pyright: reportIncompatibleVariableOverride=false
@@ -55,7 +55,7 @@ PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAM
 # the same speed, whether it was held, and whether it slides.
 SPEED, STUCK, STUCK_AT = range(3)
 STAGE_SPEED, WAS_HELD, SLIDES = range(HIGH + 1, HIGH + 4)
-TINY = 1e-14  # N m (N): a level with which MuJoCo has a constraint
+TINY = 1e-14  # N m (N): a level above 0, so that MuJoCo has a constraint
 
 
 @dataclasses.dataclass(frozen=True)

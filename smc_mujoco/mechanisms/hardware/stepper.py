@@ -228,8 +228,8 @@ class Stepper(Actuator):
 
 
 def of_rig(torque: float) -> Stepper:
-    """Return the motor and the pulse generator of rig stepper_furuta, which holds a torque, N m
-    (N).
+    """Return the stepper motor and pulse generator of rig stepper_furuta, with another holding
+    torque, N m (N).
     """
     rate = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
     return Stepper(torque=torque, speed=15e3 * rate, ramp=20e3 * rate, stop_band=50.0 * rate)
