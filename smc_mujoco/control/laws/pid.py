@@ -2,9 +2,10 @@
 
 A baseline without a sliding mode. The filter tau limits the amplification of noise by the
 derivative. Back-calculation prevents wind-up: while u is beyond the bound +-u_max, w tends with the
-time constant tt to the value that brings u back to its bound; with ki = 0, w = 0. On M x'' = u the
-loop is stable if and only if kp kd > M ki (Routh, tau = 0), and a constant disturbance leaves no
-error. D is computed by the implicit (backward) Euler method, starting at the first de, and w by the
+time constant tt to the value that brings u back to its bound; with ki = 0, w = 0. What it leaves in
+w goes with the time constant kp / ki, so a tiny ki keeps an error for long. On M x'' = u the loop
+is stable if and only if kp kd > M ki (Routh, tau = 0), and a constant disturbance leaves no error.
+D is computed by the implicit (backward) Euler method, starting at the first de, and w by the
 explicit one. The trace's s is kp e + kd D.
 Gains: kp, proportional [N/m]; ki, integral [N/(m s)]; kd, derivative [N s/m]; tau, of the filter
 [s]; tt, of the anti-windup [s].

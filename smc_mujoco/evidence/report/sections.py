@@ -146,7 +146,7 @@ def _leading(outcomes: Sequence[Outcome]) -> Cell:
     for _, laws in outcomes:
         unbeaten.update(laws)
     if not unbeaten:
-        return Cell("none")
+        return Cell("no law")
     most = max(unbeaten.values())
     laws = []
     for law, count in unbeaten.items():
@@ -179,7 +179,7 @@ def comparison(compared: Compared) -> Section:
             row = [Cell(name)]
             for plant in plants:
                 winner, unbeaten = outcomes[plant, metric].get(name, (None, ()))
-                row.append(Cell(winner or _few(unbeaten) or "none", strong=winner is not None))
+                row.append(Cell(winner or _few(unbeaten) or "no law", strong=winner is not None))
             rows.append(row)
         matrices.append(
             Tabular(

@@ -148,7 +148,7 @@ def leading(*cells) -> Any:
             Cell("5 laws", "unbeaten in 1 of 1"),
         ),
         ([block(itae="a b", settles="b c")], Cell("b", "unbeaten in 1 of 1")),
-        ([block(itae="")], Cell("none")),
+        ([block(itae="")], Cell("no law")),
     ],
     ids=["winner", "level", "most", "many", "a calm law that never settles", "nobody"],
 )
