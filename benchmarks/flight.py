@@ -168,7 +168,7 @@ def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
     for block in (block for board in boards if board.metric == MEASURE for block in board.blocks):
         cells = []
         for law in laws:
-            mark = "*" * (law in block.best)
+            mark = "*" if law in block.best else ""
             cells.append(
                 "falls"
                 if block.lacking.get(law)

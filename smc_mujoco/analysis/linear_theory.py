@@ -232,7 +232,7 @@ def restoring_force(
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
     def force(x: Array) -> Array:
-        nominal = [plant.nominal(np.full(plant.n, each), v, 0, p) for each in x]
+        nominal = [plant.nominal(np.full(plant.n, position), v, 0, p) for position in x]
         return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
 
     return force

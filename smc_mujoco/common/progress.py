@@ -57,7 +57,7 @@ class Bar:
         self.what = text
         self.advance(work)
 
-    def finished(self, seconds: float, left: int) -> None:
+    def add_piece(self, seconds: float, left: int) -> None:
         """Record how long a piece of the work took, s, and how many are left, each of which is
         expected to take the median.
         """
@@ -75,7 +75,7 @@ class Bar:
 
     @property
     def left(self) -> str:
-        """The time that is left, such as "12 s left"; "" if nothing is known."""
+        """The time that is left in words, such as "12 s left"; "" if nothing is known."""
         now = time.monotonic()
         if self.end is not None:
             seconds = max(0.0, self.end - now)
@@ -83,7 +83,7 @@ class Bar:
             seconds = (now - self.start) * (1.0 / self.share - 1.0)
         else:
             return ""
-        return f"{seconds:.0f} s left"
+        return f"{length(seconds)} left"
 
     def __str__(self) -> str:
         if not self.whole:
@@ -97,8 +97,14 @@ class Bar:
 def told(what: str, seconds: float) -> None:
     """Tell how long something takes at most, before it starts, if that is long."""
     if seconds > LINE_PERIOD:
-        length = f"{-(-seconds // 60.0):.0f} min" if seconds > 90.0 else f"{seconds:.0f} s"
-        print(f"{what}: {length} at most", file=sys.stderr)
+        print(f"{what}: {length(seconds)} at most", file=sys.stderr)
+
+
+def length(seconds: float) -> str:
+    """Return a time in words, such as "12 s" or "3 min"."""
+    if seconds > 90.0:
+        return f"{math.ceil(seconds / 60.0)} min"
+    return f"{seconds:.0f} s"
 
 
 @contextlib.contextmanager

@@ -139,7 +139,9 @@ class WorstCases(Tables, list[WorstCase]):
     def title(self) -> str:
         """Plant, metric, number of runs and class."""
         first = self[0]
-        metric = CATALOGUE[first.metric].label + f" in {first.unit}" * bool(first.unit)
+        metric = CATALOGUE[first.metric].label
+        if first.unit:
+            metric += f" in {first.unit}"
         within = f"worst of {first.tried} runs within {first.class_words}"
         return f"{first.nominal.plant.name}: {metric}, {within}"
 

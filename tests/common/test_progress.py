@@ -56,16 +56,16 @@ def test_the_time_left_is_the_median_of_pieces_that_were_not_read_from_a_file(mo
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     shown = progress.Bar("pid", 6.0)
     said = []
-    for i, seconds in enumerate((0.01, 9.0, 4.0, 5.0)):
+    for i, seconds in enumerate((0.01, 90.0, 4.0, 5.0)):
         now[0] += seconds
-        shown.finished(seconds, 5 - i)
+        shown.add_piece(seconds, 5 - i)
         shown.reached(i + 1.0, 6.0)
         said.append(str(shown).partition(", ")[2])
     now[0] += 3.0
     assert [*said, shown.left] == [
         "0 s left",
-        "36 s left",
-        "20 s left",
+        "6 min left",
+        "3 min left",
         "10 s left",
         "7 s left",
     ]

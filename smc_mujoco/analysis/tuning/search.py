@@ -174,7 +174,7 @@ def tune(
         def found(i: int) -> SearchResult:
             start = time.monotonic()
             made = task.kept(i, failure, shown.advance, folder, codes)
-            shown.finished(time.monotonic() - start, searches - i - 1)
+            shown.add_piece(time.monotonic() - start, searches - i - 1)
             shown.reached((i + 1) * task.size, searches * task.size)
             return made
 

@@ -96,7 +96,7 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
     gains = {row.law: row.gains for row in rows}
     cells = [
         [
-            Cell(row.law + "*" * bool(row.why), colour=law_colour(row.law)),
+            Cell(f"{row.law}*" if row.why else row.law, colour=law_colour(row.law)),
             *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
         ]
         for row in rows

@@ -342,9 +342,9 @@ def _module(folder: Path, package: str) -> ModuleType:
 def _place(error: BaseException, folder: Path) -> str:
     """Return the file and line of a paper's folder at which an exception was raised."""
     frames = [
-        f
-        for f in traceback.extract_tb(error.__traceback__)
-        if Path(f.filename).is_relative_to(folder.resolve())
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).is_relative_to(folder.resolve())
     ]
     if frames:
         return f"{frames[-1].filename}, line {frames[-1].lineno}"
