@@ -502,7 +502,7 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
         numbers = [buffer.put(row) for row in part.numbers(run)]
         memories = [buffer.put(row) for row in part.start(run)]
         compiled = buffer.part(part, kind)
-        frictions = _frictions(run.load()) if kind == "brake" else []
+        frictions = _frictions(prepared, part, run) if kind == "brake" else []
         for place, i in enumerate(part.channels(s.plant)):
             ctrl = -1
             if kind == "force" and part.is_drive:
@@ -516,8 +516,32 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     return rows
 
 
-def _frictions(model: mujoco.MjModel) -> list[int]:
-    """Return the degree of freedom of each row of constraints that is its dry friction, else -1."""
+def _frictions(prepared: Prepared, part: Part, run: Run) -> list[int]:
+    """Return the degree of freedom of each row of constraints that is its dry friction, else -1.
+
+    Raises:
+      ScenarioError: flags of the model that turn dry friction off, or a jump that moves the rows.
+    """
+    model = run.load()
+    found = _rows_of_friction(model)
+    s = prepared.scenario.resolved
+    if not [*part.fields(model)]:  # it gives no force
+        return found
+    unsafe = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE.value
+    if unsafe or not {*run.dofs} <= {*found}:
+        raise ScenarioError(
+            f"the model's flags turn off what holds a joint that {type(part).__name__} stops: take "
+            "constraint, frictionloss and refsafe out of its <flag>"
+        )
+    if s.jump and _rows_of_friction(with_values(model, prepared.scenario, s.jump_step)) != found:
+        raise ScenarioError(
+            f"the jump takes all dry friction of a joint away beside {type(part).__name__}: give a "
+            "factor such as 1e-9"
+        )
+    return found
+
+
+def _rows_of_friction(model: mujoco.MjModel) -> list[int]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     dry = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF

@@ -152,7 +152,6 @@ def test_a_body_is_pushed_once_when_the_mouse_lets_go():
         session,
         Page({2: 1.0, 4: 3.0, 7: 0.0}),
         panel,
-        lambda session: True,
     )
     (push,) = session.scenarios[0].disturbance
     assert push.body == "cart"

@@ -28,6 +28,7 @@ from smc_mujoco.mechanisms.plant import Field, Plant
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which
 # have rounding errors.
 EARLY_SHARE = 0.5
+MAX_COUNT = 2.0**52  # a larger number is whole
 MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
 # readings in a history are a multiple of this, so that runs with other delays share a model; chosen
 READINGS_STEP = 64
@@ -85,7 +86,10 @@ class Encoder(OnJoints):
             x += p.bias
         if p.counts != 0.0:
             quantum = (2.0 * math.pi if y.hinge != 0.0 else 1.0) / p.counts
-            x = quantum * math.floor(x / quantum + 0.5)
+            count = x / quantum + 0.5
+            if abs(count) < MAX_COUNT:
+                count = math.floor(count)
+            x = quantum * count
         if p.dropout != 0.0 and y.j > 0.0 and y.chance < p.dropout:
             return memory[0], memory[1]
         memory[0], memory[1] = x, y.v

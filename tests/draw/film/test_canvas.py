@@ -45,7 +45,7 @@ def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges()
 
 def test_a_ghost_stands_where_the_reference_is_and_inside_a_machine_that_is_there():
     with stage("van_der_pol") as shown:
-        shown.pose(np.array([1.5]))
+        shown.arrange(np.array([1.5]))
         alone = shown.render().astype(int)
         shown.aim(np.array([-1.0]))
         ghost = np.abs(shown.render().astype(int) - alone).max(axis=2) > 20

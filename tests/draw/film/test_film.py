@@ -114,13 +114,13 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
         return np.nonzero(np.abs(picture.astype(int) - upright).max(axis=2) > 60)[1].mean() - 320
 
     with staged(trace, (640, 360)) as scene:
-        scene.pose(np.array([0.0]))
+        scene.arrange(np.array([0.0]))
         upright = scene.render().astype(int)
         left, right = (
             column(scene.render([(0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))]))
             for end in (-1.0, 1.0)
         )
-        scene.pose(np.array([0.4]))
+        scene.arrange(np.array([0.4]))
         leaning = column(scene.render())
     assert leaning * right > 0.0 > leaning * left
 
@@ -283,7 +283,7 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     with staged(slack, (480, 170)) as shown:
         rotor, joint = (shown.data.joint(f"m/{name}") for name in ("rotor:hinge", "hinge"))
         for flank in (-1.0, 0.0, 1.0):
-            shown.pose(np.array([0.3]), np.array([flank * 0.1]))
+            shown.arrange(np.array([0.3]), np.array([flank * 0.1]))
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
     edges = np.append(-1e-3, slack.t)
@@ -298,7 +298,7 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     assert np.abs(ahead).max() <= 0.1
     resting = realistic(contact="floor", duration=0.2)
     with staged(resting, (480, 170)) as shown:
-        shown.pose(np.array([0.4]))
+        shown.arrange(np.array([0.4]))
         assert shown.data.joint("m/lift").qpos[0] == 0.0
 
 

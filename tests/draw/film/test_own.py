@@ -53,7 +53,7 @@ def test_arrows_of_a_foreign_cart_are_seen_and_its_rail_is_cut_to_what_moves():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
     with staged(trace, (640, 360)) as scene:
-        scene.pose(trace.x[0])
+        scene.arrange(trace.x[0])
         empty = scene.render().astype(int)
         for push in (0.2, -0.2):
             arrow = Arrow(0.0, push, (1.0, 0.0, 0.0, 1.0))

@@ -461,3 +461,26 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
                         assert friction.value(0.0, motor, load, numbers)[1:] == pytest.approx(
                             [-held, held], rel=0, abs=1e-12
                         )
+
+
+ARM = """<mujoco><option><flag {}/></option><worldbody>
+<body><joint name="a" axis="0 1 0"/><geom size=".1" pos=".3 0 0" contype="0"/>
+<body pos=".3 0 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos=".3 0 0" contype="0"/>
+</body></body></worldbody><actuator><motor joint="a"/><motor joint="b"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("flag", ["constraint", "frictionloss", "refsafe"])
+def test_flags_that_turn_dry_friction_off_are_refused_beside_a_formula(flag, refused):
+    plant = smc.plant_from(ARM.format(f'{flag}="disable"'), ["a", "b"], name="arm")
+    rough = smc.hardware.ServoFriction(kc=0.3)
+    run = smc.Scenario(plant=plant, law="none", friction=rough, u_max=1.0, duration=0.01)
+    refused(lambda: smc.run(run), flag)
+
+
+def test_a_jump_that_ends_the_dry_friction_of_another_joint_is_refused(refused):
+    rough = {"elbow": smc.hardware.ServoFriction(kc=0.15)}
+    plant = smc.plant("double_pendulum", cf1=0.2, cf2=0.0)
+    given = {"plant": plant, "law": "none", "friction": rough, "duration": 0.3}
+    refused(lambda: smc.run(smc.Scenario(**given, jump=smc.Jump(0.2, {"cf1": 0.0}))), "1e-9")
+    little = smc.run(smc.Scenario(**given, x0=(1.0, 0.5), jump=smc.Jump(0.2, {"cf1": 1e-9})))
+    assert np.abs(little.reaction[250:, 1]).max() > 0.1
