@@ -91,7 +91,8 @@ class Advice(Tables):
         boards = self.leaderboard
         settles = self.settles[self.law.name]
         if settles < RELIABLE:
-            return f"no law is reliable here, this one settles in {100 * settles:.0f} % of its runs"
+            share = f"{100 * settles:.0f} % of its runs in its worst condition"
+            return f"no law is reliable here, this one settles in {share}"
         if len(self.laws) < 2:
             return "there is no second law"
         if barred := [law for board in boards for law in board.barred if law != self.law.name]:
@@ -116,6 +117,11 @@ class Advice(Tables):
             notes.append(
                 f"Left out after one search and {FEW} runs in each condition, though the best may "
                 f"be among them: {', '.join(self.left_out)}"
+            )
+        if rare := sorted(self.settles.keys() - {law.name for law in self.laws}):
+            notes.append(
+                "Not compared, as they settle in fewer than half as many runs as another law: "
+                f"{', '.join(rare)}"
             )
         return [*others, dataclasses.replace(last, notes=notes + self.answer)]
 

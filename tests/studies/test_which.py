@@ -53,6 +53,7 @@ def test_laws_stand_by_their_mean_rank_and_doing_nothing_is_not_compared(advice)
     calm = advice.table.select(law="idle").column("tv_rate")
     assert calm.max() == 0.0  # no law is calmer
     assert advice.settles["idle"] < 0.5 * advice.settles["observer_free"] == 0.5
+    assert "as many runs as another law: idle" in " ".join(advice.tables[-1].notes)
 
 
 def test_a_law_whose_runs_fail_comes_after_one_whose_runs_do_not(advice):
