@@ -56,7 +56,9 @@ def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():
 def test_what_starts_at_its_goal_is_not_nudged_off_it():
     rest = smc.plant("quadrotor").rest
     flight = smc.Scenario(plant="quadrotor", law="geometric", x0=(rest[0] + 1.0, *rest[1:]))
-    assert nudged(flight).x0[1:] == rest[1:]
+    start = nudged(flight).x0
+    assert start is not None
+    assert start[1:] == rest[1:]
 
 
 def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
