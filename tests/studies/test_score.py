@@ -17,7 +17,9 @@ def failing(y, gains, memory):
 def cases():
     yield smc.Scenario(plant="duffing", law="pid", duration=0.5)
     yield smc.Scenario(plant="duffing", law=failing(when=0.2), duration=0.5)
-    yield smc.Scenario(plant="duffing", law="pid", duration=0.5, friction=smc.Coulomb(0.1))
+    yield smc.Scenario(
+        plant="duffing", law="pid", duration=0.5, friction=smc.hardware.LuGre(0.1, 0.1, 0.1)
+    )
     yield smc.Scenario(plant="duffing", law=failing(when=9.0), duration=0.5)
 
 

@@ -1,7 +1,6 @@
 """Laws of free bodies in C: written out, they give the compiled law's bits, also on their own."""
 
 import subprocess
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -51,11 +50,11 @@ def traces(tmp_path_factory):
         (path := folder / f"{name}.c").write_text(smc.exchange.law_to_c(name))
         return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
-    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
         )
-        made = [*pool.map(make, LAWS)]
+        made = [*map(make, LAWS)]
     found = iter(
         smc.run(
             [s for pair in zip(LAWS, made, strict=True) for law in pair for s in scenarios(law)]

@@ -5,7 +5,6 @@ sentence.
 import math
 import re
 import subprocess
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -232,13 +231,12 @@ def compiled(folder):
         (path := folder / f"{name}.c").write_text(smc.exchange.law_to_c(laws[name], joints=3))
         return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
-    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
         )
         return {
-            name: (laws[name], made())
-            for name, made in zip(laws, pool.map(make, laws), strict=True)
+            name: (laws[name], made()) for name, made in zip(laws, map(make, laws), strict=True)
         }
 
 
