@@ -27,7 +27,6 @@ import numba
 import numpy as np
 import pytest
 from helpers import reference
-from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 from numba.core.compiler_lock import global_compiler_lock
 
@@ -329,30 +328,6 @@ class Sour(smc.Signal):
 
 
 # (f) other people's callbacks
-
-FIRST = """
-import sys
-import mujoco
-def mine(model, data):
-    calls.append(1)
-calls = []
-mujoco.set_mjcb_control(mine)
-import smc_mujoco as smc
-trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.02))
-assert mujoco.get_mjcb_control() is mine
-assert calls == []
-assert "scipy.linalg" not in sys.modules  # numba's, which takes as long to load as a short run
-mujoco.set_mjcb_control(None)
-assert (trace.x == smc.run(trace.scenario).x).all()
-print("done")
-"""
-
-
-def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
-    done = python("-c", FIRST, folder=tmp_path)
-    assert done.stdout == "done\n"
-    assert done.stderr == ""
-
 
 # (g) batches
 
