@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 
 LEVEL = 0.95  # of confidence, of every interval and verdict; chosen
 # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples

@@ -23,9 +23,9 @@ import numpy as np
 
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
+from smc_mujoco.common.aliases import Array, Fields, Names, Pair
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, whole
-from smc_mujoco.common.kinds import Array, Fields, Names, Pair
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit

@@ -20,9 +20,9 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
+from smc_mujoco.common.aliases import Array, ArrayPair, Floats, Pair
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
-from smc_mujoco.common.kinds import Array, ArrayPair, Floats, Pair
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement

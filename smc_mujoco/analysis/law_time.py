@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.jit import NotCompilable, call
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.simulation import callback, cfunctions, state
 from smc_mujoco.simulation.prepare import prepare

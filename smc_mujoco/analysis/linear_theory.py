@@ -29,9 +29,9 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, ArrayPair, Pair
 from smc_mujoco.common.constraints import Finite, Natural, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import Array, ArrayPair, Pair
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant

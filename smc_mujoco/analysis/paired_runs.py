@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from smc_mujoco.analysis.ranking import first_of_kind
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, has, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics

@@ -38,10 +38,10 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
+from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
-from smc_mujoco.common.kinds import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.progress import Report
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, joint_names

@@ -87,8 +87,8 @@ def halved(scenario: Scenario) -> Scenario:
 
 
 def nudged(scenario: Scenario) -> Scenario:
-    """Return the same scenario with its start moved by 1e-9 of its distance from the plant's
-    origin, so that what starts at its goal stays there.
+    """Return the same scenario with each start position moved by 1e-9 of its distance from the
+    plant's origin. A joint that starts there stays there.
     """
     places = zip(scenario.resolved.x0, scenario.plant.origin, strict=True)
     return dataclasses.replace(scenario, x0=tuple(r + (1.0 + NUDGE) * (x - r) for x, r in places))

@@ -22,11 +22,11 @@ from smc_mujoco.benchmark import entry as entries
 from smc_mujoco.benchmark import runs, suite
 from smc_mujoco.benchmark.problem import Problem, problem
 from smc_mujoco.common import guard
+from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
-from smc_mujoco.common.kinds import AnyPath, Data, Fields
 from smc_mujoco.common.version import versions
 
 START_TIME = 120.0  # s, for imports and compilation; chosen

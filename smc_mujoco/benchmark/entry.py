@@ -25,10 +25,10 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+from smc_mujoco.common.aliases import AnyPath, Data, Fields, Names, Numbers
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
-from smc_mujoco.common.kinds import AnyPath, Data, Fields, Names, Numbers
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.from_text import law as law_of
 from smc_mujoco.control.law import Law, known_laws

@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Data, Floats, Names, Numbers
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
-from smc_mujoco.common.kinds import Array, Data, Floats, Names, Numbers
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law, known_laws
@@ -222,7 +222,8 @@ class Problem:
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
         plant = trace.scenario.plant
-        if len(bounds := mixer(plant)[:, -1]):
+        bounds = mixer(plant)[:, -1]
+        if bounds.size:
             commands = trace.applied  # of the rotors
         else:
             bounds = np.array(trace.scenario.limits[: plant.driven])

@@ -8,7 +8,7 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
 def frozen_data(kind: type[T]) -> type[T]:
-    """Make a class frozen data."""
+    """Make a class a frozen dataclass."""
     return dataclasses.dataclass(frozen=True)(kind)
 
 
@@ -16,5 +16,5 @@ def frozen_data(kind: type[T]) -> type[T]:
     frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,)
 )
 def named_data(kind: type[T]) -> type[T]:
-    """Make a class frozen data whose fields are given by name."""
+    """Make a class a frozen dataclass whose fields are given by name."""
     return dataclasses.dataclass(frozen=True, kw_only=True)(kind)

@@ -17,8 +17,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.kinds import AnyPath
 
 MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen

@@ -19,11 +19,11 @@ from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple, TypedDict
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.aliases import Data, Names, Pair
 from smc_mujoco.common.constraints import Each, Number, Whole, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data, Names, Pair
 from smc_mujoco.control.outer_law import on_computed_torque
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit

@@ -22,11 +22,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
+from smc_mujoco.common.aliases import Data, Floats, Names, Numbers
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
-from smc_mujoco.common.kinds import Data, Floats, Names, Numbers
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue

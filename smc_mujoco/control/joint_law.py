@@ -29,8 +29,8 @@ import numpy as np
 from numba import carray, njit
 from numba.extending import overload
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.jit import call, floats, pointer, record_at
-from smc_mujoco.common.kinds import Array
 
 
 class JointMeasurement(NamedTuple):

@@ -3,8 +3,8 @@
 import dataclasses
 
 from smc_mujoco.common import annexes
+from smc_mujoco.common.aliases import Data, Fields
 from smc_mujoco.common.catalogue import Catalogue
-from smc_mujoco.common.kinds import Data, Fields
 from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws

@@ -11,10 +11,10 @@ import dataclasses
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from smc_mujoco.common.aliases import Data, Fields
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data, Fields
 from smc_mujoco.common.text import joined
 
 NONE = "none"

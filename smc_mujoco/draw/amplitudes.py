@@ -18,7 +18,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
-from smc_mujoco.common.kinds import AnyPath, Fields
+from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.limit_cycle import channel_cycle

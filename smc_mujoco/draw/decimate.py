@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.simulation.trace import Trace
 
 MEAN_WINDOW = (

@@ -21,8 +21,8 @@ from smc_mujoco.analysis.paired_runs import (
     unit_of_x,
 )
 from smc_mujoco.analysis.ranking import linked
+from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
-from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style

@@ -10,8 +10,8 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from smc_mujoco.common.aliases import AnyPath, Pair
 from smc_mujoco.common.errors import ScenarioError, find, items_of
-from smc_mujoco.common.kinds import AnyPath, Pair
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style

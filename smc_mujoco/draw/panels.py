@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from smc_mujoco.common.kinds import Array, ArrayPair, Data, Fields, Pair
+from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window

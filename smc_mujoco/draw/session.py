@@ -16,8 +16,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Fields
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import Array, Fields
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.gain_sets import law as law_with_gains
 from smc_mujoco.control.law import Law, laws

@@ -17,8 +17,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.common.kinds import Array, ArrayPair
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant

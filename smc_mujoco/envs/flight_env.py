@@ -16,8 +16,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import ArrayPair
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import ArrayPair
 from smc_mujoco.envs.gymnasium_env import PlantEnv, action_space
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
+from smc_mujoco.common.aliases import Array, Data, Fields
 from smc_mujoco.common.constraints import OneOf
 from smc_mujoco.common.extras import extra
-from smc_mujoco.common.kinds import Array, Data, Fields
 from smc_mujoco.envs import registration
 from smc_mujoco.envs.episode import Episode, Setting, bounded
 from smc_mujoco.mechanisms.plant import Plant

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law

@@ -25,7 +25,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.kinds import Array, ArrayPair, Fields
+from smc_mujoco.common.aliases import Array, ArrayPair, Fields
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.named import as_plant

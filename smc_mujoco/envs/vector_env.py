@@ -31,7 +31,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from mujoco.batch import Batch, SimulationError  # already imported with simulation.run
 
-from smc_mujoco.common.kinds import Array, ArrayPair, Data, Fields
+from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields
 
 MAX_COPIES = 1_000_000  # a larger number is a mistake
 

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.aliases import Array, Floats, Names
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.kinds import Array, Floats, Names
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.control.written import Matrix, WrittenLaw, state_feedback

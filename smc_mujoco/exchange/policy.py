@@ -24,12 +24,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.jit import Uncompiled
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.control.law import Law, Measurement, law_function
 
 Act = Callable[[np.ndarray], Any]

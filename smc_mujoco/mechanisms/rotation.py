@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 
 
 @njit(error_model="numpy")

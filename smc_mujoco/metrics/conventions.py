@@ -59,9 +59,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, has, shown
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 

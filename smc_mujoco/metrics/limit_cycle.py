@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from smc_mujoco.common.kinds import Array, Pair
+from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Floats, Numbers
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
-from smc_mujoco.common.kinds import Floats, Numbers
 from smc_mujoco.common.text import counted, joined, stated
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel

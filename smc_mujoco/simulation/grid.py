@@ -24,6 +24,7 @@ from typing import Annotated
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Data, Fields, Floats
 from smc_mujoco.common.constraints import Natural, Whole, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import (
@@ -38,7 +39,6 @@ from smc_mujoco.common.errors import (
     whole,
 )
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data, Fields, Floats
 from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template

@@ -38,7 +38,7 @@ from smc_mujoco.simulation.trace import Trace, from_log, warn_of_broken
 # isort: split
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system

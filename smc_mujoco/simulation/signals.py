@@ -23,11 +23,11 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
+from smc_mujoco.common.aliases import Numbers, Pair
 from smc_mujoco.common.constraints import Boolean, Natural, Number, Positive, constrain
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
-from smc_mujoco.common.kinds import Numbers, Pair
 from smc_mujoco.simulation import philox
 
 FOOT = 0.3048  # m

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common.aliases import AnyPath, Array, Floats
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
-from smc_mujoco.common.kinds import AnyPath, Array, Floats
 from smc_mujoco.mechanisms.inverse_kinematics import solve
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from smc_mujoco.common import html
+from smc_mujoco.common.aliases import AnyPath, Array, Fields, Names
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -24,7 +25,6 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
-from smc_mujoco.common.kinds import AnyPath, Array, Fields, Names
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise

@@ -12,8 +12,8 @@ from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, POWER, Effect, Rank, min_p
 from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
+from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.kinds import Names, Numbers, Pair
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds

@@ -12,11 +12,11 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
+from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
-from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source

@@ -17,8 +17,8 @@ from smc_mujoco.analysis.bootstrap import median_of, share_interval
 from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
+from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
-from smc_mujoco.common.kinds import Array, Names
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead

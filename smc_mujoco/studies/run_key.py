@@ -8,9 +8,9 @@ import hashlib
 import json
 
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
-from smc_mujoco.common.kinds import Fields
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.codes import Hashes, code_hashes

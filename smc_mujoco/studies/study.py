@@ -23,11 +23,11 @@ import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved, repeats_all
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import AnyPath, Data, Fields, Names
 from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, printable, shown
 from smc_mujoco.common.files import reading, to_json
-from smc_mujoco.common.kinds import AnyPath, Data, Fields, Names
 from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import COMPARED
 from smc_mujoco.control.law import checked_name

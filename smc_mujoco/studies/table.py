@@ -29,11 +29,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.html import table as html_table
-from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.common.text import counted, number
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from smc_mujoco.common.aliases import Fields, Numbers
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.files import plain, read_json, replacing
-from smc_mujoco.common.kinds import Fields, Numbers
 from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 

@@ -7,9 +7,9 @@ import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
+from smc_mujoco.common.aliases import Numbers, Pair
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import slug
-from smc_mujoco.common.kinds import Numbers, Pair
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.named import as_plant

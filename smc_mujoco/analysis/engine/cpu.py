@@ -12,9 +12,9 @@ from numba import njit
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.loop import simulation
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import Key, compile_for, jit, pointer
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.simulation.state import address
 
 # in a call of compiled code, which Ctrl-C waits for: .4 s, or .6 with dry friction

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
-from smc_mujoco.common.kinds import Fields, Names
+from smc_mujoco.common.aliases import Fields, Names
 from smc_mujoco.control.joint_law import stored_dtype
 from smc_mujoco.control.measurement import Measurement
 from smc_mujoco.mechanisms.hardware.drives import DriveStep, Series

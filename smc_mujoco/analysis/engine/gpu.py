@@ -23,7 +23,7 @@ from numba.extending import intrinsic
 
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.loop import simulation
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.numba_internals import cgutils
 
 THREADS = 128  # in a block

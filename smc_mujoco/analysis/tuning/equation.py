@@ -11,7 +11,7 @@ import numpy as np
 
 from smc_mujoco.analysis.engine.group import Group, key
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common.kinds import Floats, Pair
+from smc_mujoco.common.aliases import Floats, Pair
 from smc_mujoco.simulation import state
 from smc_mujoco.simulation.scenario import Scenario
 

@@ -30,10 +30,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved as halved_step
+from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.kinds import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import pose_errors

@@ -8,10 +8,10 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
+from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
-from smc_mujoco.common.kinds import AnyPath, Data, Fields
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import counted
 from smc_mujoco.control import source

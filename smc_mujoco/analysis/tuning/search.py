@@ -55,6 +55,7 @@ from smc_mujoco.analysis.tuning.objective import (
 from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import AnyPath, Array, Floats, Names
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import FilePath, Whole, constrained
 from smc_mujoco.common.errors import (
@@ -64,7 +65,6 @@ from smc_mujoco.common.errors import (
     find,
     users_stacklevel,
 )
-from smc_mujoco.common.kinds import AnyPath, Array, Floats, Names
 from smc_mujoco.common.progress import bar, told
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure

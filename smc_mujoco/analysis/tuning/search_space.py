@@ -43,8 +43,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Numbers, Pair
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import Numbers, Pair
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import Gain, Unit

@@ -21,11 +21,11 @@ from typing import Annotated
 import numpy as np
 
 from smc_mujoco.common import constraints
+from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesting
 from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Array, Pair
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant

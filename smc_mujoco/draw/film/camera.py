@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
-from smc_mujoco.common.kinds import Array
 
 FOVY = 9.0  # degrees, chosen: a long lens
 TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw.film import camera, scene
 
 THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape would be undefined

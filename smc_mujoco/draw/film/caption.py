@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from smc_mujoco.common.kinds import Array, Pair
+from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.arrows import Scale

@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.film import arrows

@@ -19,9 +19,9 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common import errors, extras, gl
+from smc_mujoco.common.aliases import AnyPath, Array, Pair
 from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import replacing, with_ending
-from smc_mujoco.common.kinds import AnyPath, Array, Pair
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end, finite

@@ -15,8 +15,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.constraints import Number, constrained
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.metrics.catalogue import chattering_amplitude, chattering_frequency

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.states import shapes

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import find
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw.film import camera
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.mechanisms.hardware.part import OWN, joint_ids

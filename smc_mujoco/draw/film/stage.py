@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import states
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, scene

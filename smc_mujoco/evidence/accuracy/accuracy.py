@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Floats
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
-from smc_mujoco.common.kinds import Floats
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Floats
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.kinds import Array, Floats
 
 # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
 TREND = 1.5

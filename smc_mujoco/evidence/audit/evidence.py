@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import Data, Fields
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, to_json
-from smc_mujoco.common.kinds import Data, Fields
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import TEXT_FIELDS, Paper
 from smc_mujoco.evidence.audit.verdict import totals

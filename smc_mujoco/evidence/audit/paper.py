@@ -25,12 +25,12 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from smc_mujoco.common import files
+from smc_mujoco.common.aliases import Data, Fields, Names, Numbers, Pair
 from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import reading, replacing
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data, Fields, Names, Numbers, Pair
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known

@@ -19,10 +19,10 @@ from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+from smc_mujoco.common.aliases import Data, Fields, Names, Numbers
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data, Fields, Names, Numbers
 from smc_mujoco.control.component import Component
 from smc_mujoco.evidence.audit.paper import Entry, Paper
 from smc_mujoco.evidence.audit.verdict import Check, Threshold, check

@@ -26,10 +26,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.common import html
+from smc_mujoco.common.aliases import Fields, Names, Numbers
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Fields, Names, Numbers
 
 SUPPORTED = "supported"
 PARTLY = "partly supported"

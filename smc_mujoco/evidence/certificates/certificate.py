@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.aliases import AnyPath, Array, Data, Names
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import reading, with_ending, write_json
-from smc_mujoco.common.kinds import AnyPath, Array, Data, Names
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Data, Floats, Pair
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.kinds import Data, Floats, Pair
 
 Function = Callable[[np.ndarray], np.ndarray]
 # The plant's parameters -> M, and A, B, C, E, F of phi = A sin x + B x + C x^3 and D = E + F x^2.

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+from smc_mujoco.common.aliases import Fields, Pair
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
-from smc_mujoco.common.kinds import Fields, Pair
 from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 from scipy.optimize import brentq
 
-from smc_mujoco.common.kinds import Array, ArrayPair, Pair
+from smc_mujoco.common.aliases import Array, ArrayPair, Pair
 from smc_mujoco.evidence.certificates.loops import Loop
 from smc_mujoco.simulation.cfunctions import cached
 

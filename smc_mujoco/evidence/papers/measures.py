@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.metrics.limit_cycle import limit_cycle
 from smc_mujoco.simulation.trace import Trace
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.kinds import Names
 from smc_mujoco.common.progress import Report, bar
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.study import FULL as GRID

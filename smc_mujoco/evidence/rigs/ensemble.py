@@ -16,8 +16,8 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
 from smc_mujoco.analysis.tuning.search import tune
+from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
-from smc_mujoco.common.kinds import AnyPath, Fields
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs.rig import Rig, Values
 from smc_mujoco.simulation import coerce

@@ -18,10 +18,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Data, Fields, Numbers
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
-from smc_mujoco.common.kinds import Array, Data, Fields, Numbers
 from smc_mujoco.common.progress import bar
 from smc_mujoco.evidence.rigs import search
 from smc_mujoco.evidence.rigs.records import Columns, Record

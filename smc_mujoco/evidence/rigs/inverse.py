@@ -11,8 +11,8 @@ power model", IEEE ICRA 1997 (the parallel filter).
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.kinds import Array
 from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Data, Fields, Numbers
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
-from smc_mujoco.common.kinds import Array, Data, Fields, Numbers
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Record
 from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig

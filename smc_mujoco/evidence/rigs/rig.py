@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
 from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Columns, Record

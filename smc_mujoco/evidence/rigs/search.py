@@ -15,7 +15,7 @@ import itertools
 
 import numpy as np
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.evidence.rigs import inverse
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
 from smc_mujoco.evidence.rigs.rig import Values

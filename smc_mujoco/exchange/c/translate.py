@@ -30,9 +30,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Fields, Names
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Fields, Names
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading

@@ -20,10 +20,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import AnyPath, Data, Fields, Floats
 from smc_mujoco.common.constraints import Each, Number, OneOf, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import no_room, replacing, scratch, with_ending
-from smc_mujoco.common.kinds import AnyPath, Data, Fields, Floats
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law

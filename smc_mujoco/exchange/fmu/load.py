@@ -23,13 +23,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.aliases import AnyPath, Array, Data, Names, Numbers, Pair
 from smc_mujoco.common.constraints import Positive, Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, number, one_line, unknown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
 from smc_mujoco.common.guard import Failed, run_isolated
 from smc_mujoco.common.jit import Uncompiled
-from smc_mujoco.common.kinds import AnyPath, Array, Data, Names, Numbers, Pair
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Floats, Names, Numbers, Pair
 from smc_mujoco.common.constraints import Boolean, Bound, Number, constrain
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import (
@@ -23,7 +24,6 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.common.kinds import Floats, Names, Numbers, Pair
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import BASE, PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range

@@ -43,9 +43,9 @@ from llvmlite import binding
 from numba import carray, types
 
 from smc_mujoco.common import fingerprint, libmujoco
+from smc_mujoco.common.aliases import Array, Numbers, Pair
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, Key, floats, pointer, record_at
-from smc_mujoco.common.kinds import Array, Numbers, Pair
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids

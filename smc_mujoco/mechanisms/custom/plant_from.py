@@ -29,10 +29,10 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.aliases import Array, Fields, Names
 from smc_mujoco.common.constraints import OneOf, Timeout, constrained
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
-from smc_mujoco.common.kinds import Array, Fields, Names
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.kinds import Array, Floats
+from smc_mujoco.common.aliases import Array, Floats
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT
 from smc_mujoco.mechanisms.hardware.part import dof_ids, driven_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant

@@ -29,10 +29,10 @@ from typing import Annotated, ClassVar
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Pair
 from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
-from smc_mujoco.common.kinds import Pair
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Field, Plant
 

@@ -24,10 +24,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
+from smc_mujoco.common.aliases import Fields, Floats, Names, Numbers
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
-from smc_mujoco.common.kinds import Fields, Floats, Names, Numbers
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names

@@ -18,11 +18,11 @@ from typing import Annotated
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.constraints import Number, Range
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Array, Pair
 from smc_mujoco.mechanisms.hardware import contact
 from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, solref
 from smc_mujoco.mechanisms.hardware.part import OWN, Positive, moving_joints, state_with

@@ -24,7 +24,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from smc_mujoco.common.kinds import Array, ArrayPair
+from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.mechanisms.plant import Plant
 
 GRID_POINTS = 201  # of a grid along each axis: odd, so that it has the origin

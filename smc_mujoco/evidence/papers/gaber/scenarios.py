@@ -13,9 +13,9 @@ plants' parameters are in their files.
 import dataclasses
 from collections.abc import Sequence
 
+from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.kinds import Data
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.simulation.conditions import (  # noqa: F401
     CONTROL_PERIOD,

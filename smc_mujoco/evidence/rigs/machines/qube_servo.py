@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from smc_mujoco.common.kinds import Array
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.evidence.rigs.controllers import rotary, state_feedback
 from smc_mujoco.evidence.rigs.records import STATE_SAMPLES, Columns, Record, rate
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig

@@ -1,4 +1,4 @@
-"""Types that many signatures share."""
+"""Short names of types that many signatures share."""
 
 import os
 from collections.abc import Mapping
