@@ -42,9 +42,19 @@ INPUT_FIELDS = tuple(n for n in Measurement._fields if n not in ("has_surface", 
 PERIOD_TOLERANCE = 1e-6  # relative difference below which two periods are equal
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
-_running: dict[
-    int, "Running"
-] = {}  # number of an instance, which its law's memory holds -> the instance
+
+class Instances:
+    """The instances that run, by the number that the law's memory holds."""
+
+    def __init__(self) -> None:
+        self.by_number: dict[int, Running] = {}
+
+    def __reduce__(self) -> str:
+        """Pickle by name: a law's fingerprint does not depend on what runs meanwhile."""
+        return "_running"
+
+
+_running = Instances()
 _numbers = itertools.count(1)
 
 
@@ -91,7 +101,7 @@ class FmuLaw(Uncompiled):
         """
         if memory[0] == 0.0:
             memory[0] = self._begin(y, gains, memory)
-        running = _running[int(memory[0])]
+        running = _running.by_number[int(memory[0])]
         every, length = steps(self.period, y.dt)
         done, due = running.steps
         k = math.floor((y.t - running.start) / y.dt + PERIOD_TOLERANCE)
@@ -117,7 +127,7 @@ class FmuLaw(Uncompiled):
         made = Slave(
             str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t
         )
-        _running[place] = Running(self, made, y.t, [0.0, 0.0], [0, 0])
+        _running.by_number[place] = Running(self, made, y.t, [0.0, 0.0], [0, 0])
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place
@@ -142,7 +152,7 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
 def _end(place: int) -> None:
     """End an instance, if it has not ended yet. Exceptions of its library are ignored."""
     try:
-        _running.pop(place).slave.close()
+        _running.by_number.pop(place).slave.close()
     except Exception:
         return
 

@@ -129,7 +129,7 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
     )()
     assert law.function is not None
     gc.collect()
-    before = dict(load._running)
+    before = dict(load._running.by_number)
     y = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0)
     gains = gains_of(law)
     memory = np.zeros(1)
@@ -137,9 +137,9 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
     assert first != second
     memory = np.zeros(1)
     assert law.function(y, gains, memory) == first
-    assert len(load._running) == len(before) + 1
+    assert len(load._running.by_number) == len(before) + 1
     del memory
-    assert load._running == before
+    assert load._running.by_number == before
 
 
 def test_another_process_takes_the_law_from_the_file(folder):
