@@ -393,8 +393,7 @@ def margins_of(
             cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
     searches = [kind.search(base, resolution) for base, kind in cells]
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
-    work = 0.0 if resolution == COARSE else math.inf
-    runs = Runs({"rest_share": rest_share}, device, threads, work)
+    runs = Runs({"rest_share": rest_share}, device, threads, resolution != COARSE)
     done = 0
 
     def tolerated(tried: Sequence[tuple[int, float | None]], runner: Callable) -> list[bool]:

@@ -144,6 +144,7 @@ class SobolResult:
     failed: Array  # (N,) bool, whether it fails or ends beyond 5 % of its scale
     unscored: int  # how many of them have no score
     regions: tuple[Region, ...]
+    checked: str  # how far the fast engine's scores are from MuJoCo's; "" if MuJoCo made all runs
 
 
 def _random(scenario: Scenario) -> bool:

@@ -56,6 +56,8 @@ def draw(
         _runs(runs, found, colour)
         about = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
         pages.set_head(page, width, title or about, handles)
+        if found.checked:
+            page.supxlabel(found.checked, wrap=True, color=style.MUTED, size="small")
         return pages.write(page, paths)
 
 

@@ -148,10 +148,12 @@ class Trial(NamedTuple):
 
     def check(self, laws: Mapping[str, Laws]) -> None:
         """Refuse, before gains are searched, two things of one name, what moves nothing, and a
-        device whose package is missing.
+        device that is missing, or its package.
         """
         if self.device == "cuda":
-            from smc_mujoco.analysis.engine import gpu  # noqa: F401  # which refuses it
+            from smc_mujoco.analysis.engine import gpu
+
+            gpu.check_device()
         for of_plant in laws.values():
             made = list(map(coerce.law, of_plant))
             check_names(self.plants, made, self.conditions)

@@ -27,7 +27,7 @@ import numpy as np
 
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.engine.runs import Runs, many
 from smc_mujoco.analysis.margins import TOLERATED_ERROR, rest_share
 from smc_mujoco.analysis.sensitivity import (
     CHANCE,
@@ -81,7 +81,6 @@ class Sensitivity(Tables, SobolResult):
     within: Uncertainty
     improvement: Improvement | None  # None if no half of an axis is better
     runs: int  # number of all runs
-    checked: str  # how far the fast engine's scores are from MuJoCo's; "" if MuJoCo made all runs
 
     def __repr__(self) -> str:
         return f"Sensitivity({self})"
@@ -120,6 +119,8 @@ class Sensitivity(Tables, SobolResult):
                 share, before = 100 * half.failed, 100 * half.failed_before
                 change += f", and {share:.0f} % fail in place of {before:.0f} %"
             lines.append(f"Narrow first: to {_words(self.space, [half.half])}; {change}.")
+        if self.checked:
+            lines.append(f"{self.checked}.")
         return lines
 
     @property
@@ -151,8 +152,6 @@ class Sensitivity(Tables, SobolResult):
         where = f"{self.scenario.law.name} on {self.scenario.plant.name}"
         title = f"{where}: shares of the variance of {self.label}, %"
         notes = [*self.sentences, KEY]
-        if self.checked:
-            notes.append(f"{self.checked}.")
         if len(self.values) < 2 * ROUGH_POINTS:
             notes.insert(0, f"Fewer than {ROUGH_POINTS} points: intervals are rough, give more.")
         return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
@@ -245,7 +244,7 @@ def sensitivity(
     held = np.empty(len(design), bool)
     work = len(design) * scenario.work
     formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
-    runs = Runs(formulas, device, threads, work, by_group=True)
+    runs = Runs(formulas, device, threads, many(work), by_group=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
         for first in range(0, len(design), AT_ONCE):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.engine.runs import Runs, many
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.cache import cached
@@ -75,10 +75,9 @@ class WorstCase(Tables):
     def __str__(self) -> str:
         s = self.nominal
         label = CATALOGUE[self.metric].label
-        return (
-            f"{s.law.name} on {s.plant.name}: {label} {self.words}, median of random members "
-            f"{self.with_unit(self.median)}; {self.class_words}"
-        )
+        found = f"{label} {self.words}, median of random members {self.with_unit(self.median)}"
+        words = "; ".join(filter(None, (found, self.class_words, self.checked)))
+        return f"{s.law.name} on {s.plant.name}: {words}"
 
     @property
     def heading(self) -> str:
@@ -249,7 +248,7 @@ def worst_case(
         f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress
     ) as drawn:
         formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
-        fast = Runs(formulas, device, threads, work, by_group=True)
+        fast = Runs(formulas, device, threads, many(work), by_group=True)
         drawing, search = (Search(members, entry, budget, fast, drawn.advance) for _ in range(2))
         drawing.draw(np.random.default_rng([seed, 0]))
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)

@@ -71,11 +71,16 @@ def ptx(form: Form, capability: tuple[int, int] = (9, 0)) -> str:
     return cuda.compile_ptx(kernel(form), ARGUMENTS, cc=capability)[0]
 
 
+def check_device() -> None:
+    """Raise ScenarioError if this machine has no CUDA device."""
+    if not cuda.is_available():
+        raise ScenarioError("this machine has no CUDA device: give device 'cpu'")
+
+
 @functools.lru_cache(maxsize=64)
 def compiled(form: Form) -> Any:
     """Return the compiled kernel of a form, for the device of this machine."""
-    if not cuda.is_available():
-        raise ScenarioError("this machine has no CUDA device: give device 'cpu'")
+    check_device()
     return cuda.jit(ARGUMENTS)(kernel(form))
 
 
