@@ -423,7 +423,7 @@ def _contact(plant: Plant, duration: float) -> Data:
     )
 
 
-def _pulsed(plant: Plant, duration: float) -> Data:
+def _stepper(plant: Plant, duration: float) -> Data:
     """Return a stepper motor, and its largest acceleration as the bound on u."""
     motor = of_rig(30.0 * default_u_max(plant))
     return {"actuator": motor, "u_max": motor.ramp}
@@ -450,27 +450,46 @@ def _disturbed(make: Callable[[float], Signal]) -> Recipe:
     return lambda plant, duration: {"disturbance": _sized(make(duration / 2), plant)}
 
 
-def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) -> Recipe:
-    """Return the friction that a function makes of a level, a sixtieth of the bound on each driven
-    joint.
-    """
+def _each_joint(name: str, make: Callable[[float, Plant], Any]) -> Recipe:
+    """Return this field, with what a function makes of the bound on each driven joint."""
 
     def fields(plant: Plant, duration: float) -> Data:
         limits = Scenario.recorded(plant=plant, law="none").limits
-        parts = [make(limit / BOUNDS_PER_FRICTION, plant) for limit in limits]
-        if len(set(limits)) == 1:
-            return {"friction": parts[0]}
-        return {"friction": dict(zip(joint_names(plant), parts, strict=False))}
+        parts = [make(limit, plant) for limit in limits]
+        if plant.pose or len(set(parts)) == 1:
+            return {name: parts[0]}
+        return {name: dict(zip(joint_names(plant), parts, strict=False))}
 
     return fields
 
 
+def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) -> Recipe:
+    """Return the friction that a function makes of a level, a sixtieth of the bound on each driven
+    joint.
+    """
+    return _each_joint("friction", lambda limit, plant: make(limit / BOUNDS_PER_FRICTION, plant))
+
+
 def _bristles(level: float, plant: Plant) -> Friction:
     """Return bristles that bend by 0.1 mrad (mm) before a joint slides, as those of the study do.
-    On the library's plants they have the study's stiffness.
+    On the library's plants they have the study's stiffness. That is late on furuta: with a tenth of
+    the default step `rotary_swing_up` settles 0.6 % earlier and has 3 % more ITAE.
     """
     stiffness = BRISTLE_STIFFNESS * level if plant.is_user_model else LuGre.stiffness
     return LuGre(0.5 * level, level, stribeck=0.05, stiffness=stiffness)
+
+
+def _motor(limit: float, plant: Plant) -> DCMotor:
+    """Return the default motor; on a user's model as many side by side as its bound is of the
+    study's.
+    """
+    count = limit / U_MAX if plant.is_user_model else 1.0
+    return DCMotor(
+        resistance=DCMotor.resistance / count,
+        inductance=DCMotor.inductance / count,
+        rotor_inertia=DCMotor.rotor_inertia * count,
+        current=DCMotor.current * count,
+    )
 
 
 IDEAL: dict[str, Recipe] = {
@@ -495,8 +514,8 @@ REAL: dict[str, Recipe] = {
     "coulomb": _rubbing(lambda level, plant: Coulomb(level)),
     "lugre": _rubbing(_bristles),
     "lag_20ms": {"actuator": Lag(0.02)},
-    "dc_motor": {"actuator": DCMotor()},
-    "stepper": _pulsed,
+    "dc_motor": _each_joint("actuator", _motor),
+    "stepper": _stepper,
     "backlash": {"actuator": Backlash(0.01)},
     "encoder": {"sensor": Encoder(counts=4096)},
     "jitter": {"clock": Clock(jitter=0.5e-3)},

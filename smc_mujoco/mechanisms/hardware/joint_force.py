@@ -121,6 +121,8 @@ def friction_function(
 ) -> Callable[[Callable], Callable[..., JointForce]]:
     """Turn a function (y, p, memory) -> force on a joint, N m (N), into a kind of friction.
 
+    The force is held over a step: y.h times its slope in y.v must stay below the joint's inertia.
+
     Args:
       numbers: names of the numbers that it reads as p, with their defaults. In the friction each is
         one number, or one for each joint.

@@ -252,18 +252,19 @@ def test_a_joint_of_a_file_that_is_no_channel_has_friction_by_name(part):
         )
 
 
-@pytest.mark.parametrize("name", ["coulomb", "friction", "lugre"])
+@pytest.mark.parametrize("name", ["coulomb", "friction", "lugre", "dc_motor"])
 @pytest.mark.parametrize("bounds", [(0.03, 0.03), (120.0, 0.9)])
-def test_named_frictions_of_an_own_machine_are_shares_of_its_own_bounds(name, bounds):
+def test_named_parts_of_an_own_machine_are_shares_of_its_own_bounds(name, bounds):
     lift, turn = bounds
     text = ARM % (lift, lift, turn, turn)
     machine = smc.plant_from(text, channels=["lift", "turn"], name="arm")
     made = smc.Scenario(plant=machine, law="none", **conditions.NAMED[name].on(machine, 1.0))
     for joint, bound in zip(("lift", "turn"), bounds, strict=True):
-        here = [part for part in made.friction if joint in part.joint_names(machine)]
-        dry = next(part for part in here if not isinstance(part, smc.Viscous))
-        level = dry.static if name == "lugre" else dry.level
-        assert level == pytest.approx(bound / 60.0)
+        parts = made.friction or made.actuator
+        here = [part for part in parts if joint in part.joint_names(machine)]
+        field = {"lugre": "static", "dc_motor": "stall"}.get(name, "level")
+        share = smc.DCMotor().stall / 6.0 if name == "dc_motor" else 1.0 / 60.0
+        assert getattr(here[0], field) == pytest.approx(share * bound)
         assert len(here) == (2 if name == "friction" else 1)
 
 

@@ -6,6 +6,7 @@ was found. The sets are draws whose simulated recordings have these figures, see
 benchmarks/stepper_furuta.py.
 """
 
+import dataclasses
 import math
 
 from smc_mujoco.evidence.rigs.controllers import rotary
@@ -20,7 +21,7 @@ from smc_mujoco.evidence.rigs.firmware import (
 from smc_mujoco.evidence.rigs.records import Columns
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.stepper import Stepper
+from smc_mujoco.mechanisms.hardware.stepper import of_rig
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.simulation.signals import Clock, Noise, OrnsteinUhlenbeck
 
@@ -59,13 +60,11 @@ def machine(q):
         cfq=q.pivot_friction,
     )
     step = math.tau / 1600.0  # of the firmware, rad
-    motor = Stepper(
+    motor = dataclasses.replace(
+        of_rig(q.holding_torque),
         steps=round(q.steps) or math.inf,
-        torque=q.holding_torque,
         damping=q.arm_damping,
         rotor_inertia=0.0,
-        speed=15e3 * step,
-        ramp=20e3 * step,
         stop_band=q.stop_band * step,
         queue=q.queue,
         refill=q.refill,
