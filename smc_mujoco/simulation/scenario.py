@@ -157,7 +157,8 @@ class Scenario:
         that settling time, overshoot and bounds are of the speed. The law reads the same.
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
-        also behind a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
+        also behind a Lag, a RateLimit or a DCMotor, with `exact_friction`, and where the noslip
+        pass holds the dry friction of your model's joints; else implicitfast.
       friction: in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of
         them, on the joints that an actuator drives, with their numbers in the unit of each. By
         name, {"slide": Coulomb(0.1), "hinge": Viscous(1e-4)}, any joint has its own, and "*" is all
@@ -379,6 +380,16 @@ class Scenario:
         Coulomb friction is MuJoCo's, and so is what holds joints with a formula.
         """
         return bool(self.exact_parts)
+
+    @property
+    def held_by_noslip(self) -> bool:
+        """Whether MuJoCo's noslip pass holds all dry friction, of a user's joints, beside RK4."""
+        parts = self.contact or {part.exact for part in self.friction} - {DryFriction()}
+        if parts or not self.plant.is_user_model or not all(part.drives for part in self.actuator):
+            return False
+        from smc_mujoco.mechanisms.custom.plant_from import held_by_noslip
+
+        return held_by_noslip(self.plant, REALISTIC_STEP)
 
     @functools.cached_property
     def exact_parts(self) -> tuple[Part, ...]:
@@ -644,7 +655,9 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
-        "integrator": "RK4" if s.plain_equation or s.exact_friction else "implicitfast",
+        "integrator": "RK4"
+        if s.plain_equation or s.exact_friction or s.held_by_noslip
+        else "implicitfast",
     }
     missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
     return missing | {"law": design.at_plant(s.law, s.plant)}

@@ -18,6 +18,7 @@ inertias, and grav in m/s^2.
 
 import base64
 import dataclasses
+import functools
 import math
 import os
 import warnings
@@ -33,6 +34,7 @@ from smc_mujoco.common.aliases import Array, Fields, Names
 from smc_mujoco.common.constraints import OneOf, Timeout, constrained
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
+from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
@@ -442,6 +444,18 @@ def _places(
         if joint not in alone:
             fields["base"] = names.index(joint)
     return units, fields
+
+
+@functools.lru_cache(maxsize=32)
+def held_by_noslip(plant: Plant, step: float) -> bool:
+    """Return whether the noslip pass holds all dry friction, and RK4 with such a step the damping
+    of the joints, which motors alone move.
+    """
+    model = compiled(plant.spec())
+    if (model.opt.noslip_iterations, model.opt.noslip_tolerance) != NOSLIP:
+        return False
+    damped = step * (model.dof_damping @ model.dof_invweight0)  # no mode decays faster than the sum
+    return model.nactuator == plant.driven and damped < 1.0 and not model.tendon_damping.any()
 
 
 def without_model(x, v, i, p):

@@ -620,14 +620,6 @@ def test_dry_friction_of_the_file_holds_what_weighs_less(kind, fields):
     assert np.abs(held.x).max() < (3e-3 if kind == "geared" else 1e-6)  # the file's gear is soft
 
 
-def test_the_file_s_own_softness_of_dry_friction_stays():
-    text, _ = dry_arm("arm")
-    soft = text.replace('frictionloss=".8"', 'frictionloss=".8" solreffriction=".02 1.5"')
-    kept = smc.plant_from(soft, ["a", "b"]).load()
-    assert kept.dof_solref[1].tolist() == [0.02, 1.5]
-    assert kept.dof_solref[0, 0] < 1e-6
-
-
 @pytest.mark.filterwarnings("always:the dry friction of")
 @pytest.mark.parametrize(
     ("kind", "solref"),

@@ -10,7 +10,6 @@ import pytest
 from helpers.models import build
 
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
-from smc_mujoco.mechanisms.hardware.part import drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
 
 IMPLICIT = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -31,8 +30,6 @@ LUGRE = LuGre(
     static=0.08,
     stribeck=0.01,
 )
-ALL = [Viscous(0.1), Coulomb(0.05), LUGRE]
-EACH = pytest.mark.parametrize("part", ALL, ids=lambda part: type(part).__name__)
 
 
 def bare(name, *parts, h=2.5e-4, integrator=IMPLICIT):
@@ -181,18 +178,3 @@ def test_lugre_is_the_formula_of_its_docstring():
         assert data.qfrc_actuator[0] == pytest.approx(
             -(LUGRE.stiffness * 4e-5 + damping * rate), rel=1e-9
         )
-
-
-@EACH
-def test_friction_is_on_every_joint_of_a_network(part):
-    model = build(plant("pendulum_network", n=4), part)
-    data = mujoco.MjData(model)
-    model.opt.gravity[:] = 0.0
-    model.tendon_stiffness[:] = 0.0
-    data.qvel[:] = 1.0
-    for _ in range(1000):
-        mujoco.mj_step(model, data)
-    own = build(plant("pendulum_network", n=4)).dof_damping[0]
-    assert (data.qvel < math.exp(-own / 0.125 * 0.25)).all()
-    assert data.qvel == pytest.approx(data.qvel[0])
-    assert list(drive_ids(model)) == [0, 1, 2, 3]
