@@ -2,16 +2,17 @@
 
 By default, and as "file": a servo holds where the runs start, or the ctrl of the keyframe; the rest
 is as the model says. "held": other joints with a motor are held there too, by a PD of HELD rad/s.
-"locked": every other joint is welded at the start.
+"locked": every other joint is welded at the start, and ties of the channels to it are cut.
 """
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT, Pairs
@@ -171,6 +172,10 @@ def _lock(
     for i, body in enumerate(bodies):
         body.name = body.name or f"body:{i}"
     _exclude(spec, model, bodies)
+    holds = ties(model, joints)[0]
+    for equality, held in zip(list(spec.equalities), holds, strict=True):
+        if not held:
+            spec.delete(equality)
     for i, body in enumerate(bodies):
         loose = [joint for joint in body.joints if joint.name not in joints]
         if loose:
@@ -183,6 +188,36 @@ def _lock(
             joint.axis = to_body @ at.xaxis[number]
             joint.pos = to_body @ (at.xanchor[number] - at.xpos[i])
     _delete_orphans(spec)
+
+
+def ties(model: mujoco.MjModel, joints: Collection[str]) -> tuple[Array, Array]:
+    """Return which equality constraints hold if all but these joints are locked, and which tie one
+    of them to what is locked, (neq,) each. Those of tendons hold.
+    """
+    above = np.zeros((model.nbody, model.njnt), bool)  # the joints that carry a body
+    for i in range(1, model.nbody):
+        above[i] = above[model.body_parentid[i]]
+        above[i, model.jnt_bodyid == i] = True
+    free = np.array([model.joint(i).name in joints for i in range(model.njnt)])
+    holds = np.ones(model.neq, bool)
+    cut = np.zeros(model.neq, bool)
+    kinds = mujoco.mjtEq
+    for k, kind in enumerate(map(kinds, model.eq_type)):
+        first, second = model.eq_obj1id[k], model.eq_obj2id[k]
+        between = np.zeros(model.njnt, bool)
+        if kind == kinds.mjEQ_JOINT:
+            between[first] = True
+            if second >= 0:
+                between[second] = True
+        elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+            if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE.value:
+                first, second = model.site_bodyid[[first, second]]
+            between = above[first] ^ above[second]
+        else:
+            continue
+        holds[k] = np.any(between) and np.all(free[between])
+        cut[k] = np.any(free[between]) and not holds[k]
+    return holds, cut
 
 
 def _place(body: mujoco.MjsBody, parent: int, i: int, at: mujoco.MjData) -> None:
@@ -216,9 +251,8 @@ def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.Mjs
 
 
 def _delete_orphans(spec: mujoco.MjSpec) -> None:
-    """Delete all keyframes, what names a joint that is gone, and ties within one rigid body."""
+    """Delete all keyframes, and what names a joint or a tendon that is gone."""
     left = {"", *(joint.name for joint in spec.joints)}
-    kinds = mujoco.mjtEq
     orphans = [*spec.keys]
     gone = set()
     for tendon in spec.tendons:
@@ -231,26 +265,8 @@ def _delete_orphans(spec: mujoco.MjSpec) -> None:
         if by_tendon or target_of(actuator) not in left:
             orphans.append(actuator)
     for equality in spec.equalities:
-        names = {equality.name1, equality.name2}
-        if (
-            (equality.type == kinds.mjEQ_JOINT and not names <= left)
-            or (equality.type == kinds.mjEQ_TENDON and names & gone)
-            or (equality.type in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and _rigid(spec, equality))
-        ):
+        tendons = {equality.name1, equality.name2}
+        if equality.type == mujoco.mjtEq.mjEQ_TENDON and tendons & gone:
             orphans.append(equality)
     for orphan in reversed(orphans):  # a tendon after what names it
         spec.delete(orphan)
-
-
-def _rigid(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> bool:
-    """Return whether no joint lies between the two bodies that an equality ties."""
-    carriers = set()
-    for name in (equality.name1, equality.name2):
-        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
-            body = spec.site(name).parent
-        else:
-            body = spec.body(name or "world")
-        while body.name != "world" and not body.joints:
-            body = body.parent
-        carriers.add(body.name)
-    return len(carriers) == 1

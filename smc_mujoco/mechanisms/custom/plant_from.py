@@ -216,7 +216,8 @@ def plant_from(
         joints may read its Jacobian.
       others: what other joints do. "file": as the model says; servos hold the start, or the
         keyframe's ctrl. "held": a joint with a motor (in a URDF, with an effort) is held there too,
-        by a stiff PD. "locked": all are welded there. Default: "file", with a warning if that
+        by a stiff PD. "locked": all are welded there, and equality constraints between them and
+        the channels are left out. Default: "file", with a warning if that
         leaves motors at 0.
       measured: names of further joints that are measured but not driven, in the order of their
         channels, which come last. Laws of many joints read them, and they count in scores. A free
@@ -253,16 +254,17 @@ def plant_from(
             f"{source.label} draws joint {joint!r} outside its range, so that the default goal is "
             "the middle of it: give a keyframe or a reference for another one"
         )
-    if others is None and (names := rest_of.limp(spec, [*own.joints_of(pairs), *(measured or ())])):
+    seen = [*own.joints_of(pairs), *(measured or ())]
+    if others is None and (names := rest_of.limp(spec, seen)):
         doubts.append(
             f"joints of {source.label} have motors that nothing commands, "
             f"{joined(map(repr, names))}: give others='held' (+held after the joints in a text), "
             "'locked', or 'file' if they should move freely"
         )
-    if others == "locked" and len(pairs) == 1 and made.load().neq:
+    if others == "locked" and np.any(rest_of.ties(model, seen)[1]):
         doubts.append(
-            f"equality constraints of {source.label} tie joint {pairs[0][0]!r} to what is locked: "
-            "it moves only as they give way, so give others='held', or take them out of the file"
+            f"equality constraints of {source.label} tie its channels to what is locked, and are "
+            "left out: give others='held' to keep them"
         )
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())

@@ -412,16 +412,18 @@ TIES = {
     "bodies": '<connect body1="a" body2="b" anchor="0 0 0"/>',
     "sites": '<connect site1="a" site2="b"/>',
     "weld": '<weld body1="a" body2="b"/>',
+    "joints": '<joint joint1="a" joint2="b"/>',
 }
 
 
 @pytest.mark.parametrize("tie", TIES)
-def test_a_tie_of_what_is_locked_goes_and_one_to_it_is_told_with_a_cure(tie):
+def test_a_tie_to_what_is_locked_is_cut_and_told_with_a_cure(tie):
     text = (
         f"<mujoco><worldbody>{''.join(RODS)}</worldbody><equality>{TIES[tie]}</equality></mujoco>"
     )
     motor = {"motor": True}
     assert smc.plant_from(text, {"c": motor}, others="locked").unmodelled == ""
-    with pytest.warns(ScenarioWarning, match="tie joint 'a' to what is locked.*others='held'"):
-        smc.plant_from(text, {"a": motor}, others="locked")
-    smc.plant_from(text, {"a": motor}, others="held")
+    with pytest.warns(ScenarioWarning, match="tie its channels to what is locked.*others='held'"):
+        assert smc.plant_from(text, {"a": motor}, others="locked").unmodelled == ""
+    for joints, others in (("a", "held"), ("ab", "locked")):
+        assert smc.plant_from(text, dict.fromkeys(joints, motor), others=others).load().neq == 1
