@@ -275,9 +275,11 @@ class Scenario:
         check_inertia(self.resolved)
         check_obstacles(self.resolved)
         check_names(self.resolved)
-        for doubt in (next(_doubts(self.resolved), ""), _made_up_bound(self)):
-            if doubt:
-                warnings.warn(doubt, ScenarioWarning, users_stacklevel())
+        if doubt := next(_doubts(self.resolved), ""):
+            warnings.warn(doubt, ScenarioWarning, users_stacklevel())
+        own = self.plant.is_user_model and self.force_command
+        if own and self.u_max is None and self.law.name != "none":
+            _tell_default_bound(self.plant, self.limits)
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
@@ -1144,33 +1146,22 @@ def _doubts(s: Resolved) -> Iterator[str]:
                 )
 
 
-def _made_up_bound(s: Scenario) -> str:
-    """Return a sentence about the joints of your own model whose force only a default bounds; "" if
-    there are none.
-    """
-    if (
-        s.u_max is not None
-        or not s.plant.is_user_model
-        or not s.force_command
-        or s.law.name == "none"
-    ):
-        return ""
-    driven = range(s.plant.driven)
-    taken = s.resolved.u_max
-    if not isinstance(taken, tuple):
-        taken = (taken,) * len(driven)
-    limits = s.plant.limits or (math.inf,) * len(driven)
-    suggested = s.plant.suggested.get("u_max", (None,) * len(driven))
-    free = [i for i in driven if limits[i] == math.inf and suggested[i] is None]
+@functools.lru_cache(maxsize=32)
+def _tell_default_bound(plant: Plant, limits: tuple[float, ...]) -> None:
+    """Warn, once a plant, of the joints of your own model whose force only a default bounds."""
+    suggested = plant.suggested.get("u_max", (None,) * plant.driven)
+    own = plant.limits or (math.inf,) * plant.driven
+    free = [i for i, limit in enumerate(own) if limit == math.inf and suggested[i] is None]
     if not free:
-        return ""
-    joints = joined(repr(joint_names(s.plant)[i]) for i in free)
-    bounds = joined(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
+        return
+    joints = joined(repr(joint_names(plant)[i]) for i in free)
+    bounds = joined(dict.fromkeys(f"{limits[i]:g} {plant.efforts[i]}" for i in free))
     what = "joint" if len(free) == 1 else "joints"
-    example = f"u_max={taken[free[0]]:g}"
-    if len(driven) > 1:
+    example = f"u_max={limits[free[0]]:g}"
+    if plant.driven > 1:
         example = f"smc.Channel({example}) for each"
-    return (
-        f"nothing bounds the force on {what} {joints} of {s.plant.name}, so that |u| <= {bounds} "
+    text = (
+        f"nothing bounds the force on {what} {joints} of {plant.name}, so that |u| <= {bounds} "
         f"is taken, by its load and inertia: give u_max, what your motor gives, such as {example}"
     )
+    warnings.warn(text, ScenarioWarning, users_stacklevel())

@@ -319,8 +319,12 @@ class Board(Tables):
         if 2 * min_p(largest.samples) <= allowed:
             return ""
         least = next(n for n in itertools.count(1) if 2 * min_p(n) <= allowed)
-        noun = "sets of gains" if largest.sets > 1 else "runs"
-        return f"too few {noun} ({largest.samples}), {least} can decide (seeds, searches)"
+        few = "runs"
+        cure = "more seeds"
+        if largest.sets > 1:
+            few = "sets of gains"
+            cure = "more searches, or leave out quick"
+        return f"too few {few} ({largest.samples}), {least} can decide ({cure})"
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, have not arrived, or never reach a time, such as

@@ -116,7 +116,7 @@ class Advice(Tables):
         if self.left_out:
             notes.append(
                 f"Left out after one search and {FEW} runs in each condition, though the best may "
-                f"be among them: {', '.join(self.left_out)}"
+                f"be among them (leave out quick, or name five laws): {', '.join(self.left_out)}"
             )
         if rare := sorted(self.settles.keys() - {law.name for law in self.laws}):
             notes.append(

@@ -422,26 +422,22 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
         bounds.append(tuple(map(float, model.jnt_actfrcrange[joint_id])))
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
     actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
-    if channel.motor:
-        takes = f"joint {joint!r} of {label} takes"
-        cure = "widen its actuatorfrcrange"
-        return Motor(
-            joint, _limit(takes, cure, *bounds, _together(model, actuators)), tuple(actuators)
-        )
-    if not actuators:
-        raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
+    _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds)
     names = ", ".join(model.actuator(i).name or f"number {i}" for i in actuators)
-    if len(actuators) > 1:
+    if channel.motor:
+        bounds.append(_together(model, actuators))
+    elif not actuators:
+        raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
+    elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
-    if why := _no_motor(model, actuators[0]):
+    elif why := _no_motor(model, actuators[0]):
         raise ScenarioError(
             f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}"
         )
-    _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds)
+    else:
+        bounds.append(_of_actuator(model, actuators[0]))
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
-    return Motor(
-        joint, _limit(gives, CURE, *bounds, _of_actuator(model, actuators[0])), tuple(actuators)
-    )
+    return Motor(joint, _limit(gives, CURE, *bounds), tuple(actuators))
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:

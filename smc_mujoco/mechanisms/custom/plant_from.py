@@ -349,8 +349,8 @@ def _plant(
     name: str | None,
     keyframe: str | None,
     tip: str | None,
-    others: str = "",
-    measured: Iterable[str] | None = None,
+    others: str,
+    measured: Iterable[str] | None,
 ) -> Plant:
     """Return the plant of a model, see `plant_from`."""
     label = source.label
@@ -489,10 +489,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
         return f"equality constraints hold its joints together: {WITHOUT_MODEL}"
     if model.nplugin or model.nflex:
         return f"it has plugins or flexible bodies: {WITHOUT_MODEL}"
-    channel_dofs = []
-    for dof in range(model.nv):
-        if model.joint(int(model.dof_jntid[dof])).name in joints:
-            channel_dofs.append(dof)
+    names = [model.joint(joint).name for joint in model.dof_jntid]
+    channel_dofs = [dof for dof, name in enumerate(names) if name in joints]
     if any(own.is_free(model, joint) for joint in joints[1:]):
         return f"nothing is known of what its base stands on: {WITHOUT_MODEL}"
     idle = np.ones(model.nactuator, bool)

@@ -4,6 +4,7 @@ Tuning and the default bound on u need them.
 """
 
 import functools
+import math
 from typing import NamedTuple
 
 import mujoco
@@ -23,6 +24,7 @@ STIFF = 100.0  # rad/s, of the PD that holds it
 STIFFNESS = 60.0  # 1/s^2, of the inertia, in the need
 DAMPING = 8.0  # 1/s, of the damping, in the need
 MOST = 100.0  # of the need: a larger bound on u is no scale
+UNSTABLE = mujoco.mjtWarning.mjWARN_BADQACC.value
 ROUNDS = 4  # of T and the mobility, which depend on each other
 
 
@@ -76,7 +78,7 @@ def at_goal(plant: Plant) -> AtGoal:
             data.qvel[:] = 0.0
     strayed = 0.0
     if base := _free_base(model):
-        load, strayed = _held(model, data, base, load, M[dofs, dofs])
+        load, strayed = _held(model, data, base, load, M)
     return AtGoal(M, D, K, dofs, load, model.dof_frictionloss[dofs], strayed)
 
 
@@ -94,18 +96,22 @@ def _free_base(model: mujoco.MjModel) -> int:
 
 
 def _held(
-    model: mujoco.MjModel, data: mujoco.MjData, base: int, load: Array, inertia: Array
+    model: mujoco.MjModel, data: mujoco.MjData, base: int, load: Array, M: Array
 ) -> tuple[Array, float]:
     """Hold the goal by a stiff PD. Return its force, (driven,), and how far the base moves, in its
     sizes.
     """
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    model.opt.timestep = min(model.opt.timestep, 0.1 / STIFF)
     joints = driven_ids(model)
     places = model.jnt_qposadr[joints]
     dofs = model.jnt_dofadr[joints]
+    inertia = M[dofs, dofs]
+    # the PD damps what is lighter than its inertia faster
+    fastest = STIFF * np.linalg.eigvals(np.linalg.inv(M)[np.ix_(dofs, dofs)] * inertia).real.max()
+    model.opt.timestep = min(model.opt.timestep, 0.1 / STIFF, 0.5 / fastest)
     goal = data.qpos[places].copy()
     mujoco.mj_forward(model, data)
+    data.warning.number[:] = 1  # MuJoCo tells only the first
     first = data.xpos[base].copy()
     steps = round(HOLD / model.opt.timestep)
     total = np.zeros(len(dofs))
@@ -114,13 +120,13 @@ def _held(
         push = load + inertia * STIFF * (STIFF * error - 2.0 * data.qvel[dofs])
         data.qfrc_applied[dofs] = push
         mujoco.mj_step(model, data)
+        if data.warning.number[UNSTABLE] > 1:
+            return load, math.inf
         if k >= steps // 2:
             total += np.abs(push)
     geoms = np.flatnonzero(model.geom_bodyid == base)
     size = model.geom_rbound[geoms].max(initial=0.0) or model.stat.extent
-    held = total / (steps - steps // 2)
-    if np.isfinite(held).all():
-        load = held
+    load = total / (steps - steps // 2)
     return load, float(np.linalg.norm(data.xpos[base] - first) / size)
 
 
@@ -141,15 +147,14 @@ def beside_goal(plant: Plant) -> Floats:
     more room.
     """
     x0 = list(plant.origin)
-    for i, (_, low, high) in enumerate(plant.ranges[: plant.driven]):
+    limits = plant.ranges or (("", -math.inf, math.inf),) * plant.driven
+    for i, (_, low, high) in enumerate(limits[: plant.driven]):
         up = high - x0[i]
         down = x0[i] - low
         if up >= down:
             x0[i] += min(BESIDE, ROOM * up)
         else:
             x0[i] -= min(BESIDE, ROOM * down)
-    for i in range(plant.driven):
-        x0[i] += 0.0 if plant.ranges else BESIDE
     return tuple(x0)
 
 

@@ -314,6 +314,23 @@ def test_a_joint_that_leans_on_its_stop_never_settles():
         assert np.isinf(smc.score(trace)["settling_time"]) >= leaning
 
 
+# a base lighter than its limb, on springs
+LIGHT = """<mujoco><worldbody><body><joint type="slide" axis="1 0 0" stiffness="1e3"/>
+<joint type="slide" axis="0 0 1" stiffness="1e3" damping="9"/><geom size=".1" mass=".01"/><body>
+<joint name="h" axis="0 1 0"/><geom pos=".5 0 0" size=".05" mass="1"/></body></body></worldbody>
+</mujoco>"""
+
+
+def test_a_light_base_on_springs_does_not_fall_and_its_bound_is_told_once(capfd):
+    light = smc.plant_from(LIGHT, {"h": {"motor": True}})
+    assert scales.falls(light) == ""
+    assert scales.at_goal(light).load == pytest.approx([0.5 * 9.81], rel=1e-2)
+    assert capfd.readouterr().err == ""
+    with pytest.warns(ScenarioWarning, match="nothing bounds the force on joint 'h'") as told:
+        smc.grid(light, [smc.law(name) for name in ("pid", "adrc")])
+    assert len(told) == 1
+
+
 def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch):
     standing = plant("walker", "held")
     assert scales.falls(standing) == ""
@@ -425,5 +442,5 @@ def test_a_tie_to_what_is_locked_is_cut_and_told_with_a_cure(tie):
     assert smc.plant_from(text, {"c": motor}, others="locked").unmodelled == ""
     with pytest.warns(ScenarioWarning, match="tie its channels to what is locked.*others='held'"):
         assert smc.plant_from(text, {"a": motor}, others="locked").unmodelled == ""
-    for joints, others in (("a", "held"), ("ab", "locked")):
-        assert smc.plant_from(text, dict.fromkeys(joints, motor), others=others).load().neq == 1
+    for joints, mode in (("a", "held"), ("ab", "locked")):
+        assert smc.plant_from(text, dict.fromkeys(joints, motor), others=mode).load().neq == 1
