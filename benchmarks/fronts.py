@@ -582,15 +582,15 @@ def judged(points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES) ->
 
 
 def rounded(point: dict) -> dict:
-    """Return what is kept of a point, to five digits, with what is read of its settings."""
+    """Return what is kept of a point, rounded, with what is read of its settings."""
     settings = point["settings"]
     kept = {"wc": settings["wc"], "least": settings["least"]}
     for name in ("plant", "model", "law", "price", "level", "condition", "within", "gains"):
         kept[name] = point[name]
     kept["gains"] = {name: float(f"{value:.5g}") for name, value in point["gains"].items()}
-    name = "J" if point["price"] == "least" else "errors"
-    kept[name] = [float(f"{value:.4g}") for value in point[name]]
-    return kept | {"chose": point["chose"]}
+    for name in ("J", "errors", "rates"):
+        kept[name] = [float(f"{value:.4g}") for value in point[name]]
+    return kept | {"chose": point["chose"], "settled": point["settled"]}
 
 
 def line(point: dict) -> str:
