@@ -45,6 +45,11 @@ def test_the_contents_name_every_page_once():
     assert sorted(NAV) == sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
 
 
+def test_each_table_of_the_site_replaces_a_line_of_one_page(known):
+    pages = "\n".join(page.read_text() for page in DOCS.glob("*.md")).split("\n")
+    assert {pages.count(line) for line in known.SHOWN} == {1}
+
+
 def test_help_lists_every_public_name_once_and_those_of_a_first_script_first(known):
     tasks = known.tasks()
     listed = []

@@ -2,7 +2,6 @@
 stale alone.
 """
 
-import importlib.util
 import os
 import re
 import shutil
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers.sources import loaded
 
 import smc_mujoco
 
@@ -138,13 +138,7 @@ def test_a_stranger_s_code_meets_no_secret():
         assert "pull_request" not in events or "secrets." not in text
 
 
-SPEC = importlib.util.spec_from_file_location("entered", ROOT / ".github" / "entered.py")
-assert SPEC
-assert SPEC.loader
-ENTERED = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(ENTERED)
-
-
+ENTERED = loaded(ROOT / ".github" / "entered.py")
 GIT = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "init.defaultBranch=main"]
 
 

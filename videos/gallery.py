@@ -32,7 +32,6 @@ class Clip(NamedTuple):
     condition: str = "nominal"
     changes: Mapping[str, Any] = {}
     laws: Sequence[str | Law] = ()
-    phone: bool = True  # whether its charts' titles fit a picture for phones
 
     def frames(self, **options: Any) -> Frames:
         """Return the pictures of the clip; options as of `smc.film`."""
@@ -106,7 +105,7 @@ CLIPS = {  # name of the clip's file -> what it shows
             ARM, channels={"shoulder": smc.Channel(x0=-0.6), "elbow": smc.Channel(x0=0.2)}
         ),
         "A robot of your own, a wall and a ball",
-        1.2,
+        1.1,
         changes=STRANGER,
         laws=(
             smc.law("pid", kp=(150.0, 60.0), kd=(15.0, 5.0), ki=(50.0, 20.0)),
@@ -119,7 +118,6 @@ CLIPS = {  # name of the clip's file -> what it shows
         3.2,
         changes=EIGHT,
         laws=("geometric", "quaternion_sliding"),
-        phone=False,
     ),
 }
 
@@ -127,5 +125,4 @@ if __name__ == "__main__":
     for name, clip in CLIPS.items():
         path = write(clip.frames(), FOLDER / f"{name}.webp")
         print(f"{path.relative_to(FOLDER.parents[1])}  {path.stat().st_size / 1e6:.2f} MB")
-        if clip.phone:
-            write(clip.still(), FOLDER / f"{name}.png")
+        write(clip.still(), FOLDER / f"{name}.png")

@@ -1,5 +1,5 @@
-"""What pages show that the package knows, written into them when the site is built: a marker in a
-page -> its text.
+"""What pages show that the package knows, written into them when the site is built, in place of
+links.
 """
 
 import inspect
@@ -198,14 +198,15 @@ def _plain(text: str) -> str:
     return re.sub(r"([|_*<\[\]`\\])", lambda found: f"&#{ord(found[1])};", " ".join(text.split()))
 
 
-SHOWN = {
+METRICS = ", ".join(f"`{metric.name}`" for metric in metrics())
+SHOWN = {  # what the repository's page shows -> lines of the site's
     "<!-- every public name -->": contents,
-    "<!-- every plant -->": machines,
-    "<!-- every law -->": kinds,
-    "<!-- every metric -->": definitions,
+    "[Every plant](../smc_mujoco/mechanisms/plants)": machines,
+    "[Every law](../smc_mujoco/control/laws)": kinds,
+    f"[Their definitions](../smc_mujoco/metrics/catalogue.py): {METRICS}.": definitions,
     "<!-- what holds instead of each claim -->": instead,
-    "<!-- every scene -->": questions,
-    "<!-- every audit -->": audits,
+    "[Every scene](../scenes)": questions,
+    "[Every audit](../benchmarks/papers)": audits,
     "<!-- what decides every claim -->": decisions,
 }
 

@@ -13,7 +13,7 @@ import typer
 from smc_mujoco.cli.commands import analysis, catalogue, runs, studies
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common import annexes
-from smc_mujoco.common.errors import printable
+from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
 
@@ -23,6 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
+DRAWN = ("film", "figure", "plot", "video")  # words that are tried for `run`
 # heading in the help -> commands; the annexes add theirs
 GROUPS: dict[str, list[Callable[..., None]]] = {
     "Run and look": [catalogue.list_, runs.run, runs.show, runs.view],
@@ -58,6 +59,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         signal.signal(signal.SIGTERM, _end)
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = _showing_once()
+    given = sys.argv[1:] if arguments is None else arguments
+    if given and given[0] in DRAWN:
+        with errors_as_sentences():
+            raise ScenarioError(
+                f"no command {given[0]!r}: `smc-mujoco run SCENE` writes figures and a film; in "
+                "Python smc.figure and smc.film draw any traces"
+            )
     app(arguments, prog_name="smc-mujoco")
 
 

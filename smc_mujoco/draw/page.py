@@ -53,7 +53,6 @@ TITLE_PAD = 5.0  # points on a full page, above the title
 # largest width of a legend's entry, of the page's: in several columns, in one
 MAX_SHARE = 0.55
 MAX_SINGLE_SHARE = 0.95
-MAX_NAME = 0.42  # of a full page's width, of a run's name in a legend
 MAX_TICKS = 9  # ticks of an axis, as of matplotlib's
 TICK_LETTERS = 6  # of the label of a tick, and of the space beside it
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks, as of matplotlib's AutoLocator
@@ -214,7 +213,7 @@ def run_handles(
     gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
     looks = style.looks(traces)
     for trace, name, colour, source, look in zip(traces, names, colours, gains, looks, strict=True):
-        words = style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE) + source
+        words = name + source
         if how := style.ending(trace):
             words += f" ({how})"
         handles.append(entry(words, colour, lw=style.points(2.0), **look))

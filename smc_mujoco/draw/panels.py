@@ -455,10 +455,14 @@ def over_time(
     heights = limits(traces, name)
     if name in PEAKS:
         ax.set_yscale("log")
-        if heights[1] > 10.0 * heights[0]:
+        first, last = np.log10(heights)
+        if math.floor(last) > math.ceil(first):
             ax.yaxis.set_minor_formatter(NullFormatter())
-        else:  # numbers between decades may be all there are
+        else:  # with fewer than two decades, numbers between them
             ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+            numbers = FuncFormatter(lambda value, _: style.short(value))
+            ax.yaxis.set_major_formatter(numbers)
+            ax.yaxis.set_minor_formatter(numbers)
     ax.set_ylim(limits(among or traces, name))
     set_numbers(ax.yaxis, panel._replace(traces=among or traces))
     if name == "reaction":
@@ -760,8 +764,8 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     ax.set_xlim(1e3 * (begin - stop), 0.0)
 
 
-def crowded(panel: Panel) -> bool:
-    """Return whether each trace needs a row: it has several channels, or more than MAX_BANDS bands
+def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:
+    """Return whether each trace needs a row: it has several channels, or more than `allowed` bands
     of u are wide.
     """
     if len(panel.group.channels) > 1 and panel.quantity not in SINGLE:
@@ -773,7 +777,7 @@ def crowded(panel: Panel) -> bool:
     for trace in panel.traces:
         _, least, most = band(trace.t, trace.u)
         wide += float(np.mean(most - least)) > MIN_WIDE_BAND * (high - low)
-    return wide > MAX_BANDS
+    return wide > allowed
 
 
 def drawn_channels(y: Array) -> list[int]:

@@ -57,7 +57,14 @@ PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}
 CAMEL = re.compile(r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])")
 MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve they begin again
 # of the runs in a picture, in widths of a line, for the same readers; chosen
-DASHES = ["-", (0, (6, 1.4)), (0, (5, 1.3, 1.2, 1.3)), (0, (1.5, 1.2)), (0, (9, 1.3)), (0, (3, 1))]
+DASHES = [
+    "-",
+    (0, (6, 1.4)),
+    (0, (5, 1.3, 1.2, 1.3)),
+    (0, (1.5, 1.2)),
+    (0, (5, 1.3, 1.2, 1.3, 1.2, 1.3)),
+    (0, (3, 1)),
+]
 MAX_VALUES = 8  # numbers of a label
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST = 61.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper

@@ -33,7 +33,7 @@ CALLS = {
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune "
-    "--worst --quick "
+    "--worst --quick --metrics itae "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
     "--figure f "
     "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda": ["studies.compare.compare"],

@@ -288,6 +288,7 @@ REFUSED = {  # command line -> what the sentence names
     "worst duffing --law pid --bound mass=0.7:1.3,mass=0.5:2": ("mass twice",),
     "worst duffing --law pid --bound delai=0:1": ("'delai'", "delay"),
     "worst duffing --law pid --bound mass=0.3": ("mass",),
+    "film one.npz": ("smc.film",),
     "which arm.xm:shoulder --quick": ("'arm.xm'", ".xml"),
 }
 

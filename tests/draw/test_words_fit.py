@@ -5,12 +5,12 @@ that lasts is cut without an arrow; and each machine fills half of its tile.
 """
 
 import dataclasses
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.boxes import check, recorded, words_of
+from helpers.sources import loaded
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
@@ -18,11 +18,7 @@ from smc_mujoco.draw.film import film
 from smc_mujoco.studies import scene as scenes
 
 ROOT = Path(__file__).parents[2]
-made = importlib.util.spec_from_file_location("gallery", ROOT / "videos" / "gallery.py")
-assert made is not None
-assert made.loader is not None
-gallery = importlib.util.module_from_spec(made)
-made.loader.exec_module(gallery)
+gallery = loaded(ROOT / "videos" / "gallery.py")
 LONGEST = 1.0  # s, of a run, whose words are those of the whole
 SMALLEST = 0.5  # of a tile's height or width, for its machine
 

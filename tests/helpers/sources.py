@@ -1,7 +1,17 @@
-"""Laws in files, as users write them: the C export reads their source."""
+"""Files of Python that are in no package, such as laws as users write them."""
 
-import importlib
+import importlib.util
 import sys
+
+
+def loaded(path):
+    """The module of a file that is in no package."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def strange(text, folder, monkeypatch):

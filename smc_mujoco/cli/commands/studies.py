@@ -13,7 +13,6 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.simulation.grid import Starts
     from smc_mujoco.studies.table import Table
 
 
@@ -118,6 +117,13 @@ def compare(
         float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")
     ] = None,
     x0: options.X0 = None,
+    metrics: Annotated[
+        str | None,
+        typer.Option(
+            help="What to compare, as a,b: scores that `smc-mujoco show` lists, or settles; "
+            "default settles,settling_time,ultimate_bound,itae,tv_rate."
+        ),
+    ] = None,
     relevant: options.Relevant = RELEVANT,
     defaults: options.Defaults = False,
     out: options.Folder = Path("compared"),
@@ -150,12 +156,16 @@ def compare(
     arm.tex
     """
     with delay_ctrl_c():
+        from smc_mujoco.common import annexes
         from smc_mujoco.common.files import with_ending
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
+        from smc_mujoco.studies.leaderboard import METRICS, leaderboard
+        from smc_mujoco.studies.study import FULL, study
 
     terminal = Terminal(json)
     start = options.starts(x0)
+    names = options.names(metrics, METRICS)
     if rig is not None:
         own = (plants, condition, gains != "tuned", worst, figure, latex, seed)
         if any(own):
@@ -163,19 +173,22 @@ def compare(
                 "--rig brings its own plant, parameter sets and gains: leave out the plants, "
                 "--condition, --gains, --worst, --figure, --latex and --seed"
             )
-        _compare_on_rig(
-            rig,
-            law,
-            seeds,
-            searches,
-            duration,
-            start,
-            relevant,
-            defaults,
-            out,
-            threads,
-            terminal,
-        )
+        ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
+        machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
+        chosen = options.laws(law, of_rig=machine.laws) or None
+        length = FULL.duration if duration is None else duration
+        searched = {"folder": out / "searches", "threads": threads, "progress": True}
+        found = []
+        if searches is not None:
+            found = ensemble.tuned(machine, chosen, searches, starts=start, **searched)
+        scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, start)
+        table = study(scenarios, out, True, threads, progress=True, half_steps=True)
+        boards = leaderboard(table, names, defaults=defaults, relevant=relevant)
+        terminal.print(boards)
+        for candidate in found:
+            terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
+        terminal.note(ensemble.verdict(boards))
+        _finish(table, out, terminal)
         return
     latex = latex and with_ending(latex, ".tex")
     options.check_files(None, latex, *files(figure))
@@ -188,6 +201,7 @@ def compare(
         tune,
         worst,
         out=out,
+        metrics=names,
         duration=duration,
         starts=start,
         gains=gains,
@@ -207,42 +221,6 @@ def compare(
         comparison.plot(figure)
         terminal.wrote(*files(figure))
     _finish(comparison.table, out, terminal)
-
-
-def _compare_on_rig(
-    rig: str,
-    law: list[str] | None,
-    seeds: int,
-    searches: int | None,
-    duration: float | None,
-    starts: "Starts | None",
-    relevant: float,
-    defaults: bool,
-    out: Path,
-    threads: int | None,
-    terminal: Terminal,
-) -> None:
-    """Compare laws over the parameter sets of a rig, and say if one law wins on all sets."""
-    from smc_mujoco.common import annexes
-    from smc_mujoco.studies.leaderboard import leaderboard
-    from smc_mujoco.studies.study import FULL, study
-
-    ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
-    machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
-    chosen = options.laws(law, of_rig=machine.laws) or None
-    length = FULL.duration if duration is None else duration
-    tuning = {"starts": starts, "folder": out / "searches", "threads": threads, "progress": True}
-    found = []
-    if searches is not None:
-        found = ensemble.tuned(machine, chosen, searches, **tuning)
-    scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, True, threads, progress=True, half_steps=True)
-    boards = leaderboard(table, defaults=defaults, relevant=relevant)
-    terminal.print(boards)
-    for candidate in found:
-        terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
-    terminal.note(ensemble.verdict(boards))
-    _finish(table, out, terminal)
 
 
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:

@@ -14,6 +14,7 @@ from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 
 FOVY = 9.0  # degrees, chosen: a long lens
 TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen
+HEAD_ROOM = 0.02  # of a picture's width, free above it for heads of arrows; chosen
 TILE_GAP = 2  # px between tiles
 MIN_HEIGHT = 0.25  # of a tile's, for a machine whose words have no room; chosen
 Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees
@@ -124,11 +125,14 @@ def tiles(
     layouts = []
     for rows in range(1, count + 1):
         columns = -(-count // rows)
+        if columns * (rows - 1) >= count:  # a row would be empty
+            continue
         wide = int(size[0] / columns) - TILE_GAP
         tall = int((size[1] - top) / rows) - TILE_GAP
         edge = TILE_EDGE * tall
+        head = HEAD_ROOM * size[0]
         foot = max(tall - edge - strip(wide), MIN_HEIGHT * tall)
-        place = fit(points, turn, (wide, tall), Room(edge, edge, wide - edge, foot))
+        place = fit(points, turn, (wide, tall), Room(edge, head, wide - edge, foot))
         distance = float((place - points.mean(axis=0)) @ turn[:, 2])
         scale = 1.0 / (pixel((wide, tall)) * distance)
         fits = strip(wide) < tall

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 from PIL import Image
 
@@ -24,6 +24,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.film.caption import fitted
 from smc_mujoco.draw.panels import Panel
 from smc_mujoco.metrics.conventions import SETTLING_BAND, last_exit, scale
 from smc_mujoco.simulation.trace import Trace
@@ -41,7 +42,7 @@ LANE_GAP = 8  # points between a lane, and how far u swings
 LANE_HEIGHT = 0.84  # of a lane's pitch
 END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
-LEFT = 0.062  # of the width: where the charts begin
+LEFT = 0.062  # of the width, at least: where the charts begin
 RIGHT = 0.985
 CHART_GAP = 0.0664  # of the width, between two charts
 
@@ -81,8 +82,9 @@ class Charts:
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
-            gap = CHART_GAP / ((RIGHT - LEFT + CHART_GAP) / len(strip) - CHART_GAP)
-            figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.13, top=0.85, wspace=gap)
+            left = max(LEFT, style.width("−00.00", LETTERS * DPI * scale / 72) / size[0])
+            gap = CHART_GAP / ((RIGHT - left + CHART_GAP) / len(strip) - CHART_GAP)
+            figure.subplots_adjust(left=left, right=RIGHT, bottom=0.13, top=0.85, wspace=gap)
             artists: list[Artist] = []
             rows = []
             for ax, panel in zip(axes, strip, strict=True):
@@ -95,7 +97,6 @@ class Charts:
                     row.tick_params(length=0)
                     panels.mark(row, style.marks(traces, names), named=False)
                     artists += panels.over_time(row, part, shades, panel.traces, bands, names)
-                    row.yaxis.set_minor_formatter(NullFormatter())
                     artists += settled(row, part, shades)
                     if laned:
                         tell_swing(row, part.traces[0], shades[0])
@@ -187,8 +188,8 @@ class Charts:
 
 
 def in_lanes(panel: Panel) -> bool:
-    """Return whether each law's u has a lane: else bands of several laws would hide each other."""
-    return panel.quantity == "u" and len(panel.traces) > 1 and panels.crowded(panel)
+    """Return whether each law's u has a lane: else a wide band would hide the others."""
+    return panel.quantity == "u" and len(panel.traces) > 1 and panels.crowded(panel, 0)
 
 
 def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
@@ -255,20 +256,22 @@ def set_titles(ax: Axes, panel: Panel, point: float) -> None:
     """Set the panel's label at the left and, at the right, as much of what its lines mean as fits;
     `point` in px.
     """
-    ax.set_title(panel.label)
+    wide = ax.get_window_extent().width
+    room = wide + (1.0 - RIGHT) * ax.figure.bbox.width
+    words, size = fitted(panel.label, room, TITLE_LETTERS * point)
+    ax.set_title(words, fontsize=size / point)
     choices = []
     if panel.quantity == "x":
         choices = [f"▼ settled to {100 * SETTLING_BAND:g} %", f"▼ {100 * SETTLING_BAND:g} %"]
     else:
         meaning = panels.meaning([panel])
-        if panels.crowded(panel):
+        if panels.crowded(panel, 0):
             meaning.pop("band", None)
-        words = [f"{name}: {text}" for name, text in meaning.items()]
-        while words:
-            choices.append(", ".join(words))
-            words.pop()
-    label = style.width(panel.label, TITLE_LETTERS * point, bold=True)
-    room = ax.get_window_extent().width - label - 10 * point
+        said = [f"{name}: {text}" for name, text in meaning.items()]
+        while said:
+            choices.append(", ".join(said))
+            said.pop()
+    room = wide - style.width(words, size, bold=True) - 10 * point
     fitting = [text for text in choices if style.width(text, LETTERS * point) <= room]
     panels.note(ax, fitting[0] if fitting else "")
 

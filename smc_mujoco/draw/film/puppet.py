@@ -178,13 +178,12 @@ class Puppet:
             return points
         model = self.model
         points = np.concatenate([*self.places, *self.goals, *(line for _, line in lines)])
-        groups = model.geom_group.copy()
         on_stage = self.scenario.plant.on_stage
         axes = self.data[0].xaxis[self.ids[self.slides]]
         machines = [shape.model for shape in self.shapes]
         raised = scene.cut(machines, points, axes, on_stage)
         scene.forward(model, self.data[0])
-        kept = scene.still(model) & (model.geom_group == groups)
+        kept = scene.still(model) & (model.geom_group < scene.HIDDEN_GROUP)
         standing = scene.boxes(model, self.data[0])[kept]
         low = points.min(axis=0)
         high = points.max(axis=0)
