@@ -14,7 +14,6 @@ import re
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
@@ -486,6 +485,7 @@ def run_of(prepared: Prepared, part: Part) -> Run:
         v0=[s.v0[i] for i in joints],
         dofs=shared.channels["qvel"][joints].tolist(),
         load=functools.partial(with_values, shared.model, prepared.scenario),
+        jump_step=s.jump_step,
         draw=draw,
     )
 
@@ -502,50 +502,21 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
         numbers = [buffer.put(row) for row in part.numbers(run)]
         memories = [buffer.put(row) for row in part.start(run)]
         compiled = buffer.part(part, kind)
-        frictions = _frictions(prepared, part, run) if kind == "brake" else []
+        frictions = part.friction_rows(run)
         for place, i in enumerate(part.channels(s.plant)):
             ctrl = -1
             if kind == "force" and part.is_drive:
                 ctrl = channels["ctrl"][i]
             function = {"address": compiled.address, "memory": memories[place]}
             function["parameters"] = numbers[place if len(numbers) > 1 else 0]
-            row = {"function": function, "channel": i, "ctrl": ctrl, "row": -1}
-            if frictions and run.dofs[place] in frictions:
-                row["row"] = frictions.index(run.dofs[place])
+            row = {
+                "function": function,
+                "channel": i,
+                "ctrl": ctrl,
+                "row": frictions.get(place, -1),
+            }
             rows.append(row | {"acts": kind == "act", "staged": kind == "stage_force"})
     return rows
-
-
-def _frictions(prepared: Prepared, part: Part, run: Run) -> list[int]:
-    """Return the degree of freedom of each row of constraints that is its dry friction, else -1.
-
-    Raises:
-      ScenarioError: flags of the model that turn dry friction off, or a jump that moves the rows.
-    """
-    model = run.load()
-    found = _rows_of_friction(model)
-    s = prepared.scenario.resolved
-    if not [*part.fields(model)]:  # it gives no force
-        return found
-    unsafe = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE.value
-    if unsafe or not {*run.dofs} <= {*found}:
-        raise ScenarioError(
-            f"the model's flags turn off what holds a joint that {type(part).__name__} stops: take "
-            "constraint, frictionloss and refsafe out of its <flag>"
-        )
-    if s.jump and _rows_of_friction(with_values(model, prepared.scenario, s.jump_step)) != found:
-        raise ScenarioError(
-            f"the jump takes all dry friction of a joint away beside {type(part).__name__}: give a "
-            "factor such as 1e-9"
-        )
-    return found
-
-
-def _rows_of_friction(model: mujoco.MjModel) -> list[int]:
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    dry = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-    return np.where(dry, data.efc_id, -1).tolist()
 
 
 def _drives(s: Resolved) -> list[dict[str, Any]]:

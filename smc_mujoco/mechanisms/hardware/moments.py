@@ -220,7 +220,8 @@ class Run:
     x0: Sequence[float]
     v0: Sequence[float]
     dofs: Sequence[int]
-    load: Callable[[], Any]
+    load: Callable[..., Any]  # physics step, default 0 -> MjModel with the values from then on
+    jump_step: int  # the first with what the scenario's jump changes; -1 without a jump
     draw: Callable[[], list[float]]
 
     @property

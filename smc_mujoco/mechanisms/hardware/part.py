@@ -82,6 +82,16 @@ class Part:
         """Return the memory of each joint at the start of a run, (n, memory)."""
         return [(0.0,) * self.memory] * run.n
 
+    def friction_rows(self, run: Run) -> dict[int, int]:
+        """Return joint -> row of MuJoCo's constraints, of joints whose dry friction it sets.
+
+        Raises:
+          ScenarioError: flags of the model that turn dry friction off, or a jump that moves the
+            rows.
+        """
+        del run
+        return {}
+
     def channels(self, plant: Plant) -> Sequence[int]:
         """Return the channels on which its functions act; (-1,) if it acts on all at once."""
         return range(plant.n)

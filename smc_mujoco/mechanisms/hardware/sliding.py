@@ -36,6 +36,7 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.common.constraints import Each, Number
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import (
     HIGH,
     RISE,
@@ -45,6 +46,7 @@ from smc_mujoco.mechanisms.hardware.friction import (
     with_rise,
 )
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce, PerJoint
+from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
@@ -113,6 +115,34 @@ class Sliding(JointForce):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         if not self.zero:
             yield from Coulomb(TINY, on=self.on).fields(model)
+
+    def friction_rows(self, run: Run) -> dict[int, int]:
+        if run.rk4:
+            return {}
+        model = run.model
+        found = _dry_joints(model)
+        if not self.zero:
+            unsafe = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE.value
+            if unsafe or not {*run.dofs} <= {*found}:
+                raise ScenarioError(
+                    "the model's flags turn off what holds a joint that "
+                    f"{type(self).__name__} stops: take constraint, frictionloss and refsafe out "
+                    "of its <flag>"
+                )
+            if run.jump_step > 0 and _dry_joints(run.load(run.jump_step)) != found:
+                raise ScenarioError(
+                    "the jump takes all dry friction of a joint away beside "
+                    f"{type(self).__name__}: give a factor such as 1e-9"
+                )
+        return {i: found.index(dof) for i, dof in enumerate(run.dofs) if dof in found}
+
+
+def _dry_joints(model: mujoco.MjModel) -> list[int]:
+    """Return the degree of freedom of each row of constraints that is its dry friction, else -1."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    dry = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+    return np.where(dry, data.efc_id, -1).tolist()
 
 
 @functools.cache
