@@ -483,13 +483,7 @@ def _motor(limit: float, plant: Plant) -> DCMotor:
     """Return the default motor; on a user's model as many side by side as its bound is of the
     study's.
     """
-    count = limit / U_MAX if plant.is_user_model else 1.0
-    return DCMotor(
-        resistance=DCMotor.resistance / count,
-        inductance=DCMotor.inductance / count,
-        rotor_inertia=DCMotor.rotor_inertia * count,
-        current=DCMotor.current * count,
-    )
+    return DCMotor().side_by_side(limit / U_MAX if plant.is_user_model else 1.0)
 
 
 IDEAL: dict[str, Recipe] = {

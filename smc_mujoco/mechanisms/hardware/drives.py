@@ -16,6 +16,7 @@ exact for a speed that changes linearly there.
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a property here)
+import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -193,7 +194,7 @@ class DCMotor(Actuator):
     @property
     def scale(self) -> float:
         """V per unit of u: per N m (N) of stall torque, or 1 if u is the voltage."""
-        if self.command == "voltage":
+        if self.unit:
             return 1.0
         return self.resistance / self.constant
 
@@ -207,11 +208,10 @@ class DCMotor(Actuator):
         """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is
         the torque.
         """
+        if not self.unit:
+            return NominalDrive()
         per_volt = self.constant / self.resistance
-        by_voltage = NominalDrive(per_volt, per_volt * self.constant)
-        if self.command == "voltage":
-            return by_voltage
-        return NominalDrive()
+        return NominalDrive(per_volt, per_volt * self.constant)
 
     @property
     def stall(self) -> float:
@@ -222,6 +222,17 @@ class DCMotor(Actuator):
     def bound(self) -> float | None:
         """V, the supply, if u is the voltage."""
         return self.voltage if self.unit else None
+
+    def side_by_side(self, count: float) -> "DCMotor":
+        """Return so many of these motors on one joint, as one motor."""
+        return dataclasses.replace(
+            self,
+            resistance=self.resistance / count,
+            inductance=self.inductance / count,
+            rotor_inertia=self.rotor_inertia * count,
+            cogging=self.cogging * count,
+            current=self.current * count,
+        )
 
     @property
     def even(self) -> bool:
