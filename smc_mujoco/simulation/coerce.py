@@ -334,13 +334,13 @@ def contact(name: str, value: object, s: Any) -> tuple[Obstacle, ...]:
 def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]:
     """Return frictions sorted by kind, from one, several or None, or by joint.
 
-    Kinds must differ, and one at most has bristles on a joint.
+    Kinds must differ, and one at most holds a joint at rest.
     """
     items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints(s.plant))
     for part, other in itertools.combinations(items, 2):
         same = type(part) is type(other) and part.on == other.on
         both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
-        if same or (part.bristles and other.bristles and both):
+        if same or (part.holds and other.holds and both):
             kinds = f"{type(part).__name__} and {type(other).__name__}"
             raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
     return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))

@@ -1047,7 +1047,7 @@ def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
     at any time.
     """
-    states = [part for part in s.friction if part.bristles or part.force is not None]
+    states = [part for part in s.friction if part.holds or part.force is not None]
     if s.integrator == "RK4" and states and not s.exact_friction:
         raise ScenarioError(
             f"integrator RK4 has four stages in a step, and the state of {shown(states[0])} moves "

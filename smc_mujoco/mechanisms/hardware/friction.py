@@ -227,7 +227,7 @@ class LuGre(Friction):
         oscillate too long.
     """
 
-    bristles = True
+    holds = True
     forces = "coulomb", "static"
 
     coulomb: Positive

@@ -148,7 +148,7 @@ class Friction(OnJoints):
 
     # Whether it holds a joint at rest by bristles or by MuJoCo's dry friction, which RK4 would not
     # make more accurate. At most one friction may.
-    bristles: ClassVar[bool] = False
+    holds: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
