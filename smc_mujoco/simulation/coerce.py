@@ -232,6 +232,17 @@ def several(kind: type[T], example: str) -> Callable[[str, object, Any], tuple[T
     return convert
 
 
+def disturbance(name: str, value: object, s: Any) -> tuple[Signal, ...]:
+    """Return the disturbances, from one, several or None."""
+    if isinstance(value, Mapping):
+        joint = next(iter(value), "")
+        raise ScenarioError(
+            f"{name} is {shown(value)}, and a signal acts on every driven joint: give the signal "
+            f"alone, or on one joint fault=smc.Fault(at=0.0, bias=0.2, on={joint!r})"
+        )
+    return several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)")(name, value, s)
+
+
 def mismatch(name: str, value: Numbers | None, s: Any) -> Numbers:
     """Return parameter factors; None means no factors."""
     return parameter_factors(name, {} if value is None else value)

@@ -210,9 +210,7 @@ class Scenario:
     feedforward: Signal | None = field(
         coerce.instance(Signal, "one signal, such as smc.signals.TimeSeries(times, values)"), None
     )
-    disturbance: tuple[Signal, ...] = field(
-        coerce.several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)"), None
-    )
+    disturbance: tuple[Signal, ...] = field(coerce.disturbance, None)
     noise: Noise = field(
         coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None
     )

@@ -216,6 +216,14 @@ def test_a_disturbance_is_none_one_or_several():
     assert scenario(disturbance=[sine, smc.Constant(1.0)]).disturbance == (sine, smc.Constant(1.0))
 
 
+def test_a_disturbance_by_joint_is_refused_and_the_fault_that_it_names_acts_there(refused):
+    plant = smc.plant("double_pendulum")
+    push = {"elbow": smc.Sine(1.0, 2.0)}
+    words = refused(lambda: scenario(plant=plant, disturbance=push), "every driven joint")
+    fault = eval(words.partition("fault=")[2])
+    assert scenario(plant=plant, fault=fault).fault.on == "elbow"
+
+
 def test_an_error_of_measurement_is_a_known_signal(refused):
     for error in (
         0.1,

@@ -45,6 +45,7 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
     "ASCII": "save that file as a binary STL",
     "mass and inertia": "give that body a mass and an inertia (<inertial>)",
     "not found Element 'plugin'": "load its library before (mujoco.mj_loadPluginLibrary)",
+    "must be positive in geom": "give its shapes sizes above 0, or delete them",
     "positive eigenvalues": "give that body three moments of inertia above 0",
 }
 OF_A_PART = "not found", "invalid qpos size", "mujocoinclude"  # words on a file that is no model

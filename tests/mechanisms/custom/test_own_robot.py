@@ -175,10 +175,20 @@ def test_what_is_changed_in_a_urdf_is_said_once_by_its_link(tmp_path, kind):
     assert 0.0 < large <= small + middle
 
 
-@pytest.mark.parametrize("kind", [INERTIA, INERTIAL], ids=["point", "massless"])
-def test_a_link_that_moves_without_inertia_is_refused_by_name_and_the_cure_works(tmp_path, kind):
-    file = in_package(tmp_path, kind, 'ixx="0" iyy="0" izz="0"' * (kind == INERTIA))
-    with pytest.raises(smc.ScenarioError, match=r"'l2'.*give that body a mass and an inertia"):
+LIGHT = "'l2'.*give that body a mass and an inertia"
+FLAT = f"{INERTIAL}<collision><geometry><sphere radius='0'/></geometry></collision>"
+REFUSED = {
+    "point": (INERTIA, 'ixx="0" iyy="0" izz="0"', LIGHT),
+    "massless": (INERTIAL, "", LIGHT),
+    "flat": (INERTIAL, FLAT, "give its shapes sizes above 0"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_link_without_inertia_or_size_is_refused_and_the_cure_works(tmp_path, kind):
+    old, new, cure = REFUSED[kind]
+    file = in_package(tmp_path, old, new)
+    with pytest.raises(smc.ScenarioError, match=cure):
         read(file)
     file.write_text(ARM)
     assert read(file)[1] == []
