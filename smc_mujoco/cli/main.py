@@ -82,10 +82,12 @@ def _showing_once() -> Callable[..., None]:
 
 
 def _end(*_: object) -> None:
-    """End as Ctrl-C does, also in a shell's background job, which ignores Ctrl-C."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.raise_signal(signal.SIGINT)
+    """End as Ctrl-C does, also where that is ignored, as in a shell's background job; and at once
+    where it is delayed.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.raise_signal(signal.SIGINT)
+    raise KeyboardInterrupt
 
 
 def play(scene: str) -> None:
