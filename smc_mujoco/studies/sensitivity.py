@@ -59,7 +59,8 @@ if TYPE_CHECKING:
 METRIC = "rms_error"
 # physics steps by default, for a plant of one channel: up to 20 s of a core
 DEFAULT_STEPS = 3_600_000
-MIN_POINTS, MAX_POINTS = 8, 4096  # of the default, powers of 2
+STEPS_BESIDE = 600  # that take as long as to make a run and to score it
+MIN_POINTS = 8  # of the default, a power of 2
 AT_ONCE = 4096  # scenarios in memory at once; chosen
 # with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
 ROUGH_POINTS = 32
@@ -313,9 +314,9 @@ def default_points(scenario: Scenario, axes: int) -> int:
     one core.
     """
     dry = 1 + bool(scenario.friction and not scenario.exact_friction)
-    a_run = scenario.samples * scenario.steps * (1 + scenario.plant.n) / 2 * dry
+    a_run = STEPS_BESIDE + scenario.samples * scenario.steps * (1 + scenario.plant.n) / 2 * dry
     most = DEFAULT_STEPS / (a_run * (axes + 2))
-    return min(max(MIN_POINTS, 2 ** math.floor(math.log2(max(most, 1.0)))), MAX_POINTS)
+    return max(MIN_POINTS, 2 ** math.floor(math.log2(max(most, 1.0))))
 
 
 def _score(trace: Trace, metric: str) -> float:

@@ -358,6 +358,7 @@ def test_the_default_class_has_the_axes_of_machines():
         "period",
         "chance",
     }
+    assert default_points(scenario(duration=0.01), 8) == 512
     assert default_points(scenario(duration=8.0), 8) == 32
     assert default_points(scenario(duration=5.0), 8) == 64
     assert default_points(scenario(plant="panda", law="computed_torque", duration=10.0), 8) == 8
