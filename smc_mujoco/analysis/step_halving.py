@@ -26,7 +26,7 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-RANGE = "the range need not hold the truth"
+RANGE = "the true value may lie outside the range"
 MARK = "*"  # behind a number that depends on the step
 CHATTERS = 10.0  # 1/s: variation of a command a second over its bound, from which it chatters
 NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders

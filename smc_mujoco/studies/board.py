@@ -27,17 +27,18 @@ LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
 MEDIANS = (
-    f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share; "
-    f"of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less."
+    f"Medians with {100 * LEVEL:g} % intervals over runs or, where runs share gains, over sets of "
+    f"gains. With fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, which "
+    "covers less."
 )
 MARKS = (
-    "Marked: no law is better, every run has arrived, and the samples are enough to see a lead. "
-    "Arrived: the error stays within 10 % of the start in the last fifth of the run, or within 5 "
-    "times what the sensor tells apart. "
+    "A mark: no law is better, every run has arrived, and there are enough samples to see a lead. "
+    "Arrived: in the last fifth of the run the error stays within 10 % of the start, or within 5 "
+    "times the sensor's resolution. "
     "'detects 24 %': a lead of 24 % between the law and the one in front would have been seen in "
-    f"{100 * POWER:g} % of such comparisons; 'detects no lead': not even the largest. 'never', "
-    "'fails' and 'not arrived' are no values, and worse than any. 'by the step': the medians at "
-    f"the physics step and at half of it, which differ by more than {APART}; {RANGE}."
+    f"{100 * POWER:g} % of such comparisons; 'detects no lead': no lead would have been, however "
+    "large. 'never', 'fails' and 'not arrived' rank behind every value. 'by the step': the medians "
+    f"at the physics step and at half of it, where they differ by more than {APART}; {RANGE}."
 )
 
 # A word in a table's cells -> what LaTeX prints below the table about it.
@@ -478,8 +479,8 @@ def key(boards: Sequence[Board]) -> str:
     family = max(board.family for board in boards)
     winner = (
         "A winner is better than every other law in a paired test, corrected for "
-        f"{counted(family, 'comparison')} a metric. The rival that a verdict names is the hardest "
-        "to tell from the winner. Pairs of runs tell by how much, not the medians. "
+        f"{counted(family, 'comparison')} per metric. The rival that a verdict names is the one "
+        "hardest to tell from the winner. A lead is measured on pairs of runs, not on medians. "
         f"Ahead means by more than {relevance(boards[0].relevant)}."
     )
     parts = [MEDIANS, MARKS, winner]
@@ -493,8 +494,8 @@ def key(boards: Sequence[Board]) -> str:
 def relevance(share: float) -> str:
     """Return the least relevant difference in words."""
     return (
-        f"{100 * share:g} % of the larger value, where values below what the problem can show "
-        "count as equal (half a count of the encoder, the noise, 1e-4 of the start, "
+        f"{100 * share:g} % of the larger value; values too small for the problem to show count "
+        "as equal (below half a count of the encoder, the noise, 1e-4 of the start, or "
         f"{100 * MIN_COMMAND_SHARE:g} % of the bound on u)"
     )
 

@@ -48,10 +48,10 @@ QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the o
 MAX_BLOCKS = 12
 MAX_SEED = 10**6
 DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
-TIMES = "Time of the laws' compiled code a sample on this machine"
-TIME_HEADINGS = "plant", "law", "of pid's", "median (s)", "99 % quantile (s)"
+TIMES = "Time that the compiled laws take per sample, on this machine"
+TIME_HEADINGS = "plant", "law", "relative to pid", "median (s)", "99 % quantile (s)"
 GAINS = "plant", "law", "gains", "sets", "best set"
-BEST_SET = "Runs take the sets in turn; the best set is that of the search with the least J."
+BEST_SET = "Run i uses set i, and after the last set the first again; the best set has the least J."
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)

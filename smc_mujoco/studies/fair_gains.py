@@ -397,5 +397,5 @@ def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
     best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
     remark = ""
     if names := list(search_space.without_unit(default)):
-        remark = f"no unit, so searched about the default: {joined(names)}"
+        remark = f"searched about the default, for want of a unit: {joined(names)}"
     return Candidate(best, tuple(sets), remark)

@@ -239,7 +239,9 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
         )
     assert kinds(made)["plain_law"] == "tuned here"
     (remark,) = made.remarks
-    assert remark.startswith("plain_law: no unit, so searched about the default: lam and k1")
+    assert remark.startswith(
+        "plain_law: searched about the default, for want of a unit: lam and k1"
+    )
 
 
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):

@@ -47,7 +47,7 @@ def tune(
     ] = "balanced",
     searches: Annotated[int, typer.Option(min=1, help="Independent searches.")] = 12,
     budget: Annotated[
-        int, typer.Option(min=1, help="Sets of gains that a search tries at most, for each gain.")
+        int, typer.Option(min=1, help="The most sets of gains that a search tries, per gain.")
     ] = 64,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches and of the noise.")] = 0,
     out: Annotated[
@@ -70,8 +70,8 @@ def tune(
     Each gain is searched over the same number of decades about a scale that follows from its unit
     and the plant. The objective is error times time, plus variation of u, summed over seven
     conditions in runs of 5 s: nominal, noise, delay, a sine and a constant disturbance, 30 % more
-    and 30 % less mass. Each search has its own start, noise and initial states, so their results
-    show how much of a tuning is chance. The same seed gives the same gains. With
+    and 30 % less mass. Each search has its own start, noise and initial states, so the spread
+    of their results shows how much is chance. The same seed gives the same gains. With
     --out each search is kept in the folder FILE-searches: if you stop the command, it continues
     there.
 
@@ -377,7 +377,7 @@ def chatter(
     If a law switches and the actuator lags, the loop oscillates without end, where the law's
     describing function N and the response L of the linearised mechanism have N L = 1. The column
     "±" is how far the prediction may be off. A star marks a run that changes by more than 5 % from
-    a start moved by 1e-9 of itself, or at half the physics step (2.5 % without RK4). The column
+    a start that differs by 1e-9 of itself, or at half the physics step (2.5 % without RK4). Column
     "third" is the third harmonic over the first. With several driven channels, "coupling" is how
     far this channel's command moves another one, over how far it moves this one: if large, the
     prediction fails.

@@ -44,9 +44,9 @@ def list_(
     """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in
     full.
 
-    The line about an entry of another installed package ends with the name of that package, in
-    brackets. A law is shown with its gains and source. The command "smc-mujoco which" compares laws
-    that suit a plant, and recommends one.
+    What another installed package adds is followed by that package's name in brackets. A law is
+    shown with its gains and source. The command "smc-mujoco which" compares the laws that suit a
+    plant, and recommends one.
 
     FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong
     with it (docs/c.md). That process is not a sandbox: the law can open files and connections, like

@@ -143,9 +143,9 @@ PlantName = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="A plant from `smc-mujoco list`, or yours, a .xml or .urdf: "
-        "FILE.xml:joint+joint@keyframe+held (or +locked), where a joint "
-        'may be "joint(motor,partner=pole,u_max=9,x0=0.2)", or "joint(measured)".',
+        help="A plant from `smc-mujoco list`, or your own .xml or .urdf: "
+        "FILE.xml:joint+joint@keyframe+held (or +locked). A joint may be written "
+        '"joint(motor,partner=pole,u_max=9,x0=0.2)" or "joint(measured)".',
     ),
 ]
 Quick = Annotated[

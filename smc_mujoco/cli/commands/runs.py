@@ -41,11 +41,11 @@ def run(
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
-    Each run is repeated at half the physics step, and from a start moved by 1e-9 of itself; at a
-    quarter of the step too if u chatters, and under RK4 too if there are contacts. A score that
-    changes by more than 5 % is marked (without RK4 2.5 % at half the step).
+    Each run is repeated at half the physics step and from a start that differs by 1e-9 of itself;
+    also at a quarter of the step if u chatters, and under RK4 if there are contacts. A score that
+    changes by more than 5 % is marked (2.5 % at half the step without RK4).
 
-    Exported traces have every number to the last bit, and its unit.
+    Exported traces keep every number to the last bit, with its unit.
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """

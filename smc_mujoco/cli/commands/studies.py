@@ -105,11 +105,12 @@ def compare(
         int | None,
         typer.Option(
             min=1,
-            help="How many searches tune a law; default 12. With --rig no law is tuned without it.",
+            help="How many searches tune a law; default 12. With --rig, laws are tuned only if "
+            "it is given.",
         ),
     ] = None,
     worst: Annotated[
-        bool, typer.Option("--worst", help="Also search the worst case of each law.")
+        bool, typer.Option("--worst", help="Also search for the worst case of each law.")
     ] = False,
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
@@ -142,12 +143,12 @@ def compare(
     """Compare laws on plants in conditions: tune the laws that have no gains, run all of them, and
     say which is better and how sure that is.
 
-    A law with gains in brackets keeps them. Any other law, including one from your own file, has
-    the package's gains for the plant, or else is tuned by the same rule, which takes seconds to
-    minutes for each law on each plant. If you stop the command, it continues when you start it
-    again. --law all compares every general law. With --rig laws have the machine's gains, or those
-    that --searches finds on its parameter sets, and a line for each metric says whether one law
-    wins on all sets.
+    A law with gains in brackets keeps them. Any other law, including one from your own file, uses
+    the package's gains for the plant or, if there are none, is tuned by the same rule, which takes
+    seconds to minutes for each law on each plant. If you stop the command, it continues when you
+    start it again. --law all compares every general law. With --rig, laws use the machine's gains,
+    or those that --searches finds on its parameter sets; a line for each metric says whether one
+    law wins on every set.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder
