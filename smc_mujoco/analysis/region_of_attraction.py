@@ -304,7 +304,7 @@ def verdict_of(trace: Trace, x: Array, v: Array, final: bool) -> int | None:
     reach = _reach(x, v, trace.scenario.resolved.u_max, final)
     signals = trace.x, trace.v, trace.u, trace.r
     row = np.array([samples, late, *reach])
-    outcome = over_samples(trace.x.shape[1])(row, *map(np.ascontiguousarray, signals))
+    outcome = over_samples(trace.x.shape[1])(row, np.hstack(signals))
     return outcome if outcome or final else None
 
 

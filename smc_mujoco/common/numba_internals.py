@@ -12,6 +12,7 @@ from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.serialize import dumps
 from numba.core.typing.templates import builtin_registry
+from numba.np import arrayobj
 
 DYNAMIC_MODULE = "<dynamic>"  # stands for a module that cannot be imported
 UNRESOLVED = ".numba.unresolved$"  # begins the name of what is filled in by the linker

@@ -197,6 +197,13 @@ class Component:
             return [self]
         return [self.of_channel(i) for i in range(n)]
 
+    def numbers(self, count: int) -> list[float]:
+        """Return each gain's values in so many channels, gain by gain."""
+        found = []
+        for value in self.gains.values():
+            found += [gain_at(value, i) for i in range(count)]
+        return found
+
     def __str__(self):
         gains = ", ".join(f"{name}={gain_text(value)}" for name, value in self.gains.items())
         return f"{self.name}({gains})"

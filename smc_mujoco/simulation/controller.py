@@ -116,9 +116,9 @@ def control(address, sim, data):  # noqa: PLR0912
 
 
 @njit(error_model="numpy", inline="always")
-def _late(sim, k):
+def lateness(sim, k, last):
     """Return by how many physics steps sample k is late; -1 if it does not run."""
-    if k == 0 or k == sim.samples - 1:
+    if k in (0, last):
         return 0
     if sim.missed != 0.0 and philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed:
         return -1
@@ -134,7 +134,7 @@ def _sample(address, sim, data, k, within):
     """Run the law at sample k, if the sample comes in this physics step, `within` steps into its
     period.
     """
-    late = _late(sim, k)
+    late = lateness(sim, k, sim.samples - 1)
     if within == 0 and late != 0:
         _repeat_command(sim, k)
     if within != late:
@@ -573,13 +573,14 @@ def _arrive(sim, data, step):
     if there is one.
     """
     past = step - sim.delay
-    arrives = past >= 0 and past % sim.steps == _late(sim, past // sim.steps)
+    sent = past // sim.steps
+    arrives = past >= 0 and past % sim.steps == lateness(sim, sent, sim.samples - 1)
     faulty = step >= sim.fault_step
     if faulty and sim.stuck != 0 and sim.failing < 0:
         return
     if arrives or step == sim.fault_step:  # a fault begins on what is held
         sim.arrived = 1
-        buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
+        buffer = pointer(sim.delay_buffer + 8 * sim.n * (sent % sim.delay_slots))
         for i in range(sim.n):
             state = state_at(sim.states, i)
             u = buffer[i] if arrives else state.delayed
@@ -817,7 +818,7 @@ def _exert(address, sim, data, part):
     if sim.stage == 0 and not abs(out.force) < MAX_CONTROL:
         return 1
     if part.row >= 0:
-        state.level = data.dof_frictionloss[joint] + out.held
+        state.level = data.dof_frictionloss[joint] + out.grip
         if not state.level < MAX_CONTROL:
             return 1
         if place(data.efc_frictionloss) != 0:  # MuJoCo has had room for its constraints
@@ -829,7 +830,7 @@ def _exert(address, sim, data, part):
     state.exerted += out.force
     state.reaction += out.force / weight
     if part.staged != 0:
-        state.held += out.held
+        state.held += out.grip
     return 0
 
 

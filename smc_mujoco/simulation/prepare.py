@@ -20,7 +20,7 @@ from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
 from smc_mujoco.common.jit import NotCompilable, Uncompiled
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.component import Component, gain_at
+from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
@@ -199,7 +199,7 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
     values = _shared_functions(s, nominal, buffer)
-    values |= _settings(s)
+    values |= settings(s)
     values |= _moments(prepared, tables["parts"], buffer)
     values |= _arrays(s, buffer)
     if s.law.joint:
@@ -317,10 +317,7 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
     size = s.plant.driven if s.law.joint else 1  # numbers of a gain
     laws = []
     for law in buffer.laws():
-        gains = []
-        for value in law.gains.values():
-            gains += [gain_at(value, i) for i in range(size)]
-        laws.append(_function(buffer.component(law), gains, buffer) | memory)
+        laws.append(_function(buffer.component(law), law.numbers(size), buffer) | memory)
     disturbances = []
     for i, d in enumerate(s.disturbance):
         body = -1
@@ -370,7 +367,7 @@ def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, i
     return _function(compiled, cfunctions.signal_values(signal), buffer, signal.memory, channels)
 
 
-def _settings(s: Resolved) -> dict[str, Any]:
+def settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, delay and noise."""
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
@@ -467,11 +464,13 @@ def _native_nominal(s: Resolved) -> Native | None:
     return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest)
 
 
-def run_of(prepared: Prepared, part: Part) -> Run:
+def run_of(scenario: Scenario, part: Part) -> Run:
     """Return what the numbers of a part may depend on."""
-    s = prepared.scenario.resolved
-    shared = prepared.mechanism
+    s = scenario.resolved
     joints = [i for i in part.channels(s.plant) if i >= 0]
+
+    def locate() -> list[int]:
+        return mechanism(scenario).channels["qvel"][joints].tolist()
 
     def draw() -> list[float]:
         return [philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53 for i in joints]
@@ -483,8 +482,8 @@ def run_of(prepared: Prepared, part: Part) -> Run:
         rk4=s.integrator == "RK4",
         x0=[s.x0[i] for i in joints],
         v0=[s.v0[i] for i in joints],
-        dofs=shared.channels["qvel"][joints].tolist(),
-        load=functools.partial(with_values, shared.model, prepared.scenario),
+        locate=locate,
+        load=lambda step=0: with_values(mechanism(scenario).model, scenario, step),
         jump_step=s.jump_step,
         draw=draw,
     )
@@ -498,7 +497,7 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     channels = prepared.mechanism.channels
     rows = []
     for part, kind in s.acting:
-        run = run_of(prepared, part)
+        run = run_of(prepared.scenario, part)
         numbers = [buffer.put(row) for row in part.numbers(run)]
         memories = [buffer.put(row) for row in part.start(run)]
         compiled = buffer.part(part, kind)
@@ -541,7 +540,7 @@ def _readers(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     s = prepared.scenario.resolved
     rows: list[dict[str, Any]] = [{}] * s.plant.n
     for sensor in s.sensors:
-        numbers = sensor.numbers(run_of(prepared, sensor))[0]
+        numbers = sensor.numbers(run_of(prepared.scenario, sensor))[0]
         compiled = buffer.part(sensor, "read")
         for i in sensor.channels(s.plant):
             function = _function(compiled, numbers, buffer, sensor.memory)

@@ -41,7 +41,9 @@ MODEL = floats(("f", "g"))
 SIGHT = floats(Sight._fields)
 RAW = floats(("x", "v"))
 JOINT_STATE = floats(JointState._fields)
-EXERTED = floats(("force", "held", "away"))
+# grip: the level of dry friction, N m (N), of a `brake`; for how many s it holds the joint, of a
+# `stage_force`
+EXERTED = floats(("force", "grip", "away"))
 
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
 # and of its arrays.

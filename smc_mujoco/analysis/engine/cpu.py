@@ -73,12 +73,11 @@ def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None
         for part in parts:
             piece(part)
     else:
-        with ThreadPoolExecutor(threads) as pool:
-            try:
-                list(pool.map(piece, parts))
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+        pool = ThreadPoolExecutor(threads)
+        try:
+            list(pool.map(piece, parts))
+        finally:  # Ctrl-C waits for the pieces that run
+            pool.shutdown(cancel_futures=True)
     return scores
 
 

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from smc_mujoco.common.aliases import Fields, Names
 from smc_mujoco.control.joint_law import stored_dtype
 from smc_mujoco.control.measurement import Measurement
-from smc_mujoco.mechanisms.hardware.drives import DriveStep, Series
 
 LOGGED = ("x", "v", "u", "s", "d", "r")  # of a channel at a sample, in a log
 FAILURE, FAILED_STEP, SCORES = range(3)  # places in the scores of a run; metrics follow
@@ -22,11 +21,12 @@ SAMPLED = ("sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r"
 
 
 class Part(NamedTuple):
-    """A function of the user's, with the names of its parameters and its memory in a channel."""
+    """A function that acts on channels, with the names of its parameters and its memory in each."""
 
     function: Any  # None: one in C, whose address is in the row
     names: Names
     memory: int = 0
+    channels: tuple[int, ...] = ()  # on which it acts, with numbers for each; (): on all, with one
 
 
 class Form(NamedTuple):
@@ -35,16 +35,16 @@ class Form(NamedTuple):
     n: int  # channels
     driven: int  # those that have an actuator, which come first
     joint: bool  # whether the law is of many joints
-    laws: tuple[Part, ...]  # of all channels, or one for each
     nominal: Part
-    estimator: Part
-    surface: Part | None
+    laws: tuple[Part, ...]  # of all channels, or one for each
+    estimators: tuple[Part, ...]  # one
+    surfaces: tuple[Part, ...]  # one or none, as are sensors and drives
+    sensors: tuple[Part, ...]
+    drives: tuple[Part, ...]  # between command and force
     frictions: tuple[Part, ...]
-    sensor: Part | None
-    drive: bool  # whether lags or rate limits stand between command and force
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
     disturbances: tuple[type, ...]
-    feedforward: type | None
+    feedforwards: tuple[type, ...]  # one or none
     errors: tuple[type | None, ...]  # of position and velocity
     noise: bool
     true_model: bool
@@ -82,20 +82,12 @@ def row_places(form: Form) -> Places:
         places.take(name, form.n)
     for name in ("known", "before", "after"):
         places.take(name, len(form.nominal.names))
-    for i, law in enumerate(form.laws):
-        if law.function is None:
-            places.take(f"address {i}")
-        places.take(f"law {i}", len(law.names) * (form.driven if form.joint else 1))
-    places.take("estimator", len(form.estimator.names))
-    places.take("surface", len(form.surface.names) if form.surface else 0)
-    places.take("drives", len(DriveStep._fields) * form.n if form.drive else 0)
-    for name in ("levels", "damping"):
+    for name, part in parts(form).items():
+        places.take(f"{name} address")
+        places.take(name, len(part.names) * (form.n if part.channels else 1))
+    for name in ("damping", "levels"):
         places.take(name, form.n if form.frictions else 0)
-    for j, friction in enumerate(form.frictions):
-        places.take(f"friction {j}", (1 + len(friction.names)) * form.n)
-    if form.sensor:
-        places.take("hinges", form.n)
-        places.take("sensor", len(form.sensor.names))
+    places.take("hinges", form.n if form.sensors else 0)
     for name, kind in signals(form).items():
         places.take(name, PARAMETERS + len(parameters(kind)) + 2 * kind.series)
     places.take("reach", 4)
@@ -109,22 +101,17 @@ def work_places(form: Form) -> Places:
     for name in (*STATE, *MEASURED, *SAMPLED):
         places.take(name, form.n)
     places.take("buffer", form.slots * form.n)
-    places.take("law", max(law.memory for law in form.laws) * form.n)
     if any(law.function is None for law in form.laws):
         places.take("commanded", 2 * form.n)
         places.take("measured", measured_places(form))
     for name in ("mean", "motor"):  # forces of the drives
-        if form.drive:
+        if form.drives:
             places.take(name, form.n)
         else:
             places.at[name] = places.at["applied"]
-    places.take("drives", Series.memory * form.n if form.drive else 0)
     places.take("reaction", form.n if form.frictions else 0)
-    for j, friction in enumerate(form.frictions):
-        places.take(f"friction {j}", friction.memory * form.n)
-    places.take("sensor", form.sensor.memory * form.n if form.sensor else 0)
-    places.take("estimator", form.estimator.memory * form.n)
-    places.take("surface", form.surface.memory * form.n if form.surface else 0)
+    for name, part in parts(form).items():
+        places.take(name, part.memory * form.n)
     for name, kind in signals(form).items():
         places.take(name, 1 + kind.memory * form.n)
     for name in form.metrics:
@@ -144,13 +131,23 @@ def measured_places(form: Form) -> int:
     return len(Measurement._fields)
 
 
+def parts(form: Form) -> dict[str, Part]:
+    """Return the functions that act on channels, by the names of their places."""
+    return _named(form, ("laws", "estimators", "surfaces", "sensors", "drives", "frictions"))
+
+
 def signals(form: Form) -> Fields:
     """Return the kinds of a form's signals, by the names of their places."""
-    found: Fields = {"feedforward": form.feedforward}
-    for name in ("references", "disturbances", "errors"):
-        for i, kind in enumerate(getattr(form, name)):
-            found[f"{name} {i}"] = kind
-    return {name: kind for name, kind in found.items() if kind is not None}
+    return _named(form, ("feedforwards", "references", "disturbances", "errors"))
+
+
+def _named(form: Form, names: Names) -> Fields:
+    found = {}
+    for name in names:
+        for i, item in enumerate(getattr(form, name)):
+            if item is not None:
+                found[f"{name} {i}"] = item
+    return found
 
 
 def parameters(kind: Any) -> Names:

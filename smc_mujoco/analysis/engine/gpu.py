@@ -66,11 +66,6 @@ def kernel(form: Form) -> Any:
     return runs
 
 
-def ptx(form: Form, capability: tuple[int, int] = (9, 0)) -> str:
-    """Return the code of a form for devices of a compute capability. No device is needed."""
-    return cuda.compile_ptx(kernel(form), ARGUMENTS, cc=capability)[0]
-
-
 def check_device() -> None:
     """Raise ScenarioError if this machine has no CUDA device."""
     if not cuda.is_available():

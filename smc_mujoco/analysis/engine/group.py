@@ -1,39 +1,38 @@
 """Scenarios as groups of runs that one loop can make: their form, and their numbers in rows."""
 
+import functools
 import math
 from collections import Counter
 from collections.abc import Hashable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from smc_mujoco.analysis.engine.form import (
-    ACTIVE,
     FAILED_STEP,
     FAILURE,
-    PARAMETERS,
     SCORES,
-    STREAM,
+    SETTINGS,
     Form,
     Part,
-    parameters,
     row_places,
-    signals,
 )
 from smc_mujoco.analysis.engine.scores import METRICS, RESTING
+from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
-from smc_mujoco.control.component import Component, gain_at
-from smc_mujoco.mechanisms.hardware.drives import DriveStep, Lag, RateLimit, Series
-from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.hardware.drives import advanced
 from smc_mujoco.metrics.catalogue import TRANSIENT_SHARE
 from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND, groups
 from smc_mujoco.simulation.cfunctions import compile_component
-from smc_mujoco.simulation.prepare import known_values, pause_phase, references
+from smc_mujoco.simulation.prepare import known_values, references, run_of, settings
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
+
+# of the forms of one key
+VARYING: Fields = {"noise": False, "jump": False, "delay": False, "clock": False, "slots": 1}
 
 
 def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu") -> str:
@@ -49,13 +48,12 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
             s.plain_equation or (s.exact_friction and not plant.free)
         ),
         "it has an actuator other than lags and rate limits": not all(
-            isinstance(part, Lag | RateLimit) for part in s.actuator
+            part.in_callback and part.force is None for part in s.actuator
         ),
-        "its sensor reads at its own times, or only some joints": bool(s.readings)
-        or any(sensor.on for sensor in s.sensors),
+        "its sensor reads at its own times": bool(s.readings),
         f"its integrator is {s.integrator}": s.integrator != "RK4",
         "a law of many joints, or in C, is for the processor": device == "cuda"
-        and any(part.function is None for part in _laws(s)),
+        and any(_part(law).function is None for law in s.law.of_channels(plant.driven)),
         "an actuator fails": s.fault is not None,
         "a disturbance acts on a body": any(
             d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
@@ -71,8 +69,48 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
 
 def key(scenario: Scenario) -> Hashable:
     """Return what is equal for scenarios that one loop can run together."""
-    s = scenario.resolved
-    return _parts(s), _fixed(s)
+    return form_of(scenario.resolved)._replace(**VARYING, disturbances=())
+
+
+def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
+    """Return the form of one run."""
+    every = tuple(range(s.plant.n))
+    drives = [Part(advanced, part.names, part.memory, every) for part in _drives(s)]
+    sensors = [Part(part.read, part.names, part.memory, every) for part in s.sensors]
+    laws = []
+    for law in s.law.of_channels(s.plant.driven):
+        laws.append(_part(law)._replace(channels=every if law.joint else ()))
+    frictions = []
+    for part in s.exact_parts:
+        channels = tuple(part.channels(s.plant))
+        frictions.append(Part(part.stage_force, part.names, part.memory, channels))
+    clock = not s.clock.regular
+    slots = 1
+    while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled
+        slots *= 256
+    return Form(
+        n=s.plant.n,
+        driven=s.plant.driven,
+        joint=s.law.joint,
+        nominal=Part(s.plant.nominal, tuple(s.plant.parameters)),
+        laws=tuple(laws),
+        estimators=(_part(s.velocity),),
+        surfaces=tuple(map(_part, filter(None, [s.surface]))),
+        sensors=tuple(sensors[:1]),
+        drives=tuple(drives[:1]),
+        frictions=tuple(frictions),
+        references=tuple(map(type, references(s))),
+        disturbances=tuple(Counter(map(type, s.disturbance)).elements()),
+        feedforwards=tuple(map(type, filter(None, [s.feedforward]))),
+        errors=tuple(None if error is None else type(error) for error in s.noise.errors),
+        noise=bool(s.noise.position or s.noise.velocity),
+        true_model=s.model == "true",
+        jump=bool(s.jump),
+        delay=bool(s.delay_steps),
+        clock=clock,
+        slots=slots,
+        metrics=tuple(metrics),
+    )
 
 
 def _part(c: Component) -> Part:
@@ -82,41 +120,16 @@ def _part(c: Component) -> Part:
     return Part(function, tuple(c.gains), c.memory)
 
 
-def _laws(s: Resolved) -> tuple[Part, ...]:
-    return tuple(map(_part, s.law.of_channels(s.plant.driven)))
+def _drives(s: Resolved) -> list[Any]:
+    """Return the drives of all channels: those of some each."""
+    return [part for part, kind in s.acting if kind == "act"]
 
 
-def _parts(s: Resolved) -> tuple:
-    return (
-        _laws(s),
-        Part(s.plant.nominal, tuple(s.plant.parameters)),
-        _part(s.velocity),
-        None if s.surface is None else _part(s.surface),
-        tuple(Part(part.stage_force, part.names, part.memory) for part in s.exact_parts),
-        next((Part(sensor.read, sensor.names, sensor.memory) for sensor in s.sensors), None),
-    )
-
-
-def _drives(s: Resolved) -> np.ndarray:
-    """Return the DriveStep of every channel, (n, fields); 0 where the force is the command."""
-    factors = np.zeros((s.plant.n, len(DriveStep._fields)))
-    for part, _ in s.acting:
-        if isinstance(part, Series):
-            factors[list(part.of)] = part.effect
-    return factors
-
-
-def _fixed(s: Resolved) -> tuple:
-    return (
-        s.plant.n,
-        s.plant.driven,
-        s.law.joint,
-        bool(s.actuator),
-        tuple(map(type, references(s))),
-        None if s.feedforward is None else type(s.feedforward),
-        tuple(None if error is None else type(error) for error in s.noise.errors),
-        s.model == "true",
-    )
+def wider(form: Form, other: Form) -> Form:
+    """Return a form that also has what another one of the same `key` has, for a loop for both."""
+    flags = {name: max(getattr(form, name), getattr(other, name)) for name in VARYING}
+    kinds = Counter(form.disturbances) | Counter(other.disturbances)
+    return form._replace(**flags, disturbances=tuple(kinds.elements()))
 
 
 class Group:
@@ -125,54 +138,20 @@ class Group:
     Args:
       scenarios: of one `key`.
       metrics: what is scored, names of `scores.METRICS`.
-      known: a form whose code is compiled already; the group's form contains it, to use that code.
+      known: forms that are compiled already; the group's form contains them, to use their code.
     """
 
     def __init__(
-        self, scenarios: Sequence[Scenario], metrics: Sequence[str] = (), known: Form | None = None
+        self, scenarios: Sequence[Scenario], metrics: Sequence[str] = (), known: Sequence[Form] = ()
     ):
-        resolved = [scenario.resolved for scenario in scenarios]
-        first = resolved[0]
-        laws, nominal, estimator, surface, frictions, sensor = _parts(first)
-        n, driven, joint, drive, kinds, feedforward, errors, true_model = _fixed(first)
-        clock = not all(s.clock.regular for s in resolved)
-        delay = max(s.delay_steps // s.steps for s in resolved)
-        slots = 1
-        while slots < delay + 1 + clock:  # few sizes, each of which is compiled
-            slots *= 256
-        kinds_of_all: Counter[type] = Counter()
-        for s in resolved:
-            kinds_of_all |= Counter(map(type, s.disturbance))
-        form = Form(
-            n=n,
-            driven=driven,
-            joint=joint,
-            laws=laws,
-            nominal=nominal,
-            estimator=estimator,
-            surface=surface,
-            frictions=frictions,
-            sensor=sensor,
-            drive=drive,
-            references=kinds,
-            disturbances=tuple(kinds_of_all.elements()),
-            feedforward=feedforward,
-            errors=errors,
-            noise=any(s.noise.position or s.noise.velocity for s in resolved),
-            true_model=true_model,
-            jump=any(s.jump for s in resolved),
-            delay=any(s.delay_steps for s in resolved),
-            clock=clock,
-            slots=slots,
-            metrics=tuple(metrics),
-        )
-        self.form = _wider(form, known)
-        self.scenarios = resolved
+        self.scenarios = [scenario.resolved for scenario in scenarios]
+        forms = dict.fromkeys(form_of(s, metrics) for s in self.scenarios)
+        self.form = functools.reduce(wider, [*forms, *known])
         self.places = row_places(self.form)
-        self.rows = np.zeros((len(resolved), self.places.size))
+        self.rows = np.zeros((len(scenarios), self.places.size))
         self._points: list[np.ndarray] = []
         self._starts: dict[int, int] = {}  # of series in the tables
-        for row, s in zip(self.rows, resolved, strict=True):
+        for row, s in zip(self.rows, self.scenarios, strict=True):
             self._fill(row, s)
         self.tables = np.concatenate([*self._points, np.zeros(1)])
 
@@ -198,73 +177,47 @@ class Group:
 
     def _put(self, row: np.ndarray, name: str, values: Any) -> None:
         first = self.places.at[name]
-        row[first : first + np.size(values)] = np.ravel(values)
+        row[first : first + len(values)] = values
 
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
-        pause, pause_samples = s.clock.pauses(s.control_period, s.physics_step)
         t = np.arange(s.samples + 1) * s.control_period
-        settings = {
+        numbers = settings(s) | {
             "samples": s.samples,
-            "steps": s.steps,
-            "step": s.physics_step,
-            "period": s.control_period,
-            "delay": s.delay_steps,
             "jump_step": s.jump_step,
-            "seed": s.seed,
-            "uses_model": s.model != "none",
-            "sigma_x": s.noise.position,
-            "sigma_v": s.noise.velocity,
-            "jitter": s.clock.jitter_steps(s.physics_step),
-            "missed": s.clock.missed,
-            "pause": pause,
-            "pause_samples": pause_samples,
-            "pause_phase": pause_phase(s) if pause else 0,
-            "bands": _bands(s),
             "early": np.searchsorted(t, TRANSIENT_SHARE * (1.0 - ROUNDING) * t[-1]),
             "late": np.searchsorted(t, t[-1] - LAST_PART * (1 + ROUNDING) * t[-1]),
-            "x0": s.x0,
-            "v0": s.v0,
-            "limits": s.limits,
-            "known": known_values(s),
-            "estimator": list(s.velocity.gains.values()),
-            "surface": list(s.surface.gains.values()) if s.surface else [],
+            "logging": False,
         }
+        row[: len(SETTINGS)] = [numbers[name] for name in SETTINGS]
+        values: Fields = {"x0": s.x0, "v0": s.v0, "limits": s.limits, "bands": _bands(s)}
+        values |= {"known": known_values(s), "estimators 0": s.velocity.numbers(1)}
         for name, step in (("before", 0), ("after", max(s.jump_step, 0))):
-            values = vars(s.plant.values(s.factors(step)))
-            settings[name] = [values[parameter] for parameter in s.plant.parameters]
-        if self.form.drive:
-            settings["drives"] = _drives(s)
-        if self.form.sensor:
-            settings["hinges"] = [unit == "rad" for unit in s.plant.units]
-            settings["sensor"] = s.sensors[0].numbers(cast(Any, None))
-        for name, values in settings.items():
-            self._put(row, name, values)
-        self._fill_frictions(row, s)
-        self._fill_gains(row, s.law)
+            values[name] = [*vars(s.plant.values(s.factors(step))).values()]
+        if s.surface:
+            values["surfaces 0"] = s.surface.numbers(1)
+        for i, law in enumerate(s.law.of_channels(s.plant.driven)):
+            values[f"laws {i}"] = law.numbers(self._columns)
+            if self.form.laws[i].function is None:
+                values[f"laws {i} address"] = [compile_component(law).address]
+        if s.sensors:
+            values["hinges"] = [unit == "rad" for unit in s.plant.units]
+        for name, numbers in values.items():
+            self._put(row, name, numbers)
+        self._fill_hardware(row, s)
         self._fill_signals(row, s)
 
-    def _fill_frictions(self, row: np.ndarray, s: Resolved) -> None:
-        for name, kind, value in (("levels", Coulomb, "level"), ("damping", Viscous, "b")):
-            for part in s.friction:
-                if isinstance(part, kind):
-                    places = self.places.at[name] + np.array(part.channels(s.plant))
-                    row[places] += getattr(part, value)
-        for j, part in enumerate(s.exact_parts):
-            first = self.places.at[f"friction {j}"]
-            size = 1 + len(part.names)
-            for place, i in enumerate(part.channels(s.plant)):
-                numbers = part.parameters(place) if isinstance(part, Sliding) else ()
-                row[first + size * i] = 1.0
-                row[first + size * i + 1 : first + size * i + 1 + len(numbers)] = numbers
-
-    def _fill_gains(self, row: np.ndarray, law: Component) -> None:
-        for i, part in enumerate(law.of_channels(self.form.driven)):
-            gains = []
-            for value in part.gains.values():
-                gains += [gain_at(value, j) for j in range(self._columns)]
-            self._put(row, f"law {i}", gains)
-            if self.form.laws[i].function is None:
-                self._put(row, f"address {i}", compile_component(part).address)
+    def _fill_hardware(self, row: np.ndarray, s: Resolved) -> None:
+        parts = [("drives 0", part) for part in _drives(s)]
+        parts += [("sensors 0", part) for part in s.sensors]
+        parts += [(f"frictions {j}", part) for j, part in enumerate(s.exact_parts)]
+        for name, part in parts:
+            size = len(part.names)
+            first = self.places.at[name]
+            table = row[first : first + size * s.plant.n].reshape(-1, size)
+            table[[*part.channels(s.plant)]] = part.numbers(run_of(s, part))
+        for part in s.friction:
+            for name, value in zip(("damping", "levels"), part.added, strict=True):
+                row[np.add(self.places.at[name], part.channels(s.plant))] += value
 
     @property
     def _columns(self) -> int:
@@ -275,33 +228,29 @@ class Group:
         """Return where a gain of the law is in a row: of every channel."""
         found = []
         for i, part in enumerate(self.form.laws):
-            first = self.places.at[f"law {i}"] + part.names.index(name) * self._columns
+            first = self.places.at[f"laws {i}"] + part.names.index(name) * self._columns
             found += range(first, first + self._columns)
         return found
 
     def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
-        named: dict[str, tuple[Signal | None, int]] = {"feedforward": (s.feedforward, 0)}
+        named: dict[str, Signal | None] = {"feedforwards 0": s.feedforward}
         for i, signal in enumerate(references(s)):
-            named[f"references {i}"] = signal, 0
+            named[f"references {i}"] = signal
         for i, signal in enumerate(s.noise.errors):
-            named[f"errors {i}"] = signal, 0
+            named[f"errors {i}"] = signal
         free = list(self.form.disturbances)
+        streams = {}
         for i, signal in enumerate(s.disturbance):
             place = free.index(type(signal))
             free[place] = type(None)
-            named[f"disturbances {place}"] = signal, s.noise_stream(i)
-        for name, kind in signals(self.form).items():
-            signal, stream = named.get(name, (None, 0))
-            if signal is None:
-                continue
-            numbers = np.zeros(PARAMETERS + len(parameters(kind)) + 2 * kind.series)
-            numbers[ACTIVE] = 1.0
-            numbers[STREAM] = stream
-            values = list(signal.parameters().values())
-            if kind.series:
-                values += [self._table(signal.data), signal.data.shape[1]]
-            numbers[PARAMETERS:] = values
-            self._put(row, name, numbers)
+            named[f"disturbances {place}"] = signal
+            streams[f"disturbances {place}"] = s.noise_stream(i)
+        for name, signal in named.items():
+            if signal is not None:
+                values = [1.0, streams.get(name, 0), *signal.parameters().values()]
+                if signal.series:
+                    values += [self._table(signal.data), signal.data.shape[1]]
+                self._put(row, name, values)
 
     def _table(self, data: np.ndarray) -> int:
         """Return where the points of a series begin in the tables."""
@@ -323,16 +272,3 @@ def _bands(s: Resolved) -> np.ndarray:
         channels = list(group.channels)
         bands[channels] = SETTLING_BAND * (bands[channels].max() or 1.0)
     return bands
-
-
-def _wider(form: Form, other: Form | None) -> Form:
-    """Return a form that also has what another one of the same `key` has, for a loop for both."""
-    if other is None:
-        return form
-    flags = {}
-    for name in ("noise", "jump", "delay", "clock"):
-        flags[name] = getattr(form, name) or getattr(other, name)
-    kinds = Counter(form.disturbances) | Counter(other.disturbances)
-    return form._replace(
-        **flags, disturbances=tuple(kinds.elements()), slots=max(form.slots, other.slots)
-    )

@@ -21,25 +21,26 @@ from smc_mujoco.analysis.engine.form import (
     FAILURE,
     LOGGED,
     PARAMETERS,
+    SETTINGS,
     STREAM,
     Form,
-    Part,
     measured_places,
     parameters,
+    parts,
     row_places,
+    signals,
     work_places,
 )
 from smc_mujoco.analysis.engine.scores import own, tallying
 from smc_mujoco.common.jit import call, named, place
-from smc_mujoco.common.numba_internals import cgutils
+from smc_mujoco.common.numba_internals import arrayobj, cgutils
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import head_at, measurement_at
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware.drives import advanced, factors_at, kept_at
+from smc_mujoco.mechanisms.hardware.drives import kept_at
 from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
 from smc_mujoco.simulation import philox
-from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
-from smc_mujoco.simulation.signals import after_pauses
+from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE, lateness
 from smc_mujoco.simulation.state import DIVERGED, FINE, NOT_FINITE, RAISED
 
 Compiler = Callable[[Any], Any]
@@ -55,12 +56,13 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
     disturb = _disturbing(form, compile_user)
     sample = _sampling(form, compile_user)
     advance = _advancing(form, disturb, compile_user)
-    keep = _keeping(form)
     record = _recording(form)
     n = form.n
-    clock = form.clock
     size = work_at.size
-    X, V = work_at.of("x", "v")
+    X, V, REACTION = work_at.of("x", "v", "reaction")
+    STATE = tuple(work_at.of("x", "v", "d"))
+    SAMPLED = tuple(work_at.of("sample_x", "sample_v", "sample_d"))
+    reactions = n if form.frictions else 0
     SAMPLES, STEPS, STEP, PERIOD, X0, V0 = row_places(form).of(
         "samples", "steps", "step", "period", "x0", "v0"
     )
@@ -90,14 +92,15 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
                 seen = k if within == 0 else -1
                 disturb(row, tables, work, k * row[PERIOD] + within * row[STEP], seen)
                 if within == 0:
-                    keep(work)
-                    if not clock or k == samples:
-                        record(row, work, scores, log, k)
+                    for i in range(n):
+                        for j in range(3):
+                            work[SAMPLED[j] + i] = work[STATE[j] + i]
+                    for i in range(reactions):  # of their mean over the period
+                        work[REACTION + i] = 0.0
                 if k == samples:
                     break
                 advance(row, tables, work, k, within, step)
-            if clock and k < samples:  # a late sample has come
-                record(row, work, scores, log, k)
+            record(row, work, scores, log, k)  # a late sample has come
         scores[FAILURE] = FINE
 
     return simulate
@@ -120,13 +123,14 @@ def view(typingctx, numbers, first, count):
     def codegen(context, builder, signature, args):
         made = cgutils.create_struct_proxy(array)(context, builder)
         eight = context.get_constant(types.intp, 8)
-        made.data = builder.gep(args[0], [args[1]])
-        made.nitems = args[2]
-        made.itemsize = eight
-        made.shape = cgutils.pack_array(builder, [args[2]])
-        made.strides = cgutils.pack_array(builder, [eight])
-        made.meminfo = cgutils.get_null_value(made.meminfo.type)
-        made.parent = cgutils.get_null_value(made.parent.type)
+        arrayobj.populate_array(
+            made,
+            data=builder.gep(args[0], [args[1]]),
+            shape=[args[2]],
+            strides=[eight],
+            itemsize=eight,
+            meminfo=None,
+        )
         return made._getvalue()
 
     return array(numbers, types.intp, types.intp), codegen
@@ -144,10 +148,13 @@ def _pair_of(found):
     return lambda found: (found, math.nan)
 
 
-def _signal(form: Form, name: str, kind: Any, compile_user: Compiler) -> Any:
+def _signal(form: Form, name: str, compile_user: Compiler) -> Any:
     """Return a compiled function (row, tables, work, t, i) -> value, rate and acceleration of a
-    signal in channel i; of one that sees the loop, (row, work, t, e, de, s).
+    signal in channel i, all 0 without one; of one that sees the loop, (row, work, t, e, de, s).
     """
+    kind = signals(form).get(name)
+    if kind is None:
+        return own(lambda row, tables, work, t, i: (0.0, 0.0, 0.0))
     value = compile_user(kind.value)
     values = reader(parameters(kind))
     at = row_places(form).at[name]
@@ -181,15 +188,35 @@ def _signal(form: Form, name: str, kind: Any, compile_user: Compiler) -> Any:
     return own(series if kind.series else plain)
 
 
-def _by_channel(functions: Sequence[Any]) -> Any:
+def _acting(form: Form, name: str, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, y, i) -> what a function of `form.parts` gives
+    channel i for y; None without such a function.
+    """
+    part = parts(form).get(name)
+    if part is None:
+        return None
+    function = compile_user(part.function)
+    numbers = reader(part.names)
+    memory = part.memory
+    size = len(part.names) if part.channels else 0
+    FIRST = row_places(form).at[name]
+    MEMORY = work_places(form).at[name]
+
+    @own
+    def act(row, tables, work, y, i):
+        state = view(work, MEMORY + i * memory, memory)
+        return function(y, numbers(row, FIRST + i * size), state)
+
+    return act
+
+
+def _by_channel(functions: Sequence[Any], j: int = 0) -> Any:
     """Return a compiled function that calls the function of channel i, or the last one."""
-    chosen = functions[-1]
-    for j in range(len(functions) - 2, -1, -1):
-        chosen = _either(j, functions[j], chosen)
-    return chosen
+    function = functions[j]
+    if j == len(functions) - 1:
+        return function
+    others = _by_channel(functions, j + 1)
 
-
-def _either(j: int, function: Any, others: Any) -> Any:
     @own
     def choose(row, tables, work, y, i):
         if i == j:
@@ -199,39 +226,18 @@ def _either(j: int, function: Any, others: Any) -> Any:
     return choose
 
 
-@own
-def _absent(row, tables, work, t, i):
-    return 0.0, 0.0, 0.0
-
-
 def _lateness(form: Form) -> Any:
     """Return a compiled function (row, k) -> by how many physics steps sample k is late; -1 if it
     does not run.
     """
     if not form.clock:
         return own(lambda row, k: 0)
-    SAMPLES, STEPS, SEED, JITTER, MISSED = row_places(form).of(
-        "samples", "steps", "seed", "jitter", "missed"
-    )
-    PAUSE, PAUSE_SAMPLES, PAUSE_PHASE = row_places(form).of("pause", "pause_samples", "pause_phase")
+    settings = reader(SETTINGS)
 
     @own
     def late(row, k):
-        if k == 0 or k == int(row[SAMPLES]):
-            return 0
-        if row[MISSED] != 0.0 and philox.uniform(row[SEED], 0, philox.MISSED, k) < row[MISSED]:
-            return -1
-        if row[PAUSE] != 0.0:
-            return after_pauses(
-                k,
-                int(row[STEPS]),
-                int(row[PAUSE]),
-                int(row[PAUSE_SAMPLES]),
-                int(row[PAUSE_PHASE]),
-            )
-        if row[JITTER] == 0.0:
-            return 0
-        return int(philox.uniform(row[SEED], 0, philox.JITTER, k) * (row[JITTER] + 1.0))
+        numbers = settings(row, 0)
+        return int(lateness(numbers, k, int(numbers.samples)))
 
     return late
 
@@ -252,11 +258,6 @@ def _sampling(form: Form, compile_user: Compiler) -> Any:
     STEPS, STEP, PERIOD, DELAY = row_places(form).of("steps", "step", "period", "delay")
 
     @own
-    def apply(work, k):
-        for i in range(n):
-            work[APPLIED + i] = work[BUFFER + k % slots * n + i]
-
-    @own
     def sample(row, tables, work, k, within, step):
         late = late_of(row, k)
         if within == 0 and late != 0:  # until then the last command stays
@@ -267,18 +268,18 @@ def _sampling(form: Form, compile_user: Compiler) -> Any:
             measure(row, tables, work, k, t)
             if not command(row, tables, work, k, t):
                 return NOT_FINITE
-        if not delayed:
-            if within == late:
-                apply(work, k)
-            return FINE
-        steps = int(row[STEPS])
-        past = step - int(row[DELAY])
-        if past >= 0:
+        sent = k
+        arrives = within == late
+        if delayed:
+            steps = int(row[STEPS])
+            past = step - int(row[DELAY])
             sent = past
             if steps > 1:
                 sent = past // steps
-            if past - sent * steps == late_of(row, sent):
-                apply(work, sent)
+            arrives = past >= 0 and past - sent * steps == late_of(row, sent)
+        if arrives:
+            for i in range(n):
+                work[APPLIED + i] = work[BUFFER + sent % slots * n + i]
         return FINE
 
     return sample
@@ -290,23 +291,15 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
     """
     n = form.n
     noise = form.noise
-    errors = []
-    for i, kind in enumerate(form.errors):
-        if kind is None:
-            errors.append(_absent)
-        else:
-            errors.append(_signal(form, f"errors {i}", kind, compile_user))
-    position_error, velocity_error = errors
-    read = _reading(form, compile_user)
-    estimate = compile_user(form.estimator.function)
-    gains = reader(form.estimator.names)
-    memory = form.estimator.memory
-    GAINS, SEED, SIGMA_X, SIGMA_V, PERIOD = row_places(form).of(
-        "estimator", "seed", "sigma_x", "sigma_v", "period"
+    position_error = _signal(form, "errors 0", compile_user)
+    velocity_error = _signal(form, "errors 1", compile_user)
+    sensed = bool(form.sensors)
+    read = _acting(form, "sensors 0", compile_user)
+    estimate = _acting(form, "estimators 0", compile_user)
+    HINGES, SEED, SIGMA_X, SIGMA_V, PERIOD = row_places(form).of(
+        "hinges", "seed", "sigma_x", "sigma_v", "period"
     )
-    X, V, SEEN_X, SEEN_V, SEEN_A, MEMORY = work_places(form).of(
-        "x", "v", "seen_x", "seen_v", "seen_a", "estimator"
-    )
+    X, V, SEEN_X, SEEN_V, SEEN_A = work_places(form).of("x", "v", "seen_x", "seen_v", "seen_a")
 
     @own
     def measure(row, tables, work, k, t):
@@ -317,9 +310,11 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
                 z = philox.normals(row[SEED], i, philox.MEASUREMENT, k)
                 x += row[SIGMA_X] * z[0]
                 v += row[SIGMA_V] * z[1]
-            x, v = read(row, work, i, k, x, v)
-            state = view(work, MEMORY + i * memory, memory)
-            found = _pair(estimate(Reading(row[PERIOD], x, v), gains(row, GAINS), state))
+            if sensed:
+                chance = philox.uniform(row[SEED], i, philox.DROPOUT, k)
+                sight = Sight(x, v, float(k), row[HINGES + i], chance)
+                x, v = read(row, tables, work, sight, i)
+            found = _pair(estimate(row, tables, work, Reading(row[PERIOD], x, v), i))
             work[SEEN_X + i] = x
             work[SEEN_V + i] = found[0]
             work[SEEN_A + i] = found[1]
@@ -327,43 +322,11 @@ def _measuring(form: Form, compile_user: Compiler) -> Any:
     return measure
 
 
-def _reading(form: Form, compile_user: Compiler) -> Any:
-    """Return a compiled function (row, work, i, k, x, v) -> what the sensor of channel i gives."""
-    sensor = form.sensor
-    if sensor is None:
-        return own(lambda row, work, i, k, x, v: (x, v))
-    read = compile_user(sensor.function)
-    numbers = reader(sensor.names)
-    memory = sensor.memory
-    HINGES, NUMBERS, SEED = row_places(form).of("hinges", "sensor", "seed")
-    MEMORY = work_places(form).at["sensor"]
-
-    @own
-    def reading(row, work, i, k, x, v):
-        chance = philox.uniform(row[SEED], i, philox.DROPOUT, k)
-        sight = Sight(x, v, float(k), row[HINGES + i], chance)
-        return read(sight, numbers(row, NUMBERS), view(work, MEMORY + i * memory, memory))
-
-    return reading
-
-
 def _law(form: Form, i: int, compile_user: Compiler) -> Any:
     """Return a compiled function (row, tables, work, y, channel) -> u and s of law i."""
-    part = form.laws[i]
-    if part.function is None:
+    if form.laws[i].function is None:
         return _law_in_c(form, i)
-    function = compile_user(part.function)
-    gains = reader(part.names)
-    memory = part.memory
-    at = row_places(form).at[f"law {i}"]
-    first = work_places(form).at["law"]
-
-    @own
-    def law(row, tables, work, y, channel):
-        state = view(work, first + channel * memory, memory)
-        return function(y, gains(row, at), state)
-
-    return law
+    return _acting(form, f"laws {i}", compile_user)
 
 
 def _law_in_c(form: Form, i: int) -> Any:
@@ -387,8 +350,8 @@ def _calling(form: Form, i: int) -> Any:
     measured.
     """
     memory = form.laws[i].memory
-    ADDRESS, GAINS = row_places(form).of(f"address {i}", f"law {i}")
-    MEASURED, COMMANDED, MEMORY = work_places(form).of("measured", "commanded", "law")
+    ADDRESS, GAINS = row_places(form).of(f"laws {i} address", f"laws {i}")
+    MEASURED, COMMANDED, MEMORY = work_places(form).of("measured", "commanded", f"laws {i}")
 
     @own
     def ask(row, work, channel):
@@ -402,58 +365,16 @@ def _calling(form: Form, i: int) -> Any:
     return ask
 
 
-@functools.cache
-def _replacing(names: tuple[str, ...]) -> Callable:
-    """Return a compiled function (y, numbers) -> the measurement y with other values of these."""
-    fields = []
-    for name in Measurement._fields:
-        value = f"y.{name}"
-        if name in names:
-            value = f"numbers[{names.index(name)}]"
-        fields.append(f"{name}={value}")
-    space = {"Measurement": Measurement}
-    exec(f"def replaced(y, numbers): return Measurement({', '.join(fields)})", space)
-    return own(space["replaced"])
-
-
-def _surface(form: Form, compile_user: Compiler) -> Any:
-    """Return a compiled function (row, work, y, channel) -> y with the surface's s and v_eq."""
-    part = form.surface
-    if part is None:
-        return own(lambda row, work, y, channel: y)
-    function = compile_user(part.function)
-    gains = reader(part.names)
-    memory = part.memory
-    at = row_places(form).at["surface"]
-    first = work_places(form).at["surface"]
-    replaced = _replacing(("has_surface", "s", "v_eq"))
-
-    @own
-    def on_surface(row, work, y, channel):
-        state = view(work, first + channel * memory, memory)
-        s, v_eq = function(y, gains(row, at), state)
-        return replaced(y, (1.0, s, v_eq))
-
-    return on_surface
-
-
-def _referring(form: Form, compile_user: Compiler) -> Any:
-    """Return a compiled function (row, tables, work, t, i): the reference of channel i."""
-    references = []
-    for i, kind in enumerate(form.references):
-        references.append(_signal(form, f"references {i}", kind, compile_user))
-    return _by_channel(references)
-
-
-def _asking(form: Form, compile_user: Compiler) -> Any:
-    """Return a compiled function (row, tables, work, t, i) -> u, s and r of channel i."""
+def _asking(form: Form, refer: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, t, i) -> u, s and r of channel i, with a
+    function that gives its reference.
+    """
     n = form.n
     driven = form.driven
     true_model = form.true_model
-    refer = _referring(form, compile_user)
     law = _by_channel([_law(form, i, compile_user) for i in range(len(form.laws))])
-    on_surface = _surface(form, compile_user)
-    with_partner = _replacing(("q", "dq", "fq", "gq"))
+    slides = bool(form.surfaces)
+    surface = _acting(form, "surfaces 0", compile_user)
     nominal = compile_user(form.nominal.function)
     values = reader(form.nominal.names)
     KNOWN, LIMITS, PERIOD, STEPS, USES_MODEL = row_places(form).of(
@@ -479,45 +400,52 @@ def _asking(form: Form, compile_user: Compiler) -> Any:
         a = work[SEEN_A + i]
         if math.isnan(a):
             a = ddr
-        y = Measurement(
-            t=t,
-            dt=row[PERIOD],
-            x=xs[i],
-            v=vs[i],
-            e=xs[i] - r,
-            de=vs[i] - dr,
-            r=r,
-            dr=dr,
-            ddr=ddr,
-            f=f,
-            g=g,
-            a=a,
-            limit=row[LIMITS + i],
-            model=row[USES_MODEL],
-            has_surface=0.0,
-            s=0.0,
-            v_eq=0.0,
-            q=0.0,
-            dq=0.0,
-            fq=0.0,
-            gq=0.0,
-        )
+        partner = (0.0, 0.0, 0.0, 0.0)
         if n > driven:
-            partner = i + driven
-            fq, gq = nominal(xs, vs, partner, known)
-            y = with_partner(y, (xs[partner], vs[partner], fq, gq))
-        u, s = law(row, tables, work, on_surface(row, work, y, i), i)
+            fq, gq = nominal(xs, vs, i + driven, known)
+            partner = (xs[i + driven], vs[i + driven], fq, gq)
+
+        def seen(has_surface, s, v_eq):
+            return Measurement(
+                t=t,
+                dt=row[PERIOD],
+                x=xs[i],
+                v=vs[i],
+                e=xs[i] - r,
+                de=vs[i] - dr,
+                r=r,
+                dr=dr,
+                ddr=ddr,
+                f=f,
+                g=g,
+                a=a,
+                limit=row[LIMITS + i],
+                model=row[USES_MODEL],
+                has_surface=has_surface,
+                s=s,
+                v_eq=v_eq,
+                q=partner[0],
+                dq=partner[1],
+                fq=partner[2],
+                gq=partner[3],
+            )
+
+        y = seen(0.0, 0.0, 0.0)
+        if slides:
+            s, v_eq = surface(row, tables, work, y, i)
+            y = seen(1.0, s, v_eq)
+        u, s = law(row, tables, work, y, i)
         return u, s, r
 
     return ask
 
 
-def _asking_all(form: Form, compile_user: Compiler) -> Any:
+def _asking_all(form: Form, refer: Any, compile_user: Compiler) -> Any:
     """Return the same of a law of many joints, which is asked once, for all channels."""
     n = form.n
     driven = form.driven
-    refer = _referring(form, compile_user)
     law = _calling(form, 0)
+    size = measured_places(form)
     nominal = compile_user(form.nominal.function)
     values = reader(form.nominal.names)
     KNOWN, LIMITS, PERIOD, USES_MODEL = row_places(form).of(
@@ -529,11 +457,12 @@ def _asking_all(form: Form, compile_user: Compiler) -> Any:
 
     @own
     def measure(row, tables, work, t):
+        for i in range(size):
+            work[MEASURED + i] = 0.0
         head = head_at(place(work) + 8 * MEASURED, 0)
         head.t = t
         head.dt = row[PERIOD]
         head.model = row[USES_MODEL]
-        head.dynamics = 0.0
         head.n = n
         head.driven = driven
         y = measurement_at(place(work) + 8 * MEASURED)
@@ -541,23 +470,16 @@ def _asking_all(form: Form, compile_user: Compiler) -> Any:
         xs = view(work, SEEN_X, n)
         vs = view(work, SEEN_V, n)
         for i in range(n):
-            r, dr, ddr = refer(row, tables, work, t, i)
-            work[R + i] = r
+            y.r[i], y.dr[i], y.ddr[i] = refer(row, tables, work, t, i)
+            work[R + i] = y.r[i]
             y.x[i] = xs[i]
             y.v[i] = vs[i]
-            y.e[i] = xs[i] - r
-            y.de[i] = vs[i] - dr
-            y.r[i] = r
-            y.dr[i] = dr
-            y.ddr[i] = ddr
+            y.e[i] = xs[i] - y.r[i]
+            y.de[i] = vs[i] - y.dr[i]
             y.a[i] = work[SEEN_A + i]
             if math.isnan(y.a[i]):
-                y.a[i] = ddr
+                y.a[i] = y.ddr[i]
             y.limit[i] = row[LIMITS + i]
-            y.h[i] = 0.0
-            y.g[i] = 0.0
-            for j in range(n):
-                y.M[i, j] = 0.0
             y.M[i, i] = 1.0
             if row[USES_MODEL] != 0.0:  # M is diagonal
                 f, g = nominal(xs, vs, i, known)
@@ -584,11 +506,12 @@ def _commanding(form: Form, compile_user: Compiler) -> Any:
     n = form.n
     driven = form.driven
     slots = form.slots
-    ask = (_asking_all if form.joint else _asking)(form, compile_user)
-    if form.feedforward is None:
-        feed = _absent
-    else:
-        feed = _signal(form, "feedforward", form.feedforward, compile_user)
+    references = []
+    for i in range(len(form.references)):
+        references.append(_signal(form, f"references {i}", compile_user))
+    refer = _by_channel(references)
+    ask = (_asking_all if form.joint else _asking)(form, refer, compile_user)
+    feed = _signal(form, "feedforwards 0", compile_user)
     LIMITS = row_places(form).at["limits"]
     BUFFER, U, S, R = work_places(form).of("buffer", "u", "s", "r")
 
@@ -617,90 +540,90 @@ def _disturbing(form: Form, compile_user: Compiler) -> Any:
 
     k is the sample at its first stage, and -1 at all others.
     """
-    if not form.disturbances:
-        return own(lambda row, tables, work, t, k: None)
-    driven = form.driven
-    total = own(lambda row, tables, work, t, i, k, d: d)
-    for j, kind in reversed(list(enumerate(form.disturbances))):
-        total = _adding(form, f"disturbances {j}", kind, total, compile_user)
+    driven = form.driven if form.disturbances else 0
     D = work_places(form).at["d"]
 
     @own
     def disturb(row, tables, work, t, k):
         for i in range(driven):
-            work[D + i] = total(row, tables, work, t, i, k, 0.0)
+            work[D + i] = 0.0
 
+    for j in range(len(form.disturbances)):
+        disturb = _and_disturbance(form, f"disturbances {j}", disturb, compile_user)
     return disturb
 
 
-def _adding(form: Form, name: str, kind: Any, others: Any, compile_user: Compiler) -> Any:
-    """Return a compiled function that adds a disturbance, and the others, to d."""
-    evaluate = _signal(form, name, kind, compile_user)
-    active = row_places(form).at[name] + ACTIVE
+def _and_disturbance(form: Form, name: str, others: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function that adds a disturbance to the sum of others."""
+    evaluate = _signal(form, name, compile_user)
+    driven = form.driven
+    alone = signals(form)[name].random
+    sees = signals(form)[name].sees
     last = work_places(form).at[name]
-    alone = kind.random
-    sees = kind.sees
+    active = row_places(form).at[name] + ACTIVE
     PERIOD = row_places(form).at["period"]
-    X, V, R, LAST_R, S = work_places(form).of("x", "v", "r", "last_r", "s")
+    X, V, R, LAST_R, S, D = work_places(form).of("x", "v", "r", "last_r", "s", "d")
 
     @own
-    def value(row, tables, work, t, i, k):
-        if sees:
-            if i > 0 or k < 0:
-                return work[last]
-            r = work[R]
-            rate = (r - work[LAST_R]) / row[PERIOD] if k > 0 else 0.0
-            return evaluate(row, work, t, work[X] - r, work[V] - rate, work[S])[0]
-        if i > 0 and not alone:
-            return work[last]
-        return evaluate(row, tables, work, t, i)[0]
+    def disturb(row, tables, work, t, k):
+        others(row, tables, work, t, k)
+        for i in range(driven if row[active] != 0.0 else 0):
+            if sees:
+                if i == 0 and k >= 0:
+                    r = work[R]
+                    rate = (r - work[LAST_R]) / row[PERIOD] if k > 0 else 0.0
+                    work[last] = evaluate(row, work, t, work[X] - r, work[V] - rate, work[S])[0]
+            elif i == 0 or alone:
+                work[last] = evaluate(row, tables, work, t, i)[0]
+            work[D + i] += work[last]
 
-    @own
-    def add(row, tables, work, t, i, k, d):
-        if row[active] != 0.0:
-            work[last] = value(row, tables, work, t, i, k)
-            d += work[last]
-        return others(row, tables, work, t, i, k, d)
-
-    return add
+    return disturb
 
 
 def _driving(form: Form) -> Any:
     """Return a compiled function (row, work, i, stage): the force of the drive of channel i, and
     its mean over the step.
     """
-    FACTORS = row_places(form).at["drives"]
-    V, APPLIED, MEAN, MOTOR, KEPT = work_places(form).of("v", "applied", "mean", "motor", "drives")
+    if not form.drives:
+        return own(lambda row, work, i, stage: None)
+    (part,) = form.drives
+    advance = part.function
+    factors = reader(part.names)
+    size = len(part.names)
+    FACTORS = row_places(form).at["drives 0"]
+    V, APPLIED, MEAN, MOTOR, KEPT = work_places(form).of(
+        "v", "applied", "mean", "motor", "drives 0"
+    )
 
     @own
-    def move(row, work, i, stage):
+    def drive(row, work, i, stage):
         kept = kept_at(place(work) + 8 * KEPT, i)
         if stage == 0:
-            factors = factors_at(place(row) + 8 * FACTORS, i)
-            work[MEAN + i] = advanced(factors, kept, work[APPLIED + i], work[V + i])
+            of_drive = factors(row, FACTORS + size * i)
+            work[MEAN + i] = advance(of_drive, kept, work[APPLIED + i], work[V + i])
         work[MOTOR + i] = work[MEAN + i]
         if stage == 0:
             work[MOTOR + i] -= kept.rise
         elif stage == 3:
             work[MOTOR + i] += kept.rise
 
-    return move
+    return drive
 
 
-def _rubbing(form: Form, compile_user: Compiler) -> Any:
-    """Return a compiled function (row, work, i, stage, step, f, at_rest, g) -> friction on channel
-    i; `f` is at its speed, `at_rest` is f at speed 0.
+def _friction(form: Form, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, i, stage, step, f, at_rest, g) -> friction on
+    channel i; `f` is at its speed, `at_rest` is f at speed 0.
     """
-    rub = own(lambda row, work, y, i: 0.0)
-    for j, part in reversed(list(enumerate(form.frictions))):
-        rub = _and_friction(form, j, part, rub, compile_user)
+    total = own(lambda row, tables, work, y, i: 0.0)
+    for j in reversed(range(len(form.frictions))):
+        total = _and_friction(form, f"frictions {j}", total, compile_user)
     H, LEVELS, DAMPING = row_places(form).of("step", "levels", "damping")
     X, V, APPLIED, MEAN, MOTOR, D, REACTION = work_places(form).of(
         "x", "v", "applied", "mean", "motor", "d", "reaction"
     )
 
     @own
-    def friction(row, work, i, stage, step, f, at_rest, g):
+    def friction(row, tables, work, i, stage, step, f, at_rest, g):
         drag = row[DAMPING + i] * work[V + i]
         pushed = work[D + i]
         y = JointState(
@@ -717,34 +640,28 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
             level=row[LEVELS + i],
             mobility=g,
         )
-        force = rub(row, work, y, i)
+        force = total(row, tables, work, y, i)
         work[REACTION + i] += force / (6.0 if stage % 3 == 0 else 3.0)
         return force - drag
 
     return friction
 
 
-def _and_friction(form: Form, j: int, part: Part, others: Any, compile_user: Compiler) -> Any:
-    """Return a compiled function (row, work, y, i) -> the force of friction j on channel i, and of
-    the others.
+def _and_friction(form: Form, name: str, others: Any, compile_user: Compiler) -> Any:
+    """Return a compiled function (row, tables, work, y, i) -> the force of a friction on channel i,
+    and of the others.
     """
-    force = compile_user(part.function)
-    numbers = reader(part.names)
-    size = 1 + len(part.names)
-    memory = part.memory
-    FIRST = row_places(form).at[f"friction {j}"]
-    MEMORY = work_places(form).at[f"friction {j}"]
+    force = _acting(form, name, compile_user)
+    channels = parts(form)[name].channels
 
     @own
-    def rub(row, work, y, i):
-        total = others(row, work, y, i)
-        at = FIRST + size * i
-        if row[at] != 0.0:
-            state = view(work, MEMORY + i * memory, memory)
-            total += force(y, numbers(row, at + 1), state)[0]
-        return total
+    def total(row, tables, work, y, i):
+        found = others(row, tables, work, y, i)
+        if i in channels:
+            found += force(row, tables, work, y, i)[0]
+        return found
 
-    return rub
+    return total
 
 
 def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
@@ -752,13 +669,11 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
     n = form.n
     driven = form.driven
     jump = form.jump
-    drive = form.drive
     rubs = bool(form.frictions)
-    disturbed = bool(form.disturbances)
-    # a signal without memory is the same at the second stage and at the third
+    # a signal without memory is the same at the third stage as at the second
     remembers = any(kind.memory for kind in form.disturbances)
-    move = _driving(form)
-    friction = _rubbing(form, compile_user)
+    drive = _driving(form)
+    friction = _friction(form, compile_user)
     nominal = compile_user(form.nominal.function)
     values = reader(form.nominal.names)
     X, V, A, X0, V0, SUM_V, SUM_A, MOTOR, REST, D = work_places(form).of(
@@ -782,12 +697,11 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
             work[SUM_V + i] = 0.0
             work[SUM_A + i] = 0.0
         for stage in range(4):
-            if disturbed and stage > 0 and (stage != 2 or remembers):
+            if stage > 0 and (stage != 2 or remembers):
                 fraction = LAST_STAGE if stage == 3 else 0.5
                 disturb(row, tables, work, k * row[PERIOD] + (within + fraction) * h, -1)
-            if drive:
-                for i in range(driven):
-                    move(row, work, i, stage)
+            for i in range(driven):
+                drive(row, work, i, stage)
             for i in range(n):
                 f, g = nominal(xs, vs, i, p)
                 actuator = i
@@ -796,7 +710,7 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
                 force = work[MOTOR + actuator] + work[D + actuator]
                 if rubs:
                     at_rest = nominal(xs, view(work, REST, n), i, p)[0]
-                    force += friction(row, work, i, stage, step, f, at_rest, g)
+                    force += friction(row, tables, work, i, stage, step, f, at_rest, g)
                 work[A + i] = f + g * force
             weight = 1.0 if stage % 3 == 0 else 2.0
             reach = h if stage == 2 else 0.5 * h
@@ -814,50 +728,22 @@ def _advancing(form: Form, disturb: Any, compile_user: Compiler) -> Any:
     return advance
 
 
-def _keeping(form: Form) -> Any:
-    """Return a compiled function (work): keep the state of all channels at a sample, and begin the
-    next mean of friction.
-    """
-    n = form.n
-    rubs = bool(form.frictions)
-    X, V, D, REACTION, SAMPLE_X, SAMPLE_V, SAMPLE_D = work_places(form).of(
-        "x", "v", "d", "reaction", "sample_x", "sample_v", "sample_d"
-    )
-
-    @own
-    def keep(work):
-        for i in range(n):
-            work[SAMPLE_X + i] = work[X + i]
-            work[SAMPLE_V + i] = work[V + i]
-            work[SAMPLE_D + i] = work[D + i]
-            if rubs:
-                work[REACTION + i] = 0.0
-
-    return keep
-
-
 def _recording(form: Form) -> Any:
     """Return a compiled function (row, work, scores, log, k): what is kept of sample k."""
     n = form.n
     columns = len(LOGGED)
     tally = tallying(form)
     LOGGING = row_places(form).at["logging"]
-    X, V, D, U, S, R, LAST_U, LAST_R = work_places(form).of(
-        "sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r"
-    )
+    U, R, LAST_U, LAST_R = work_places(form).of("u", "r", "last_u", "last_r")
+    COLUMNS = tuple(work_places(form).of("sample_x", "sample_v", "u", "s", "sample_d", "r"))
 
     @own
     def record(row, work, scores, log, k):
         tally(row, work, scores, k)
         for i in range(n):
             if row[LOGGING] != 0.0:
-                at = (k * n + i) * columns
-                log[at + 0] = work[X + i]
-                log[at + 1] = work[V + i]
-                log[at + 2] = work[U + i]
-                log[at + 3] = work[S + i]
-                log[at + 4] = work[D + i]
-                log[at + 5] = work[R + i]
+                for j in range(columns):
+                    log[(k * n + i) * columns + j] = work[COLUMNS[j] + i]
             work[LAST_U + i] = work[U + i]
             work[LAST_R + i] = work[R + i]
 

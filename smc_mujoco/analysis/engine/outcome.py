@@ -4,12 +4,12 @@ One rule serves the loop, where it is a metric, and traces of MuJoCo.
 """
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from smc_mujoco.analysis.engine import CONVERGES, DOES_NOT, UNDECIDED
-from smc_mujoco.analysis.engine.form import Form, metric_places, row_places, work_places
+from smc_mujoco.analysis.engine.form import Form, Places, metric_places, row_places, work_places
 from smc_mujoco.analysis.engine.scores import METRICS, own
 from smc_mujoco.metrics.conventions import SETTLING_BAND
 from smc_mujoco.simulation.cfunctions import cached
@@ -23,19 +23,6 @@ NAME = "outcome"
 SIGNALS = 3  # x, v and u, whose ranges tell rest
 
 
-class Where(NamedTuple):
-    """Indices of what the rule reads: in `row`, then in `work`, where it also keeps numbers."""
-
-    samples: int
-    late: int  # the first sample of the part that counts
-    reach: int  # X, V and the bound on u, then whether the verdict is final
-    x: int
-    v: int
-    u: int
-    r: int
-    kept: int
-
-
 def kept_at(n: int, first: int) -> tuple[int, ...]:
     """Return where a run of n channels keeps each value in its row of work, from index `first` on.
 
@@ -47,10 +34,11 @@ def kept_at(n: int, first: int) -> tuple[int, ...]:
     return (*range(first, first + 7), ends, ends + SIGNALS * n)
 
 
-def taking(n: int, where: Where) -> Any:
+def taking(n: int, row_at: Places, work_at: Places, first: int) -> Any:
     """Return a compiled function (row, work, k): take sample k of n channels."""
-    SAMPLES, LATE, REACH, X, V, U, R, KEPT = where
-    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, KEPT)
+    SAMPLES, LATE, REACH = row_at.of("samples", "late", "reach")
+    X, V, U, R = work_at.of("sample_x", "sample_v", "u", "r")
+    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, first)
 
     @own
     def take(row, work, k):
@@ -91,12 +79,12 @@ def taking(n: int, where: Where) -> Any:
     return take
 
 
-def judging(n: int, where: Where) -> Any:
+def judging(n: int, row_at: Places, first: int) -> Any:
     """Return a compiled function (row, work) -> verdict; UNDECIDED also where a run needs to be
     longer.
     """
-    REACH = where.reach
-    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, where.kept)
+    REACH = row_at.at["reach"]
+    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, first)
 
     @own
     def judge(row, work):
@@ -132,10 +120,8 @@ def judging(n: int, where: Where) -> Any:
 
 def outcome(form: Form, at: int) -> tuple[Any, Any]:
     """Return the verdict as a metric of the loop."""
-    samples, late, reach = row_places(form).of("samples", "late", "reach")
-    x, v, u, r = work_places(form).of("sample_x", "sample_v", "u", "r")
-    where = Where(samples, late, reach, x, v, u, r, at)
-    return taking(form.n, where), judging(form.n, where)
+    row_at = row_places(form)
+    return taking(form.n, row_at, work_places(form), at), judging(form.n, row_at, at)
 
 
 METRICS[NAME] = outcome
@@ -143,23 +129,26 @@ METRICS[NAME] = outcome
 
 @functools.cache
 def over_samples(n: int) -> Any:
-    """Return a function (row, x, v, u, r) -> verdict on signals, (K + 1, n) each.
+    """Return a function (row, samples) -> verdict, on x, v, u and r of n channels, (K + 1, 4n).
 
-    `row` has K, the first sample that counts, and the reach, see `Where`.
+    `row` has K, the first sample that counts, and the reach.
     """
-    where = Where(0, 1, 2, 0, n, 2 * n, 3 * n, 4 * n)
-    take = taking(n, where)
-    judge = judging(n, where)
-    size = 4 * n + metric_places(NAME, n)
+    row_at = Places()
+    work_at = Places()
+    for name in ("samples", "late", "reach"):
+        row_at.take(name)
+    for name in ("sample_x", "sample_v", "u", "r"):
+        work_at.take(name, n)
+    first = work_at.size
+    take = taking(n, row_at, work_at, first)
+    judge = judging(n, row_at, first)
+    size = first + metric_places(NAME, n)
 
-    def verdict(row, x, v, u, r):
+    def verdict(row, samples):
         work = np.zeros(size)
-        for k in range(len(x)):
-            for i in range(n):
-                work[i] = x[k, i]
-                work[n + i] = v[k, i]
-                work[2 * n + i] = u[k, i]
-                work[3 * n + i] = r[k, i]
+        for k in range(len(samples)):
+            for i in range(first):
+                work[i] = samples[k, i]
             take(row, work, k)
         return judge(row, work)
 

@@ -57,7 +57,7 @@ class Runs:
         self.by_group = by_group
         self.threads = threads
         self.broken: dict[str, str] = {}  # law -> how it failed first, in a sentence
-        self.forms: dict[Hashable, Form] = {}
+        self.forms: dict[Hashable, list[Form]] = {}
         self.compiles: dict[Hashable, bool] = {}
         self.random = random.Random(0)
         self.count = 0
@@ -79,8 +79,8 @@ class Runs:
             if group is None:
                 scored = self.by_mujoco(some, report)
             else:
-                made = Group(some, tuple(self.formulas), self.forms.get(group))
-                self.forms[group] = made.form
+                made = Group(some, tuple(self.formulas), self.forms.get(group, []))
+                self.forms[group] = [made.form]
                 scored = made.scored(self.device, self.threads)
                 report(sum(case.work for case in some))
                 self._take(some, scored)

@@ -26,7 +26,7 @@ def tallying(form: Form) -> Any:
     the scores after the last.
     """
     tally = own(lambda row, work, scores, k: None)
-    for i, name in reversed(list(enumerate(form.metrics))):
+    for i, name in enumerate(form.metrics):
         tally = _and(tally, METRICS[name](form, work_places(form).at[f"metric {name}"]), i, form)
     return tally
 
@@ -72,13 +72,15 @@ def _integral(kind: str) -> Callable:
     return made
 
 
-def _largest(column: str, late: bool = False, error: bool = False) -> Callable:
-    """Return the largest |value| of a column, of the last part if `late`; minus r for an error."""
+def _largest(column: str, late: bool = False, error: bool = False, share: bool = False) -> Callable:
+    """Return the largest |value| of a column, of the last part if `late`; minus r for an error;
+    over the scale of its channel's group for a share.
+    """
 
     def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.driven
+        n = form.n if share else form.driven
         VALUE, R = work_places(form).of(column, "r")
-        LATE = row_places(form).at["late"]
+        LATE, BANDS = row_places(form).of("late", "bands")
 
         @own
         def take(row, work, k):
@@ -87,9 +89,11 @@ def _largest(column: str, late: bool = False, error: bool = False) -> Callable:
                     value = work[VALUE + i]
                     if error:
                         value -= work[R + i]
+                    if share:
+                        value /= row[BANDS + i]
                     work[at] = max(work[at], abs(value))
 
-        return take, own(lambda row, work: work[at])
+        return take, own(lambda row, work: SETTLING_BAND * work[at] if share else work[at])
 
     return made
 
@@ -187,25 +191,8 @@ def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
     return take, score
 
 
-def _rest_share(form: Form, at: int) -> tuple[Any, Any]:
-    """Return the largest |e| of the last part over the scale of its channel's
-    group.
-    """
-    n = form.n
-    X, R = work_places(form).of("sample_x", "r")
-    BANDS, LATE = row_places(form).of("bands", "late")
-
-    @own
-    def take(row, work, k):
-        if k >= row[LATE]:
-            for i in range(n):
-                work[at] = max(work[at], abs(work[X + i] - work[R + i]) / row[BANDS + i])
-
-    return take, own(lambda row, work: SETTLING_BAND * work[at])
-
-
 METRICS: dict[str, Callable] = {
-    "rest_share": _rest_share,
+    "rest_share": _largest("sample_x", late=True, error=True, share=True),
     "itae": _integral("itae"),
     "iae": _integral("iae"),
     "ise": _integral("ise"),

@@ -9,15 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.engine.group import Group, key
+from smc_mujoco.analysis.engine.group import Group, key, why_not
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.aliases import Floats, Pair
 from smc_mujoco.simulation import state
 from smc_mujoco.simulation.scenario import Scenario
 
 
+def key_of(case: Scenario, device: str) -> Hashable:
+    """Return the `key` of a case if the fast engine can run it on a device, else None."""
+    return None if why_not(case, (), device) else key(case)
+
+
 class Equations:
-    """The runs by the plant's equation, all candidates at once."""
+    """The runs of cases of one `key` by the plant's equation, all candidates at once."""
 
     def __init__(
         self,
@@ -31,28 +36,17 @@ class Equations:
         self.cases = cases
         self.threads = threads
         self.device = device
-        members: dict[Hashable, list[int]] = {}
-        for index, case in enumerate(cases):
-            members.setdefault(key(case), []).append(index)
-        self.groups = []
-        for indices in members.values():
-            made = Group([cases[i] for i in indices], ("itae", "tv"))
-            self.groups.append((indices, made, [made.gain_columns(name) for name in names]))
+        self.group = Group(cases, ("itae", "tv"))
+        self.columns = [self.group.gain_columns(name) for name in names]
 
     def __call__(self, candidates: Sequence[Floats], terms: Any) -> list[Pair]:
         count = len(self.cases)
-        costs = [(0.0, 0.0)] * (count * len(candidates))
-        for indices, made, columns in self.groups:
-            rows = np.tile(made.rows, (len(candidates), 1))
-            for k, gains in enumerate(candidates):
-                own = rows[k * len(indices) : (k + 1) * len(indices)]
-                for value, places in zip(gains, columns, strict=True):
-                    own[:, places] = value
-            scores = made.run(rows, self.threads, self.device)
-            for row, score in enumerate(scores.tolist()):
-                index = indices[row % len(indices)]
-                costs[row // len(indices) * count + index] = self._costs(self.cases[index], *score)
-        return costs
+        rows = np.tile(self.group.rows, (len(candidates), 1))
+        for k, gains in enumerate(candidates):
+            for value, columns in zip(gains, self.columns, strict=True):
+                rows[k * count : (k + 1) * count, columns] = value
+        scores = self.group.run(rows, self.threads, self.device).tolist()
+        return [self._costs(self.cases[i % count], *score) for i, score in enumerate(scores)]
 
     def _costs(
         self, case: Scenario, failure: float, failed_step: float, itae: float, tv: float

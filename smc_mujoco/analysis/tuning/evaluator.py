@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective
+from smc_mujoco.common.aliases import Array, Floats, Pair
 from smc_mujoco.control.component import Component
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
@@ -34,10 +35,8 @@ from smc_mujoco.simulation.run import (
 from smc_mujoco.simulation.scenario import Scenario
 
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "Python"  # engines
-Gains = tuple[float, ...]
-Costs = tuple[float, float]  # tracking and variation of a run
-# a case, when it failed, s, (K + 1, n) LOG -> costs
-Terms = Callable[[Scenario, float | None, np.ndarray], Costs]
+# a case, when it failed, s, (K + 1, n) LOG -> tracking and variation
+Terms = Callable[[Scenario, float | None, np.ndarray], Pair]
 
 
 class Evaluator:
@@ -65,41 +64,38 @@ class Evaluator:
         slots: int = 1,
         device: str = "cpu",
     ):
+        from smc_mujoco.analysis.tuning import equation
+
         self.goal = goal
         self.cases = list(cases)
         self.names = tuple(names)
         self.threads = cores(threads)
-        self.device = device
         prepared = []
         for case in self.cases:
             prepared.append(prepare(case))
-        with memory_for(prepared):
-            self._runs: list[tuple[list[int], Any]] = []  # indices of cases, and what runs them
-            if any(item.why_not for item in prepared):
-                self.engine = PYTHON
-                return
-            self.engine = MUJOCO
-            fast = self._fast() if by_equation else []
-            if fast:
-                from smc_mujoco.analysis.tuning.equation import Equations
+        self._runs: list[tuple[list[int], Any]] = []  # indices of cases, and what runs them
+        if any(item.why_not for item in prepared):
+            self.engine = PYTHON
+            return
+        members: dict[tuple[Hashable, Hashable], list[int]] = {}
+        for i, item in enumerate(prepared):
+            fast = equation.key_of(self.cases[i], device) if by_equation else None
+            members.setdefault((fast, None if fast else item.key), []).append(i)
+        self.engine = MUJOCO
+        # as many candidates at once as fit the memory of a batch
+        slots = max(1, min(slots, BATCH_BYTES // sum(item.bytes for item in prepared)))
+        with memory_for(prepared), callback.installed():
+            for (fast, _), indices in members.items():
+                if fast:
+                    self.engine = EQUATION
+                    some = [self.cases[i] for i in indices]
+                    made = equation.Equations(goal, some, self.names, self.threads, device)
+                else:
+                    batch = [prepared[i] for i in indices]
+                    made = _Again(batch, names, self.threads, constraints, slots)
+                self._runs.append((indices, made))
 
-                some = [self.cases[i] for i in fast]
-                self.engine = EQUATION
-                run = Equations(goal, some, self.names, self.threads, device)
-                self._runs.append((fast, run))
-            rest = [i for i in range(len(prepared)) if i not in fast]
-            if rest:
-                some = [prepared[i] for i in rest]
-                batches = _Batches(some, self.names, self.threads, constraints, slots)
-                self._runs.append((rest, batches))
-
-    def _fast(self) -> list[int]:
-        """Return the indices of the cases that the fast engine can run."""
-        from smc_mujoco.analysis.engine.group import why_not
-
-        return [i for i, case in enumerate(self.cases) if not why_not(case, (), self.device)]
-
-    def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
+    def __call__(self, candidates: Sequence[Floats]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
         size = len(self.cases)
         terms = [(0.0, 0.0)] * (size * len(candidates))
@@ -118,17 +114,17 @@ class Evaluator:
             made.append(Evaluation(gains, cost, tracking, variation))
         return made
 
-    def law(self, gains: Gains) -> Component:
+    def law(self, gains: Floats) -> Component:
         """Return the law with these gains."""
         return with_gains(self.cases[0].law, self.names, gains)
 
-    def excess(self, gains: Gains) -> float:
+    def excess(self, gains: Floats) -> float:
         """Return what a candidate's predicted chattering costs, s^2."""
         if self.goal.chattering is None:
             return 0.0
         return self.goal.excess(dataclasses.replace(self.cases[0], law=self.law(gains)))
 
-    def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[Costs]:
+    def _terms_of_traces(self, candidates: Sequence[Floats]) -> list[Pair]:
         laws = []
         for gains in candidates:
             laws.append(self.law(gains))
@@ -142,7 +138,7 @@ class Evaluator:
             traces = run(cases, self.threads)
         return [self.goal.terms_of_run(trace) for trace in traces]
 
-    def _terms(self, case: Scenario, failed_at: float | None, log: np.ndarray) -> Costs:
+    def _terms(self, case: Scenario, failed_at: float | None, log: np.ndarray) -> Pair:
         """Return tracking and variation of the run of a case, see `Terms`."""
         if failed_at is not None:
             return self.goal.terms_of_failure(failed_at)
@@ -162,18 +158,9 @@ def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) ->
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
-def _that_fit(prepared: Sequence[Prepared], candidates: int) -> int:
-    """Return how many of these candidates may run at once: as many as fit the memory of a batch."""
-    return max(1, min(candidates, BATCH_BYTES // sum(item.bytes for item in prepared)))
-
-
-def _batched(candidates: Sequence[Gains], size: int) -> list[Sequence[Gains]]:
-    return [candidates[first : first + size] for first in range(0, len(candidates), size)]
-
-
 def _putter(
     prepared: Prepared, names: Sequence[str], record: Any, packed: Packed
-) -> Callable[[Gains], None]:
+) -> Callable[[Array], None]:
     """Return the function that puts a candidate's gains among the numbers of a run."""
     law = prepared.scenario.law
     at = int(record["law"]["parameters"])
@@ -183,64 +170,46 @@ def _putter(
     for name in names:
         rows.append(list(law.gains).index(name))
 
-    def put(gains: Gains) -> None:
+    def put(gains: Array) -> None:
         values[rows] = np.reshape(gains, (-1, 1))
 
     return put
 
 
-class _Batches:
-    """The runs by MuJoCo: a Batch for each group of cases that can share one."""
+class _Again(ScenarioBatch):
+    """Cases of one key that run again and again in MuJoCo, with gains of `slots` candidates at
+    once.
+    """
 
     def __init__(
         self,
-        prepared: Sequence[Prepared],
+        cases: Sequence[Prepared],
         names: Sequence[str],
         threads: int,
         constraints: bool,
         slots: int,
     ):
-        groups: dict[Hashable, list[int]] = {}
-        for index, item in enumerate(prepared):
-            groups.setdefault(item.key, []).append(index)
-        self.cases = [item.scenario for item in prepared]
-        self.slots = _that_fit(prepared, slots)
-        self.groups = list(groups.values())
-        with callback.installed():
-            self.batches = [
-                _Again([prepared[i] for i in its] * self.slots, names, threads, constraints)
-                for its in self.groups
-            ]
-
-    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
-        made: list[Costs] = []
-        for some in _batched(candidates, self.slots):
-            rows = [(0.0, 0.0)] * (len(some) * len(self.cases))
-            for its, batch in zip(self.groups, self.batches, strict=True):
-                batch.again([gains for gains in some for _ in its])
-                for k in range(len(some) * len(its)):
-                    index = its[k % len(its)]
-                    rows[k // len(its) * len(self.cases) + index] = terms(
-                        self.cases[index], batch.failed_at(k), batch.logs[k]
-                    )
-            made += rows
-        return made
-
-
-class _Again(ScenarioBatch):
-    """A ScenarioBatch that runs again and again, each time with other gains."""
-
-    def __init__(
-        self, prepared: Sequence[Prepared], names: Sequence[str], threads: int, constraints: bool
-    ):
+        prepared = [*cases] * slots
         super().__init__(prepared, threads, constraints)
+        self.slots = slots
+        self.cases = [item.scenario for item in cases]
         self.first_records = self.records.copy()
         self.first_numbers = [packed.numbers.copy() for packed in self.packed]
         self.start = {name: array.copy() for name, array in self.started.items()}
         each = zip(prepared, self.records, self.packed, strict=True)
         self.put = [_putter(item, names, record, packed) for item, record, packed in each]
 
-    def again(self, gains: Sequence[Gains]) -> None:
+    def __call__(self, candidates: Sequence[Floats], terms: Terms) -> list[Pair]:
+        made: list[Pair] = []
+        count = len(self.cases)
+        for first in range(0, len(candidates), self.slots):
+            some = candidates[first : first + self.slots]
+            self.again(np.repeat(some, count, axis=0))
+            for k in range(len(some) * count):
+                made.append(terms(self.cases[k % count], self.failed_at(k), self.logs[k]))
+        return made
+
+    def again(self, gains: Array) -> None:
         """Run the first simulations, as many as gains are given, from their start."""
         self.records[:] = self.first_records
         self.records["failure"][len(gains) :] = state.INTERRUPTED  # they are not stepped
@@ -265,7 +234,7 @@ class _Again(ScenarioBatch):
         return int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
 
 
-def sums(log: np.ndarray, period: float) -> tuple[float, float]:
+def sums(log: np.ndarray, period: float) -> Pair:
     """Return ITAE and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace
     do.
 

@@ -46,6 +46,11 @@ class Viscous(Friction):
 
     b: Natural
 
+    @property
+    def added(self) -> tuple[float, float]:
+        """Its damping."""
+        return self.b, 0.0
+
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         yield Field("dof_damping", self.dofs(model), self.b, adds=True)
 
@@ -72,6 +77,11 @@ class Coulomb(Friction):
     forces = ("level",)
 
     level: Natural
+
+    @property
+    def added(self) -> tuple[float, float]:
+        """Its dry friction."""
+        return 0.0, self.level
 
     @property
     def exact(self) -> Part:

@@ -219,10 +219,15 @@ class Run:
     rk4: bool
     x0: Sequence[float]
     v0: Sequence[float]
-    dofs: Sequence[int]
+    locate: Callable[[], Sequence[int]]
     load: Callable[..., Any]  # physics step, default 0 -> MjModel with the values from then on
     jump_step: int  # the first with what the scenario's jump changes; -1 without a jump
     draw: Callable[[], list[float]]
+
+    @property
+    def dofs(self) -> Sequence[int]:
+        """Their degrees of freedom in the MjModel."""
+        return self.locate()
 
     @property
     def model(self) -> Any:

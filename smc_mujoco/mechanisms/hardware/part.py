@@ -151,6 +151,8 @@ class Friction(OnJoints):
     holds: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
+    # damping, N m s/rad (N s/m), and dry friction, N m (N), that it adds to a joint of the model
+    added: ClassVar[tuple[float, float]] = (0.0, 0.0)
 
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""
