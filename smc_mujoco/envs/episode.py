@@ -271,6 +271,7 @@ class Episode:
         """Begin an episode from `start`."""
         setting = self.setting
         mujoco.mj_resetData(setting.model, data)
+        data.warning.number[:] = 1  # MuJoCo tells only the first: `diverged` says it
         data.qpos[:], data.qvel[:] = models.state_with(setting.model, setting.joints, *self.start)
         if setting.uses_callback:
             self.callback_records = Records(setting, 1)

@@ -278,6 +278,14 @@ def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space()
     assert many.observation_space.contains(observations)
 
 
+def test_what_mujoco_says_of_an_episode_that_diverges_is_not_printed(capfd):
+    light = smc.plant("inverted_pendulum", m=0.01, l=0.1)
+    env = PlantEnv(light, changes={"u_max": 1e9})
+    env.reset(seed=0)
+    assert env.step([1.0])[2]
+    assert capfd.readouterr() == ("", "")
+
+
 def test_an_environment_is_copied_and_sent_away_as_it_stands():
     one = PlantEnv("cart_pole", "swing_up", {"control_period": 0.01})
     one.reset(seed=0)

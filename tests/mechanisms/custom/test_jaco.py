@@ -57,4 +57,3 @@ def test_laws_of_many_joints_track_on_every_joint(jaco):
         assert trace.failure is None
         assert error.max() < FOLLOW[trace.scenario.law.name], error
         assert np.ptp(trace.x, axis=0).min() > 0.4
-    assert set(FOLLOW) <= set(smc.laws(kind="joint"))

@@ -298,16 +298,8 @@ def test_a_joint_that_leans_on_its_stop_never_settles():
         keyframe="home",
         others="locked",
     )
-    weak = smc.Scenario(
-        plant=stop,
-        law=smc.law(
-            "pid",
-            kp=1e3,
-            ki=0.0,
-            kd=1.0,
-        ),
-        duration=1.0,
-    )
+    law = smc.law("pid", kp=1e3, ki=0.0, kd=1.0)
+    weak = smc.Scenario(plant=stop, law=law, duration=1.0)
     for u_max, leaning in ((20.0, False), (0.05, True)):
         trace = smc.run(dataclasses.replace(weak, u_max=u_max))
         assert leans(trace) == leaning
@@ -340,12 +332,7 @@ def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch):
         high=0.68,
         bent=".4 0 .4 0",
     )
-    limp = smc.plant_from(
-        text,
-        ["knee0"],
-        keyframe="home",
-        others="file",
-    )
+    limp = smc.plant_from(text, ["knee0"], keyframe="home", others="file")
     assert "locked" in scales.falls(limp)
     trace = smc.run(smc.Scenario(plant=limp, law="pid", duration=0.1))
     assert np.isinf(smc.score(trace)["settling_time"])

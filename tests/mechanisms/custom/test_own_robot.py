@@ -33,7 +33,6 @@ ARM = """<robot name="arm"><link name="base"/>
 <joint name="j2" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="0 0 -0.5"/>
 <axis xyz="0 1 0"/>
 <limit lower="-2" upper="2" effort="20"/></joint></robot>"""
-RUN = {"law": "classical", "duration": 0.01}
 
 
 @pytest.fixture
@@ -60,18 +59,7 @@ def test_a_text_says_of_a_channel_what_python_says(folder):
     assert seen == smc.plant_from("mine.xml", {"lift": smc.Channel(motor=True)}, measured=["tilt"])
     assert seen.argument == "mine.xml:lift(motor)+tilt(measured)"
     both = as_plant("mine.xml:lift(motor,u_max=30)+tilt(motor, u_max=5)")
-    assert smc.Scenario(plant=both, **RUN).resolved.u_max == (30.0, 5.0)
-
-
-def bounds(text, **fields):
-    with warnings.catch_warnings(record=True) as reported:
-        warnings.simplefilter("always")
-        scenario = smc.Scenario(plant=as_plant(text), **(RUN | fields))
-    return scenario.resolved.u_max, [str(warning.message) for warning in reported]
-
-
-def one(y, gains, memory):
-    return -gains.k * y.e
+    assert smc.Scenario(plant=both, law="classical").resolved.u_max == (30.0, 5.0)
 
 
 def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
