@@ -17,8 +17,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import Key, compile_for, jit, pointer
 from smc_mujoco.simulation.state import address
 
-# in a call of compiled code, which Ctrl-C waits for: .4 s, or .6 with dry friction
-PIECE_STEPS = 3_000_000
+# in a call of compiled code, which Ctrl-C waits for: .1 s, or .2 with dry friction
+PIECE_STEPS = 1_000_000
 
 
 @functools.lru_cache(maxsize=64)
