@@ -15,12 +15,10 @@ def failing(y, gains, memory):
 
 
 def cases():
-    yield smc.Scenario(plant="duffing", law="pid", duration=0.5)
-    yield smc.Scenario(plant="duffing", law=failing(when=0.2), duration=0.5)
-    yield smc.Scenario(
-        plant="duffing", law="pid", duration=0.5, friction=smc.hardware.LuGre(0.1, 0.1, 0.1)
-    )
-    yield smc.Scenario(plant="duffing", law=failing(when=9.0), duration=0.5)
+    rough = smc.hardware.LuGre(0.1, 0.1, 0.1)
+    laws = ("pid", failing(when=0.2), "pid", failing(when=9.0))
+    for law, friction in zip(laws, ((), (), rough, ()), strict=True):
+        yield smc.Scenario(plant="duffing", law=law, duration=0.5, friction=friction)
 
 
 def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):
