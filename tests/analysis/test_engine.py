@@ -118,12 +118,7 @@ def test_a_run_is_that_of_mujoco_at_every_sample(plant):
     [("inverted_pendulum", "super_twisting"), ("pendulum_network", "boundary_layer")],
 )
 def test_a_run_of_other_parts_is_that_of_mujoco(plant, law, condition):
-    check(
-        plant,
-        law,
-        {condition: APART[condition]},
-        duration=4.0,
-    )
+    check(plant, law, {condition: APART[condition]}, duration=4.0)
 
 
 OTHERS = {  # plant, law, and what else the scenario has

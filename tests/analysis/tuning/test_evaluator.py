@@ -91,31 +91,19 @@ def by_runs(cases, names, gains, goal=SECOND):
     ).objective
 
 
-CONTINUOUS = [
-    ("duffing", "observer_free"),
-    ("inverted_pendulum", "pid"),
-    ("van_der_pol", MINE),
-    ("pendulum_network", "extended_state"),
-    ("inverted_pendulum_network", "boundary_layer"),
+CASES = [
+    ("duffing", "observer_free", 1e-9),
+    ("pendulum_network", "extended_state", 1e-9),
+    ("duffing", "twisting", 1e-2),
+    ("inverted_pendulum", "classical", 1e-2),
+    ("van_der_pol", "super_twisting", 1e-2),
+    ("inverted_pendulum", "pid", 1e-9),
+    ("van_der_pol", MINE, 1e-9),
+    ("inverted_pendulum_network", "boundary_layer", 1e-9),
 ]
-CHATTERING = [
-    ("duffing", "twisting"),
-    ("inverted_pendulum", "classical"),
-    ("van_der_pol", "super_twisting"),
-]
-
-
 # each law and plant of the equation is compiled for itself, in seconds
-BY_ENGINE = [
-    (False, *CONTINUOUS[0], 1e-9),
-    (False, *CHATTERING[0], 1e-2),
-    (True, *CONTINUOUS[3], 1e-9),
-    (True, *CHATTERING[0], 1e-2),
-]
-for one in CONTINUOUS:
-    BY_ENGINE.append(pytest.param(True, *one, 1e-9, marks=pytest.mark.slow))
-for one in CHATTERING:
-    BY_ENGINE.append(pytest.param(True, *one, 1e-2, marks=pytest.mark.slow))
+BY_ENGINE = [(False, *CASES[0]), (False, *CASES[2]), (True, *CASES[1]), (True, *CASES[2])]
+BY_ENGINE += [pytest.param(True, *one, marks=pytest.mark.slow) for one in CASES]
 
 
 @pytest.mark.parametrize(("by_equation", "plant", "law", "tolerance"), BY_ENGINE)
@@ -125,14 +113,7 @@ def test_either_engine_has_the_objective_of_the_runs(by_equation, plant, law, to
     candidates = []
     for factor in FACTORS:
         candidates.append(tuple(factor * cases[0].law.gains[name] for name in names))
-    evaluate = Evaluator(
-        SECOND,
-        cases,
-        names,
-        threads=2,
-        by_equation=by_equation,
-        slots=2,
-    )
+    evaluate = Evaluator(SECOND, cases, names, threads=2, by_equation=by_equation, slots=2)
     assert evaluate.engine == (EQUATION if by_equation else MUJOCO)
     found = [one.objective for one in evaluate(candidates)]
     assert found == pytest.approx(
@@ -160,25 +141,11 @@ def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_
     for k in (1.0, 1e9, 2.5, 0.01, 1.3):
         candidates.append(tuple(k * value for value in law.gains.values()))
     options = {"threads": 1, "by_equation": by_equation}
-    evaluate = Evaluator(
-        goal,
-        cases,
-        names,
-        slots=3,
-        **options,
-    )
+    evaluate = Evaluator(goal, cases, names, slots=3, **options)
     together = evaluate(candidates)
     assert [evaluate([one])[0] for one in reversed(candidates)] == together[::-1]
-    assert (
-        Evaluator(
-            goal,
-            cases,
-            names,
-            slots=1,
-            **options,
-        )(candidates)
-        == together
-    )
+    alone = Evaluator(goal, cases, names, slots=1, **options)
+    assert alone(candidates) == together
     expected = []
     for gains in candidates:
         expected.append(by_runs(cases, names, gains, goal))
