@@ -61,7 +61,7 @@ def on_files(files, config):
     for path, content in (notebooks.pages() | known.reference()).items():
         files.append(File.generated(config, path, content=content))
         BOOST.setdefault(path, 0.3)
-    for name in ("site.css", "iframe-worker.js"):
+    for name in ("site.css", "iframe-worker.js", "search.js"):
         files.append(
             File.generated(
                 config, f"assets/{name}", abs_src_path=str(ROOT / "docs" / "site" / name)
