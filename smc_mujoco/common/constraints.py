@@ -20,7 +20,15 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 import numpy as np
 
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    items_of,
+    number,
+    one_call,
+    shown,
+    unknown,
+    whole,
+)
 from smc_mujoco.common.files import as_path
 
 P = ParamSpec("P")
@@ -244,6 +252,7 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
         for name, constraint in constraints.items():
             if name in given.arguments:
                 given.arguments[name] = constraint(name, given.arguments[name])
-        return function(*given.args, **given.kwargs)
+        with one_call():
+            return function(*given.args, **given.kwargs)
 
     return checked

@@ -2,6 +2,7 @@
 that raise it.
 """
 
+import contextlib
 import difflib
 import inspect
 import itertools
@@ -9,7 +10,9 @@ import math
 import numbers
 import re
 import sys
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
 import numpy as np
@@ -222,6 +225,27 @@ def name(what: str, value: object) -> str:
             f"{what} is {shown(value)}, {len(value)} characters: give at most {MAX_NAME}"
         )
     return value
+
+
+_told: ContextVar[set[str]] = ContextVar("told")
+
+
+@contextlib.contextmanager
+def one_call() -> Iterator[None]:
+    """Let `warn_once` tell each sentence once, however many scenarios the call makes."""
+    token = _told.set(_told.get(set()))
+    try:
+        yield
+    finally:
+        _told.reset(token)
+
+
+def warn_once(sentence: str) -> None:
+    """Warn of a doubt, if any, that a call of the user's may raise many times."""
+    told = _told.get(set())
+    if sentence and sentence not in told:
+        told.add(sentence)
+        warnings.warn(sentence, ScenarioWarning, users_stacklevel())
 
 
 def users_stacklevel() -> int:

@@ -235,11 +235,16 @@ def several(kind: type[T], example: str) -> Callable[[str, object, Any], tuple[T
 def disturbance(name: str, value: object, s: Any) -> tuple[Signal, ...]:
     """Return the disturbances, from one, several or None."""
     if isinstance(value, Mapping):
-        joint = next(iter(value), "")
-        raise ScenarioError(
-            f"{name} is {shown(value)}, and a signal acts on every driven joint: give the signal "
-            f"alone, or on one joint fault=smc.Fault(at=0.0, bias=0.2, on={joint!r})"
-        )
+        driven = driven_names(s.plant)
+        joint = next(iter(value), driven[0])
+        if joint not in driven:
+            raise unknown(f"joint of {s.plant.name} in {name}", joint, driven)
+        cure = "give one signal without a joint"
+        if not s.plant.pose:
+            cure += "; only a constant force can act on one joint, by "
+            cure += f"fault=smc.Fault(at=..., bias=..., on={joint!r})"
+        fact = f"{name} is {shown(value)}, and a disturbance acts on every driven joint"
+        raise ScenarioError(f"{fact}: {cure}")
     return several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)")(name, value, s)
 
 
@@ -345,13 +350,13 @@ def contact(name: str, value: object, s: Any) -> tuple[Obstacle, ...]:
 def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]:
     """Return frictions sorted by kind, from one, several or None, or by joint.
 
-    Kinds must differ, and one at most holds a joint at rest.
+    Kinds on a joint must differ, and one at most keeps a state by which it holds the joint at rest.
     """
     items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints(s.plant))
     for part, other in itertools.combinations(items, 2):
         same = type(part) is type(other) and part.on == other.on
         both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
-        if same or (part.holds and other.holds and both):
+        if same or (part.keeps_state and other.keeps_state and both):
             kinds = f"{type(part).__name__} and {type(other).__name__}"
             raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
     return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))

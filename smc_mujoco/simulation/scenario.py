@@ -10,7 +10,6 @@ import dataclasses
 import functools
 import itertools
 import math
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
@@ -19,7 +18,7 @@ import numpy as np
 
 from smc_mujoco.common import html
 from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, suggesting
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
+from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import design
@@ -273,11 +272,10 @@ class Scenario:
         check_inertia(self.resolved)
         check_obstacles(self.resolved)
         check_names(self.resolved)
-        if doubt := next(_doubts(self.resolved), ""):
-            warnings.warn(doubt, ScenarioWarning, users_stacklevel())
+        warn_once(next(_doubts(self.resolved), ""))
         own = self.plant.is_user_model and self.force_command
         if own and self.u_max is None and self.law.name != "none":
-            _tell_default_bound(self.plant, self.limits)
+            warn_once(_assumed_bound(self.plant, self.limits))
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
@@ -1045,7 +1043,7 @@ def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
     at any time.
     """
-    states = [part for part in s.friction if part.holds or part.force is not None]
+    states = [part for part in s.friction if part.keeps_state or part.force is not None]
     if s.integrator == "RK4" and states and not s.exact_friction:
         raise ScenarioError(
             f"integrator RK4 has four stages in a step, and the state of {shown(states[0])} moves "
@@ -1144,22 +1142,20 @@ def _doubts(s: Resolved) -> Iterator[str]:
                 )
 
 
-@functools.lru_cache(maxsize=32)
-def _tell_default_bound(plant: Plant, limits: tuple[float, ...]) -> None:
-    """Warn, once a plant, of the joints of your own model whose force only a default bounds."""
+def _assumed_bound(plant: Plant, limits: tuple[float, ...]) -> str:
+    """Return a sentence on the joints of your own model whose force a default limits, or ""."""
     suggested = plant.suggested.get("u_max", (None,) * plant.driven)
     own = plant.limits or (math.inf,) * plant.driven
     free = [i for i, limit in enumerate(own) if limit == math.inf and suggested[i] is None]
     if not free:
-        return
+        return ""
     joints = joined(repr(joint_names(plant)[i]) for i in free)
     bounds = joined(dict.fromkeys(f"{limits[i]:g} {plant.efforts[i]}" for i in free))
     what = "joint" if len(free) == 1 else "joints"
     example = f"u_max={limits[free[0]]:g}"
     if plant.driven > 1:
         example = f"smc.Channel({example}) for each"
-    text = (
-        f"nothing bounds the force on {what} {joints} of {plant.name}, so that |u| <= {bounds} "
-        f"is taken, by its load and inertia: give u_max, what your motor gives, such as {example}"
+    return (
+        f"nothing limits the force on {what} {joints} of {plant.name}; |u| <= {bounds} is assumed "
+        f"from its load and inertia: give u_max, the limit of your motor, such as {example}"
     )
-    warnings.warn(text, ScenarioWarning, users_stacklevel())

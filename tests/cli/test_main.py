@@ -292,6 +292,8 @@ REFUSED = {  # command line -> what the sentence names
     "film one.npz": ("smc.film",),
     "which arm.xm:shoulder --quick": ("'arm.xm'", ".xml"),
 }
+for option in ("--no-tune", "--quick", "--device cuda"):
+    REFUSED[f"compare --rig emps {option}"] = ("--rig",)
 
 
 @pytest.mark.usefixtures("coarse_grid", "scene", "trace")

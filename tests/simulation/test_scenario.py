@@ -220,7 +220,8 @@ def test_a_disturbance_by_joint_is_refused_and_the_fault_that_it_names_acts_ther
     plant = smc.plant("double_pendulum")
     push = {"elbow": smc.Sine(1.0, 2.0)}
     words = refused(lambda: scenario(plant=plant, disturbance=push), "every driven joint")
-    fault = eval(words.partition("fault=")[2])
+    refused(lambda: scenario(plant="duffing", disturbance=push), "unknown joint of duffing")
+    fault = eval(words.partition("fault=")[2].replace("...", "0.2"))
     assert fault.on == "elbow"
     assert scenario(plant=plant, fault=fault).fault == fault
 

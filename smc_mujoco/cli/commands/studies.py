@@ -168,11 +168,12 @@ def compare(
     start = options.starts(x0)
     names = options.names(metrics, METRICS)
     if rig is not None:
-        own = (plants, condition, gains != "tuned", worst, figure, latex, seed)
-        if any(own):
+        own = (plants, condition, worst, quick, not tune, figure, latex, seed)
+        if any(own) or gains != "tuned" or device != "cpu":
             raise ScenarioError(
                 "--rig brings its own plant, parameter sets and gains: leave out the plants, "
-                "--condition, --gains, --worst, --figure, --latex and --seed"
+                "--condition, --gains, --worst, --quick, --no-tune, --figure, --latex, --seed "
+                "and --device"
             )
         ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
         machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)

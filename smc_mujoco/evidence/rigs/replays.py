@@ -393,7 +393,7 @@ def _steps(scenario: Scenario, halvings: int) -> Fields:
     """
     integrator = "RK4"
     step = scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9)
-    if scenario.input_delay or any(part.holds for part in scenario.friction):
+    if scenario.input_delay or any(part.keeps_state for part in scenario.friction):
         integrator = scenario.resolved.integrator
         step = scenario.resolved.physics_step
     return {"integrator": integrator, "physics_step": step / 2**halvings}

@@ -8,6 +8,7 @@ is as the model says. "held": other joints with a motor are held there too, by a
 import functools
 import math
 from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom import channels as own
+from smc_mujoco.mechanisms.custom import urdf
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 
@@ -77,7 +79,7 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
         moved[i] |= moved[model.body_parentid[i]]
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos  # the start, of a free body also the goal
-    of_urdf = source.label.lower().endswith(".urdf")
+    of_urdf = urdf.read(Path(source.path)) is not None
     if model.joint(joints[0]).type[0] != own.FREE:
         for joint, x in zip(joints, own.goals(model, joints, keyframe)[0], strict=True):
             at.qpos[model.joint(joint).qposadr[0]] = x
@@ -192,7 +194,7 @@ def _lock(
 
 def ties(model: mujoco.MjModel, joints: Collection[str]) -> tuple[Array, Array]:
     """Return which equality constraints hold if all but these joints are locked, and which tie one
-    of them to what is locked, (neq,) each. Those of tendons hold.
+    of them to what is locked, (neq,) each. Those of flexes hold.
     """
     above = np.zeros((model.nbody, model.njnt), bool)  # the joints that carry a body
     for i in range(1, model.nbody):
@@ -213,11 +215,26 @@ def ties(model: mujoco.MjModel, joints: Collection[str]) -> tuple[Array, Array]:
             if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE.value:
                 first, second = model.site_bodyid[[first, second]]
             between = above[first] ^ above[second]
+        elif kind == kinds.mjEQ_TENDON:
+            for tendon in {first, second} - {-1}:
+                between |= _stretching(model, tendon, above)
         else:
             continue
         holds[k] = np.any(between) and np.all(free[between])
         cut[k] = np.any(free[between]) and not holds[k]
     return holds, cut
+
+
+def _stretching(model: mujoco.MjModel, tendon: int, above: Array) -> Array:
+    """Return the joints that a tendon wraps, or that carry some of its sites only, (njnt,)."""
+    first = model.tendon_adr[tendon]
+    wraps = slice(first, first + model.tendon_num[tendon])
+    kinds = model.wrap_type[wraps]
+    ids = model.wrap_objid[wraps]
+    carried = above[model.site_bodyid[ids[kinds == mujoco.mjtWrap.mjWRAP_SITE]]]
+    joints = np.any(carried, axis=0) & ~np.all(carried, axis=0)
+    joints[ids[kinds == mujoco.mjtWrap.mjWRAP_JOINT]] = True
+    return joints
 
 
 def _place(body: mujoco.MjsBody, parent: int, i: int, at: mujoco.MjData) -> None:
@@ -264,9 +281,5 @@ def _delete_orphans(spec: mujoco.MjSpec) -> None:
         by_tendon = actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON and actuator.target in gone
         if by_tendon or target_of(actuator) not in left:
             orphans.append(actuator)
-    for equality in spec.equalities:
-        tendons = {equality.name1, equality.name2}
-        if equality.type == mujoco.mjtEq.mjEQ_TENDON and tendons & gone:
-            orphans.append(equality)
     for orphan in reversed(orphans):  # a tendon after what names it
         spec.delete(orphan)

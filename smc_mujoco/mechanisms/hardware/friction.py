@@ -237,7 +237,7 @@ class LuGre(Friction):
         oscillate too long.
     """
 
-    holds = True
+    keeps_state = True
     forces = "coulomb", "static"
 
     coulomb: Positive

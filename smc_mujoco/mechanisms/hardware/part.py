@@ -146,9 +146,9 @@ class OnJoints(Part):
 class Friction(OnJoints):
     """Base of frictions, which resist a joint's motion beside the plant's own damping."""
 
-    # Whether it holds a joint at rest by bristles or by MuJoCo's dry friction, which RK4 would not
-    # make more accurate. At most one friction may.
-    holds: ClassVar[bool] = False
+    # Whether it keeps a state by which it holds a joint at rest: bristles, or the place where it
+    # stuck. Not Coulomb, which is MuJoCo's alone. One at most on a joint.
+    keeps_state: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
     # damping, N m s/rad (N s/m), and dry friction, N m (N), that it adds to a joint of the model

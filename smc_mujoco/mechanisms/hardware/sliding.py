@@ -67,7 +67,7 @@ TINY = 1e-14  # N m (N): a level above 0, so that MuJoCo has a constraint
 class Sliding(JointForce):
     """Base of frictions by a formula."""
 
-    holds = True
+    keeps_state = True
     memory = SLIDES + 1
 
     @staticmethod

@@ -172,17 +172,7 @@ def test_runs_take_the_gains_of_the_searches_in_turn_and_firmware_keeps_its_own(
 
 @pytest.mark.slow
 def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path):
-    words = [
-        "compare",
-        "--rig",
-        "simple_pendulum_ak80",
-        "--law",
-        "pid",
-        "--law",
-        "twisting",
-        "--searches",
-        "1",
-    ]
+    words = ["compare", "--rig", "simple_pendulum_ak80", "--law", "pid,twisting", "--searches=1"]
     more = ["--seeds", "1", "--duration", "0.5", "--defaults", "--out", str(tmp_path)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ensemble.tuned, "__defaults__", (None, 1, 1, None, None, None, False))

@@ -269,7 +269,7 @@ def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
 @pytest.mark.parametrize("name", ["arm", pytest.param("hand", marks=pytest.mark.slow)])
 def test_a_joint_is_tuned_and_settles(name, mode):
     made = plant(name, mode)
-    goal = dataclasses.replace(smc_objective(), **FAST)
+    goal = search.Objective(**FAST)
     tuned = smc.tune(
         made,
         "pid",
@@ -283,12 +283,6 @@ def test_a_joint_is_tuned_and_settles(name, mode):
     assert np.abs(trace.e[-500:]).max() < 0.05
     assert arrived(trace)
     assert not leans(trace)
-
-
-def smc_objective():
-    from smc_mujoco.analysis.tuning.objective import Objective
-
-    return Objective()
 
 
 def test_a_joint_that_leans_on_its_stop_never_settles():
@@ -318,8 +312,10 @@ def test_a_light_base_on_springs_does_not_fall_and_its_bound_is_told_once(capfd)
     assert scales.falls(light) == ""
     assert scales.at_goal(light).load == pytest.approx([0.5 * 9.81], rel=1e-2)
     assert capfd.readouterr().err == ""
-    with pytest.warns(ScenarioWarning, match="nothing bounds the force on joint 'h'") as told:
-        smc.grid(light, [smc.law(name) for name in ("pid", "adrc")])
+    laws = [smc.law(name) for name in ("pid", "adrc")]
+    smc.grid(light, laws)  # here the warning is ignored
+    with pytest.warns(ScenarioWarning, match="nothing limits the force on joint 'h'") as told:
+        smc.grid(light, laws, seeds=2)
     assert len(told) == 1
 
 
@@ -380,7 +376,7 @@ def test_a_goal_inside_something_is_refused_and_each_cure_works(cure):
 @pytest.mark.parametrize("mode", ["file", "locked"])
 @pytest.mark.parametrize("parent", ["plate", "mid"])
 def test_a_link_of_a_urdf_may_touch_all_but_the_one_that_carries_it(tmp_path, parent, mode):
-    file = tmp_path / "block.urdf"
+    file = tmp_path / "block.xml"  # what it holds says what it is
     moved = []
     for shape in (SHAPE, ""):
         file.write_text(URDF.format(shape=shape, parent=parent))
@@ -417,14 +413,17 @@ TIES = {
     "sites": '<connect site1="a" site2="b"/>',
     "weld": '<weld body1="a" body2="b"/>',
     "joints": '<joint joint1="a" joint2="b"/>',
+    "tendons": '<tendon tendon1="ta" tendon2="tb"/>',
+    "string": '<tendon tendon1="ab"/>',
 }
 
 
 @pytest.mark.parametrize("tie", TIES)
 def test_a_tie_to_what_is_locked_is_cut_and_told_with_a_cure(tie):
-    text = (
-        f"<mujoco><worldbody>{''.join(RODS)}</worldbody><equality>{TIES[tie]}</equality></mujoco>"
-    )
+    text = f"""<mujoco><worldbody>{"".join(RODS)}</worldbody><equality>{TIES[tie]}</equality>
+    <tendon><fixed name="ta"><joint joint="a" coef="1"/></fixed><fixed name="tb"><joint joint="b"
+    coef="2"/></fixed><spatial name="ab"><site site="a"/><site site="b"/></spatial></tendon>
+    </mujoco>"""
     motor = {"motor": True}
     assert smc.plant_from(text, {"c": motor}, others="locked").unmodelled == ""
     with pytest.warns(ScenarioWarning, match="tie its channels to what is locked.*others='held'"):
