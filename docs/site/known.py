@@ -1,5 +1,5 @@
 """What pages show that the package knows, written into them when the site is built, in place of
-links.
+links and markers.
 """
 
 import inspect

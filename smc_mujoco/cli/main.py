@@ -23,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
-DRAWN = ("film", "figure", "plot", "video")  # words that are tried for `run`
+DRAWN = ("film", "figure", "plot", "video")  # commands that do not exist, and that users try
 # heading in the help -> commands; the annexes add theirs
 GROUPS: dict[str, list[Callable[..., None]]] = {
     "Run and look": [catalogue.list_, runs.run, runs.show, runs.view],

@@ -128,5 +128,12 @@ def _install(callbacks: dict[str, Any]) -> None:
             getattr(mujoco, f"set_mjcb_{name}")(callback)
 
 
+def silence(data: mujoco.MjData) -> None:
+    """Let MuJoCo print no warning of `data`: it prints one only the first time. In a control
+    callback that would never end.
+    """
+    data.warning.number[:] = 1
+
+
 def _python(callback: Any) -> bool:
     return callback is not None and not isinstance(callback, ctypes._CFuncPtr)  # pyright: ignore[reportAttributeAccessIssue] the base of all C functions

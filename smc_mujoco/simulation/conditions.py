@@ -451,7 +451,7 @@ def _disturbed(make: Callable[[float], Signal]) -> Recipe:
 
 
 def _each_joint(name: str, make: Callable[[float, Plant], Any]) -> Recipe:
-    """Return this field, with what a function makes of the bound on each driven joint."""
+    """Return a recipe for field `name`: one part per driven joint, made from its bound."""
 
     def fields(plant: Plant, duration: float) -> Data:
         limits = Scenario.recorded(plant=plant, law="none").limits
@@ -472,15 +472,15 @@ def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) ->
 
 def _bristles(level: float, plant: Plant) -> Friction:
     """Return bristles that bend by 0.1 mrad (mm) before a joint slides, as those of the study do.
-    On the library's plants they have the study's stiffness. That is late on furuta: with a tenth of
-    the default step `rotary_swing_up` settles 0.6 % earlier and has 3 % more ITAE.
+    On the library's plants they have the study's stiffness. The default step does not resolve them
+    on furuta: at a tenth of it `rotary_swing_up` settles 0.6 % earlier and has 3 % more ITAE.
     """
     stiffness = BRISTLE_STIFFNESS * level if plant.is_user_model else LuGre.stiffness
     return LuGre(0.5 * level, level, stribeck=0.05, stiffness=stiffness)
 
 
 def _motor(limit: float, plant: Plant) -> DCMotor:
-    """Return the default motor; on a user's model as many side by side as its bound is of the
+    """Return the default motor; on a user's model, as many in parallel as its bound is times the
     study's.
     """
     return DCMotor().side_by_side(limit / U_MAX if plant.is_user_model else 1.0)

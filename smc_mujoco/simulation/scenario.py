@@ -381,9 +381,12 @@ class Scenario:
 
     @property
     def held_by_noslip(self) -> bool:
-        """Whether MuJoCo's noslip pass holds all dry friction, of a user's joints, beside RK4."""
-        parts = self.contact or {part.exact for part in self.friction} - {DryFriction()}
-        if parts or not self.plant.is_user_model or not all(part.drives for part in self.actuator):
+        """Whether, without contact or other friction, MuJoCo's noslip pass holds a user's dry
+        friction under RK4.
+        """
+        if self.contact or not all(part.exact == DryFriction() for part in self.friction):
+            return False
+        if not self.plant.is_user_model or not all(part.drives for part in self.actuator):
             return False
         from smc_mujoco.mechanisms.custom.plant_from import held_by_noslip
 

@@ -321,11 +321,11 @@ class Board(Tables):
             return ""
         least = next(n for n in itertools.count(1) if 2 * min_p(n) <= allowed)
         few = "runs"
-        cure = "more seeds"
+        cure = "give more seeds"
         if largest.sets > 1:
             few = "sets of gains"
-            cure = "more searches, or leave out quick"
-        return f"too few {few} ({largest.samples}), {least} can decide ({cure})"
+            cure = "give more searches, or leave out quick"
+        return f"too few {few} ({largest.samples}): a verdict needs at least {least}; {cure}"
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, have not arrived, or never reach a time, such as

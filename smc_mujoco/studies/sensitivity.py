@@ -27,7 +27,7 @@ import numpy as np
 
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs, many
+from smc_mujoco.analysis.engine.runs import Runs, worth_compiling
 from smc_mujoco.analysis.margins import TOLERATED_ERROR, rest_share
 from smc_mujoco.analysis.sensitivity import (
     CHANCE,
@@ -245,7 +245,7 @@ def sensitivity(
     held = np.empty(len(design), bool)
     work = len(design) * scenario.work
     formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
-    runs = Runs(formulas, device, threads, many(work), by_group=True)
+    runs = Runs(formulas, device, threads, worth_compiling(work), by_group=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
         for first in range(0, len(design), AT_ONCE):

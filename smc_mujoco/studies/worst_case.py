@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs, many
+from smc_mujoco.analysis.engine.runs import Runs, worth_compiling
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.cache import cached
@@ -248,7 +248,7 @@ def worst_case(
         f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress
     ) as drawn:
         formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
-        fast = Runs(formulas, device, threads, many(work), by_group=True)
+        fast = Runs(formulas, device, threads, worth_compiling(work), by_group=True)
         drawing, search = (Search(members, entry, budget, fast, drawn.advance) for _ in range(2))
         drawing.draw(np.random.default_rng([seed, 0]))
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)

@@ -270,11 +270,11 @@ RESULTS = {  # changes of both blocks -> the result
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
         {"ahead": None, "samples": 3, "sets": 3},
-        "too few sets of gains (3), 7 can decide (more searches, or leave out quick)",
+        "too few sets of gains (3): a verdict needs at least 7; give more searches, or leave out quick",
     ),
     "few runs": (
         {"ahead": None, "samples": 4, "runs": 4},
-        "too few runs (4), 7 can decide (more seeds)",
+        "too few runs (4): a verdict needs at least 7; give more seeds",
     ),
 }
 

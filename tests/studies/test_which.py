@@ -85,7 +85,7 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         duration=2.5,
         seeds=3,
     )
-    assert few.answer[3].startswith("How sure: first so far: too few runs (3), ")
+    assert few.answer[3].startswith("How sure: first so far: too few runs (3): ")
     same = smc.which("duffing", laws=[FAST, FAST.named("same")], out=folder, **COMMON)
     assert same.answer[3].startswith("How sure: first so far: it wins 0 of 6 comparisons, ")
     alone = smc.which("duffing", laws=FAST, out=folder, **COMMON)

@@ -3,8 +3,10 @@
 A search, a map and a share of failures need thousands of runs of one law on one plant. So `loop`
 writes the run of such a group out as one function: sensors, noise, estimator, law, delay,
 disturbances and the plant's equation under RK4 in a single loop, compiled together with the law.
-Scores are summed on the way. `group` tells what this engine cannot
-run; `cpu` and `gpu` compile it. Its numbers find gains and fill maps: those on record are MuJoCo's.
+Scores are summed on the way. `group` tells what this engine cannot run; `cpu` and `gpu` compile it.
+
+It finds gains, fills maps, and gives sensitivities and medians of worst-case searches; where its
+numbers are shown, MuJoCo repeats CHECKED runs. All others are MuJoCo's.
 """
 
 from typing import Annotated

@@ -61,11 +61,13 @@ class Places:
     def __init__(self) -> None:
         self.size = 0
         self.at: dict[str, int] = {}
+        self.slices: dict[str, slice] = {}
 
     def take(self, name: str, count: int = 1) -> None:
         """Give the next `count` numbers a name."""
         self.at[name] = self.size
         self.size += count
+        self.slices[name] = slice(self.at[name], self.size)
 
     def of(self, *names: str) -> list[int]:
         """Return the first index of each name."""

@@ -5,6 +5,7 @@ It needs the package numba-cuda: `pip install 'smc-mujoco[gpu]'`.
 
 # pyright: reportMissingImports=false, reportCallIssue=false, reportAttributeAccessIssue=false
 import functools
+import importlib
 import warnings
 from typing import Any
 
@@ -17,6 +18,8 @@ if sentence := missing("gpu", "device 'cuda'", "numba_cuda"):
     raise MissingPackageError(sentence)
 if not hasattr(np, "row_stack"):  # numba-cuda 0.30 asks for it, and numpy 2.5 has none
     setattr(np, "row_stack", np.vstack)  # noqa: B010
+    importlib.import_module("numba.cuda.np.arrayobj")
+    delattr(np, "row_stack")
 
 from numba import cuda, float64, njit, types
 from numba.extending import intrinsic

@@ -31,7 +31,7 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
 
-# of the forms of one key
+# fields in which forms of one key may differ, at their least
 VARYING: Fields = {"noise": False, "jump": False, "delay": False, "clock": False, "slots": 1}
 
 
@@ -63,7 +63,8 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
     moving = not all(isinstance(signal, Constant) for signal in s.references)
     for name in metrics:
         beyond[f"it does not sum up {name}"] = name not in METRICS
-        beyond[f"{name} of a reference that moves"] = name in RESTING and moving
+        only = f"the engine sums up {name} only for a reference at rest"
+        beyond[only] = name in RESTING and moving
     return next((words for words, holds in beyond.items() if holds), "")
 
 
@@ -121,7 +122,7 @@ def _part(c: Component) -> Part:
 
 
 def _drives(s: Resolved) -> list[Any]:
-    """Return the drives of all channels: those of some each."""
+    """Return the callback's drives; each is of some channels."""
     return [part for part, kind in s.acting if kind == "act"]
 
 
@@ -176,8 +177,7 @@ class Group:
         return found
 
     def _put(self, row: np.ndarray, name: str, values: Any) -> None:
-        first = self.places.at[name]
-        row[first : first + len(values)] = values
+        row[self.places.slices[name]][: len(values)] = values
 
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
         t = np.arange(s.samples + 1) * s.control_period
@@ -216,7 +216,7 @@ class Group:
             table = row[first : first + size * s.plant.n].reshape(-1, size)
             table[[*part.channels(s.plant)]] = part.numbers(run_of(s, part))
         for part in s.friction:
-            for name, value in zip(("damping", "levels"), part.added, strict=True):
+            for name, value in zip(("damping", "levels"), part.added_to_model, strict=True):
                 row[np.add(self.places.at[name], part.channels(s.plant))] += value
 
     @property

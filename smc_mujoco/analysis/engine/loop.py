@@ -100,7 +100,7 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
                 if k == samples:
                     break
                 advance(row, tables, work, k, within, step)
-            record(row, work, scores, log, k)  # a late sample has come
+            record(row, work, scores, log, k)  # at the end of its period: the sample may come late
         scores[FAILURE] = FINE
 
     return simulate

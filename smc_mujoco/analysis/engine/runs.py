@@ -24,7 +24,7 @@ Scored = tuple[list[float], float | None]  # metrics, and the time of a failure,
 Report = Callable[[int], None]  # called with the physics steps since its last call
 
 
-def many(work: int) -> bool:
+def worth_compiling(work: int) -> bool:
     """Return whether runs of so many physics steps times channels take MuJoCo longer than compiling
     their law takes.
     """
@@ -38,7 +38,7 @@ class Runs:
       formulas: name of a metric -> its value for a trace of MuJoCo's.
       device: of the fast engine.
       threads: as in `run`.
-      many: whether there are so `many` runs. If not, on the processor, all are MuJoCo's.
+      worth_compiling: whether the runs are worth it. If not, on the processor, all are MuJoCo's.
       by_group: whether a formula is the worst of the groups of channels. With several groups all
         runs are MuJoCo's.
     """
@@ -48,12 +48,12 @@ class Runs:
         formulas: Mapping[str, Callable[[Trace], float]],
         device: str = "cpu",
         threads: int | None = None,
-        many: bool = True,
+        worth_compiling: bool = True,
         by_group: bool = False,
     ):
         self.formulas = formulas
         self.device = device
-        self.worth_compiling = many or device != "cpu"
+        self.worth_compiling = worth_compiling or device != "cpu"
         self.by_group = by_group
         self.threads = threads
         self.broken: dict[str, str] = {}  # law -> how it failed first, in a sentence

@@ -1,9 +1,8 @@
 """Metrics that a run sums up sample by sample, so that it needs no log.
 
-Each is that of `metrics`; all but settling_time, rest_share and outcome are of
-the channels that have an actuator. A metric is two
-compiled functions: one takes a sample into its numbers in `work`, the other makes the score of them
-at the end.
+Each is that of `metrics`; all but settling_time, rest_share and outcome are of the channels that
+have an actuator. A metric is two compiled functions: one takes a sample into its numbers in `work`,
+the other makes the score of them at the end.
 """
 
 import math

@@ -14,7 +14,7 @@ from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 
 FOVY = 9.0  # degrees, chosen: a long lens
 TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen
-HEAD_ROOM = 0.02  # of a picture's width, free above it for heads of arrows; chosen
+HEAD_ROOM = 0.02  # of the picture's width: room above the machine in a tile, for arrowheads; chosen
 TILE_GAP = 2  # px between tiles
 MIN_HEIGHT = 0.25  # of a tile's, for a machine whose words have no room; chosen
 Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees

@@ -28,7 +28,7 @@ Add = Callable[[mujoco.MjvScene], None]
 
 
 class Canvas:
-    """A picture of `size` px of a model, from its camera `film`, which does not move.
+    """A picture of `size` px of a model, from its camera `film`.
 
     With `arms`, rings around links cast no shadows.
     """

@@ -188,7 +188,7 @@ class Charts:
 
 
 def in_lanes(panel: Panel) -> bool:
-    """Return whether each law's u has a lane: else a wide band would hide the others."""
+    """Return whether each law's u has its own lane, because a wide band would hide the others."""
     return panel.quantity == "u" and len(panel.traces) > 1 and panels.crowded(panel, 0)
 
 

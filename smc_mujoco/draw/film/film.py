@@ -4,8 +4,8 @@ clock.
 In order: pace.py sets the speed; track.py says what each run does at each frame; caption.py has the
 text, charts.py the charts; camera.py lays out the tiles; scene.py composes a machine's model,
 puppet.py poses it, stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over
-arms and what flies; encoder.py writes.
-Frames are made and written one by one, so that memory does not grow with a film's length.
+arms and what flies; encoder.py writes. Frames are made and written one by one, so that memory does
+not grow with a film's length.
 """
 
 import contextlib

@@ -137,9 +137,7 @@ class Puppet:
 
     @property
     def travels(self) -> bool:
-        """Return whether a machine that nothing holds in place goes so far that the camera follows
-        it.
-        """
+        """Whether a machine that nothing holds in place goes so far that the camera follows it."""
         plant = self.scenario.plant
         if plant.on_stage and not plant.pose:
             return False

@@ -13,8 +13,7 @@ sweep on the equations of all channels. The sweeps converge for every positive d
 without an actuator that moves with channel i has g = (M^-1)_qi.
 
 The compiled path calls MuJoCo's own functions by name, with a copy of the model that has the
-nominal parameters and
-an mjData for each simulation.
+nominal parameters and an mjData for each simulation.
 
 Laws of many joints see the mechanism as a whole instead,
 
@@ -24,8 +23,7 @@ and C(x, v) w = (qfrc_bias(x, v + w) - qfrc_bias(x, v - w)) / 4: gravity cancels
 quadratic in v.
 
 Constraints are left out: contacts, limits, dry friction. Joints that are not measured, all in other
-kinematic
-trees, are assumed to be in the model's initial state.
+kinematic trees, are assumed to be in the model's initial state.
 """
 
 import contextlib
@@ -46,6 +44,7 @@ from smc_mujoco.common import fingerprint, libmujoco
 from smc_mujoco.common.aliases import Array, Numbers, Pair
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, Key, floats, pointer, record_at
+from smc_mujoco.common.mjcb import silence
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids
@@ -269,9 +268,7 @@ def prepared(
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
-    data.warning.number[:] = (
-        1  # MuJoCo tells only the first; telling it inside a control callback would never end
-    )
+    silence(data)
     joints = joint_ids(model)
     ctrl = model.actuator_ctrladr[drive_ids(model)]
     places = np.full(len(joints), -1, PLACE)

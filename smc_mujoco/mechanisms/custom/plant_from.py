@@ -198,10 +198,10 @@ def plant_from(
     others: Annotated[str, OneOf(names=OTHERS)] | None = None,
     measured: Iterable[str] | None = None,
 ) -> Plant:
-    """Make a plant of an MJCF model.
+    """Make a plant of an MJCF or URDF model.
 
     Args:
-      path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a
+      path: of an MJCF or URDF file; or the model itself: its text, an MjSpec as it is now, or a
         mjcf.RootElement of dm_control.
       channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of
         joints' names. The plant's channels have the same order. A free joint without a name has
@@ -217,8 +217,7 @@ def plant_from(
       others: what other joints do. "file": as the model says; servos hold the start, or the
         keyframe's ctrl. "held": a joint with a motor (in a URDF, with an effort) is held there too,
         by a stiff PD. "locked": all are welded there, and equality constraints between them and
-        the channels are left out. Default: "file", with a warning if that
-        leaves motors at 0.
+        the channels are left out. Default: "file".
       measured: names of further joints that are measured but not driven, in the order of their
         channels, which come last. Laws of many joints read them, and they count in scores. A free
         joint, or "base" for the model's only one, gives six channels, base_x to base_rz: position,
@@ -230,6 +229,11 @@ def plant_from(
       ScenarioError: a model that cannot be read, crashes MuJoCo, or takes more time or memory (4
         GiB) than allowed; a number in it that is NaN, infinite or beyond 1e15; an unknown or
         unsuitable joint, actuator or keyframe; or an x0 outside its joint's range.
+
+    Warns:
+      ScenarioWarning: what is changed in a URDF; constraints that give way, or dry friction that
+        creeps; a joint drawn outside its range; motors that nothing commands, without `others`;
+        equality constraints that are left out.
 
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or
     a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
@@ -450,8 +454,8 @@ def _places(
 
 @functools.lru_cache(maxsize=32)
 def held_by_noslip(plant: Plant, step: float) -> bool:
-    """Return whether the noslip pass holds all dry friction, and RK4 with such a step the damping
-    of the joints, which motors alone move.
+    """Return whether the noslip pass holds all dry friction, no actuator but the channels' motors
+    acts, and RK4 at this step, s, is stable with the joints' damping.
     """
     model = compiled(plant.spec())
     if (model.opt.noslip_iterations, model.opt.noslip_tolerance) != NOSLIP:

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Floats
+from smc_mujoco.common.mjcb import silence
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT
 from smc_mujoco.mechanisms.hardware.part import dof_ids, driven_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant
@@ -99,19 +100,20 @@ def _held(
     model: mujoco.MjModel, data: mujoco.MjData, base: int, load: Array, M: Array
 ) -> tuple[Array, float]:
     """Hold the goal by a stiff PD. Return its force, (driven,), and how far the base moves, in its
-    sizes.
+    sizes: inf if the simulation breaks down.
     """
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     joints = driven_ids(model)
     places = model.jnt_qposadr[joints]
     dofs = model.jnt_dofadr[joints]
     inertia = M[dofs, dofs]
-    # the PD damps what is lighter than its inertia faster
+    # the PD's gains suit M[i, i]; where the base gives way the joint is lighter, and its modes are
+    # faster
     fastest = STIFF * np.linalg.eigvals(np.linalg.inv(M)[np.ix_(dofs, dofs)] * inertia).real.max()
     model.opt.timestep = min(model.opt.timestep, 0.1 / STIFF, 0.5 / fastest)
     goal = data.qpos[places].copy()
     mujoco.mj_forward(model, data)
-    data.warning.number[:] = 1  # MuJoCo tells only the first
+    silence(data)
     first = data.xpos[base].copy()
     steps = round(HOLD / model.opt.timestep)
     total = np.zeros(len(dofs))

@@ -7,8 +7,8 @@ The callback simulates Lag, RateLimit and the winding of a DCMotor (`DriveStep`)
 the mean of their force over each physics step. So the velocities at the ends of the steps are those
 of the equations, whatever the step is, and any integrator may be used; only a RateLimit behind a
 Lag is not exact, see there. A state that MuJoCo integrates would give each step the force of its
-end. This lead of half a step would take away a part
-of the delay that a limit cycle depends on: behind one lag, most of it.
+end. This lead of half a step would take away a part of the delay that a limit cycle depends on:
+behind one lag, most of it.
 
 A winding also feels the joint's speed, which only MuJoCo knows within a step. `winding_step` is
 exact for a speed that changes linearly there.
@@ -194,21 +194,26 @@ class DCMotor(Actuator):
     @property
     def scale(self) -> float:
         """V per unit of u: per N m (N) of stall torque, or 1 if u is the voltage."""
-        if self.unit:
+        if self.by_voltage:
             return 1.0
         return self.resistance / self.constant
 
     @property
+    def by_voltage(self) -> bool:
+        """Whether u is the voltage."""
+        return self.command == "voltage"
+
+    @property
     def unit(self) -> str:
         """Unit of u, "V" if it is the voltage; "" for that of the joint's force."""
-        return "V" if self.command == "voltage" else ""
+        return "V" if self.by_voltage else ""
 
     @property
     def nominal(self) -> NominalDrive:
         """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is
         the torque.
         """
-        if not self.unit:
+        if not self.by_voltage:
             return NominalDrive()
         per_volt = self.constant / self.resistance
         return NominalDrive(per_volt, per_volt * self.constant)
@@ -221,10 +226,10 @@ class DCMotor(Actuator):
     @property
     def bound(self) -> float | None:
         """V, the supply, if u is the voltage."""
-        return self.voltage if self.unit else None
+        return self.voltage if self.by_voltage else None
 
     def side_by_side(self, count: float) -> "DCMotor":
-        """Return so many of these motors on one joint, as one motor."""
+        """Return the one motor that `count` of these, or a fraction, on one joint equal."""
         return dataclasses.replace(
             self,
             resistance=self.resistance / count,
@@ -512,9 +517,8 @@ def winding_step(b: float, rk4: bool) -> tuple[float, float]:
     The first number is the weight of a constant speed in the mean torque, and of the speed's change
     in the torque at the end. The second is the share of the drag of a motor without inductance that
     MuJoCo gets, so that the speed's change in the step has its effect on the mean torque. A change
-    by 1 has the effect `late` there. RK4 applies a
-    drag at the mean speed, so at half of the change, and implicit integrators at the speed at the
-    end.
+    by 1 has the effect `late` there. RK4 applies a drag at the mean speed, so at half of the
+    change, and implicit integrators at the speed at the end.
     """
     drag = 1.0 - _mean(b)
     if b < SHORT_STEP:
@@ -534,8 +538,7 @@ def _rise(a: float) -> float:
     .. a.
 
     With mean m and moment p = integral of (1 - s) f over the step s = 0 .. 1, stages of m - b, m,
-    m, m + b with
-    b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
+    m, m + b with b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
     """
     if a < SHORT_STEP:
         return -a / 2.0 + a**2 / 4.0 - 3.0 * a**3 / 40.0

@@ -46,7 +46,6 @@ class Encoder(OnJoints):
         every control sample.
       delay: s until a reading arrives, 0 or more, a whole number of physics steps. Until the first
         arrives, the controller reads x0.
-
       skew: s, 0 or more, a whole number of physics steps: a reading of each channel is older by it
         than that of the channel before, as on a bus on which the last channel is read first. Not
         with `period`.

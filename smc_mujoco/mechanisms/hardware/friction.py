@@ -20,6 +20,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLREF,
     PASSIVE,
     Actuator,
+    Added,
     Friction,
     Natural,
     Part,
@@ -47,9 +48,9 @@ class Viscous(Friction):
     b: Natural
 
     @property
-    def added(self) -> tuple[float, float]:
-        """Its damping."""
-        return self.b, 0.0
+    def added_to_model(self) -> Added:
+        """Its damping, and no dry friction."""
+        return Added(damping=self.b)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         yield Field("dof_damping", self.dofs(model), self.b, adds=True)
@@ -66,9 +67,9 @@ class Coulomb(Friction):
 
     Elsewhere it is MuJoCo's. In a step in which a joint stops or turns back, friction then has one
     direction for all of it. It is a soft constraint, so a stuck joint creeps at (1 - d) tc/2 a0,
-    with impedance d, time constant tc, and a0
-    the acceleration that friction holds back. With the hardest constraint that is 1e-4 h a0 for a
-    physics step h: 2e-7 rad/s for a pendulum of 0.125 kg m^2 that holds 1 N m at h = 0.25 ms.
+    with impedance d, time constant tc, and a0 the acceleration that friction holds back. With the
+    hardest constraint that is 1e-4 h a0 for a physics step h: 2e-7 rad/s for a pendulum of 0.125 kg
+    m^2 that holds 1 N m at h = 0.25 ms.
 
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
@@ -79,9 +80,9 @@ class Coulomb(Friction):
     level: Natural
 
     @property
-    def added(self) -> tuple[float, float]:
-        """Its dry friction."""
-        return 0.0, self.level
+    def added_to_model(self) -> Added:
+        """No damping, and its dry friction."""
+        return Added(dry=self.level)
 
     @property
     def exact(self) -> Part:

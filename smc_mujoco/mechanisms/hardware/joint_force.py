@@ -143,6 +143,9 @@ def actuator_function(
       numbers, memory: as in `friction_function`.
       delay: s, the time constant with which the force follows y.u, 0 or more. The default physics
         step resolves it.
+
+    Raises:
+      ScenarioError: for a name or a number that cannot be one.
     """
     number("delay", delay, low=0.0)
     return functools.partial(_made, Drive, numbers or {}, memory, {"delay": delay})

@@ -29,8 +29,9 @@ import dataclasses
 import math
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
+import mujoco
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
@@ -38,15 +39,17 @@ from numba.extending import register_jitable
 from smc_mujoco.common.jit import floats, record_at
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
-# qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in
-# actuator_force
+#   qpos, qvel, ctrl: in the arrays of these names
+#   x_sensor, v_sensor: in sensordata
+#   force: in actuator_force
 #   shaft, shaft_qpos: in qvel and qpos, of what the actuator drives: the joint, or its rotor
-# xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which
-# d enters there
-# horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of
-# the world, 0 or 1
-#   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
-# friction_force: of a friction's actuator, in actuator_force
+#   xfrc: of the body's force along the joint, in xfrc_applied
+#   sign: 1 or -1, with which d enters there
+#   horizontal: of the body's horizontal force, in xfrc_applied
+#   axis: of the world, 0 or 1, along which that force of a hinge acts
+#   hinge_body: of the body of a hinge, in xipos
+#   anchor: of a hinge, in xanchor and xaxis
+#   friction_force: of a friction's actuator, in actuator_force
 #   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
 #   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
 #   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
@@ -209,6 +212,12 @@ class Sight(NamedTuple):
     chance: float
 
 
+class Load(Protocol):
+    """Returns the MjModel with the values from a physics step on, a new copy."""
+
+    def __call__(self, step: int = 0) -> mujoco.MjModel: ...
+
+
 @dataclasses.dataclass(frozen=True)
 class Run:
     """What a part's numbers may depend on. Lists are of the joints that it acts on."""
@@ -219,8 +228,8 @@ class Run:
     rk4: bool
     x0: Sequence[float]
     v0: Sequence[float]
-    locate: Callable[[], Sequence[int]]
-    load: Callable[..., Any]  # physics step, default 0 -> MjModel with the values from then on
+    locate: Callable[[], Sequence[int]]  # -> degrees of freedom of these joints in the MjModel
+    load: Load
     jump_step: int  # the first with what the scenario's jump changes; -1 without a jump
     draw: Callable[[], list[float]]
 
@@ -230,7 +239,7 @@ class Run:
         return self.locate()
 
     @property
-    def model(self) -> Any:
+    def model(self) -> mujoco.MjModel:
         """The MjModel with the scenario's values, a new copy."""
         return self.load()
 

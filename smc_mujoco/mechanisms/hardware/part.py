@@ -142,6 +142,13 @@ class OnJoints(Part):
         return self.on or driven_names(plant)
 
 
+class Added(NamedTuple):
+    """What a friction adds to each of its joints in the model."""
+
+    damping: float = 0.0  # N m s/rad (N s/m)
+    dry: float = 0.0  # dry friction, N m (N)
+
+
 @dataclasses.dataclass(frozen=True)
 class Friction(OnJoints):
     """Base of frictions, which resist a joint's motion beside the plant's own damping."""
@@ -151,8 +158,7 @@ class Friction(OnJoints):
     keeps_state: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
-    # damping, N m s/rad (N s/m), and dry friction, N m (N), that it adds to a joint of the model
-    added: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    added_to_model: ClassVar[Added] = Added()
 
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""

@@ -8,8 +8,7 @@ follows it by
     thrust = (1 - fade) (linear W + square W^2),    0 at least,
 
 and its angular momentum h = sum of inertia spin W, along the body's third axis, acts on the body
-with
--w x (0, 0, h) - (0, 0, h'). spin is 1 counter-clockwise seen from above; the drag of a rotor's
+with -w x (0, 0, h) - (0, 0, h'). spin is 1 counter-clockwise seen from above; the drag of a rotor's
 blades turns the body the other way, which is in the gear of its actuator. The supply sags: c is
 less by the share `sag` times the sum of all thrusts in the middle of the physics step. The body's
 drag is -R diag(drag) R' (v - wind), at its origin.
@@ -44,9 +43,9 @@ from smc_mujoco.mechanisms.hardware.part import Part, drive_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 ROTORS_TEXT = "smc:rotors"  # name of a text in models whose actuators are rotors
-# linear [N s/rad], square [N s^2/rad^2], rise and fall [1/s], rise2 and fall2 [1/rad], inertia [kg
-# m^2], spin [1 or
-# -1], fade [1], sag [1/N], start: the speed at which a run begins [rad/s]
+# linear [N s/rad], square [N s^2/rad^2], rise and fall [1/s], rise2 and fall2 [1/rad],
+# inertia [kg m^2], spin [1 or -1], fade [1], sag [1/N], start: the speed at which a run begins
+# [rad/s]
 ROTOR = floats(
     [
         "linear",

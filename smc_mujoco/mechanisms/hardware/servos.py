@@ -105,6 +105,9 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
       model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of
         the motor.
       command: what u is, as in `DCMotor`: "torque" or "voltage".
+
+    Raises:
+      ScenarioError: an unknown servo, model or command.
     """
     models = find("servo", name, SERVOS)
     fitted = find(f"model of {name}", model, models)

@@ -53,8 +53,8 @@ class Stepper(Actuator):
     slows down above the speed sqrt(2 ramp) is chosen.
 
     The driver spreads a step of the field over the interval before it, as drivers with finer
-    microsteps do. The field
-    holds the rotor by a magnetic spring, which slips by itself if the load is too large:
+    microsteps do. The field holds the rotor by a magnetic spring, which slips by itself if the load
+    is too large:
 
         torque = gear torque sin(teeth gear (field - x)) - gear^2 damping v
 
