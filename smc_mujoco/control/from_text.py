@@ -1,4 +1,4 @@
-"""Laws and other components from text: `pid`, `pid(kp=50, ki=1)`, or a file with a law in it.
+"""Laws and other components from text: `pid`, `pid(kp=50,ki=50,kd=8)`, or a file with a law.
 
     smc.law("gains.json")        # what `smc-mujoco tune --out gains.json` wrote
     smc.law("my_law.py", lam=5)  # a law made by @smc.law_function
@@ -24,7 +24,7 @@ from smc_mujoco.control import serialise
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
 
-# pid(kp=50, ki=1)
+# pid(kp=50,ki=50,kd=8)
 NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
 # slow: pid(kp=50)
 LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)
@@ -38,9 +38,9 @@ def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
     `smc.law(...).named("slow")` gives it another name.
 
     Args:
-      text: the name of a law of the library, such as "pid"; a name with gains, such as "pid(kp=50,
-        ki=1)"; or a file with one law: FILE.json that `smc-mujoco tune` wrote, FILE.py, FILE.c or
-        FILE.fmu. Or your own law itself.
+      text: the name of a law of the library, such as "pid"; a name with gains, such as
+        "pid(kp=50,ki=50,kd=8)"; or a file with one law: FILE.json that `smc-mujoco tune` wrote,
+        FILE.py, FILE.c or FILE.fmu. Or your own law itself.
       gains: one number for all channels, or a sequence with one for each driven channel.
 
     Raises:
@@ -72,7 +72,7 @@ def laws(text: object) -> list[str | Law]:
     elif labelled := LABELLED.fullmatch(text):
         return [law(labelled["rest"]).named(labelled["label"].strip())]
     else:
-        head, gains = _parts("law", text, "pid(kp=50, ki=1)")
+        head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     if read := _reader(head):
         return [_with_gains(law, gains) for law in read(head)]
     return [find("law", head, known_laws()).bind(gains, warn=True)]

@@ -70,11 +70,11 @@ def view(
       ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit
         the machine.
     """
-    runs = runs_of(scenario, laws)
     if importlib.util.find_spec("mujoco.studio") is None:
         raise ScenarioError(
             f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'"
         )
+    runs = runs_of(scenario, laws)
     from mujoco.studio import app, launch_web, viewer_protocol, web_viewer
     from mujoco.studio.web import web_server
 
@@ -86,7 +86,7 @@ def view(
         )
     door = Door(web_server)
     door.bind("", port)
-    print(f"{door.address} answers once the laws are compiled", flush=True)
+    print(f"{door.address} answers once the laws are compiled, in up to 20 s", flush=True)
     session = Session(runs)
     web_server.bind_public_socket = door.bind
     web_server.bind_loopback_socket = door.bind_inner

@@ -172,11 +172,10 @@ def condition(name: str, **fields: Any) -> Condition:
       ScenarioError: the name is one of the suite's, a field does not exist or belongs to no
         condition, or there is no field at all.
     """
-    if errors.name("a condition's name", name) in NAMED or set(":+,") & set(name):
-        raise ScenarioError(
-            f"condition {shown(name)} is a name of the suite, or has one of : + , in it: give "
-            "another"
-        )
+    if errors.name("a condition's name", name) in NAMED:
+        raise ScenarioError(f"condition {name!r} is a name of the suite: give another")
+    if set(":+,") & set(name):
+        raise ScenarioError(f"condition {shown(name)} has one of : + , in it: give another name")
     if not fields:
         raise ScenarioError(
             f"condition {name!r} has no fields: give some, such as friction=smc.Coulomb(0.05)"

@@ -141,7 +141,8 @@ class Scenario:
       feedforward: a known signal that is added to the law's u before its bound, the same for every
         driven channel: an excitation, or the command of a recorded experiment (with the law
         "none"). None: nothing is added.
-      disturbance: d(t), one signal or several to be added, or None.
+      disturbance: d(t) on every driven channel: one signal, or several to be added, or None. On one
+        joint acts a Fault's bias, on a body a Push.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
       clock: the controller's Clock: its samples may come late or be missed. None: all are on time.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 GAINS_HELP = (
-    "With your own gains: pid(kp=50, ki=1). From a file: my_law.py, or gains.json of "
+    "With your own gains: pid(kp=50,ki=50,kd=8). From a file: my_law.py, or gains.json of "
     "`smc-mujoco tune --out`."
 )
 
@@ -115,7 +115,7 @@ LawText = Annotated[
     typer.Argument(
         metavar="LAW|FILE",
         autocompletion=LAWS,
-        help="As pid or pid(kp=50, ki=1), or a file with a law.",
+        help="As pid or pid(kp=50,ki=50,kd=8), or a file with a law.",
     ),
 ]
 Laws = Annotated[

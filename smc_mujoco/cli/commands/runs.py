@@ -148,7 +148,6 @@ def view(
 
     Example: smc-mujoco view arm.xml:shoulder+elbow --law adrc
     """
-    print("compiling the laws, which takes up to 20 s the first time", flush=True)
     with delay_ctrl_c():
         from smc_mujoco.draw import studio
 

@@ -94,7 +94,8 @@ def writable(law: Component | Template | str) -> Component:
         raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
     if not law.joint and law.of_channel(0) is not law:
         raise ScenarioError(
-            f"law {law} has gains by channel: give one channel's, such as law.of_channel(0)"
+            f"law {law} has gains by channel: give one number for each gain, or law.of_channel(0) "
+            "in Python"
         )
     return law
 

@@ -21,6 +21,7 @@ from smc_mujoco.common.errors import (
     ScenarioWarning,
     find,
     items_of,
+    one_line,
     shown,
     users_stacklevel,
 )
@@ -165,6 +166,12 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     """
     joints = joints_of(channels)
     names = [model.joint(i).name for i in range(model.njnt)]
+    named = [name for name in names if name]
+    if joints == [""] and named:
+        raise ScenarioError(
+            f"{label} names no joint: give some, as {label}:{'+'.join(named[:2])}; it has "
+            f"{one_line(', '.join(named))}"
+        )
     for joint in joints:
         kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
         if kind == FREE and len(channels) == 1 and dict(channels)[joint] == Channel():
