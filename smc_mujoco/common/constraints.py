@@ -20,15 +20,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 import numpy as np
 
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.errors import (
-    ScenarioError,
-    items_of,
-    number,
-    one_call,
-    shown,
-    unknown,
-    whole,
-)
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, told, unknown, whole
 from smc_mujoco.common.files import as_path
 
 P = ParamSpec("P")
@@ -252,7 +244,10 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
         for name, constraint in constraints.items():
             if name in given.arguments:
                 given.arguments[name] = constraint(name, given.arguments[name])
-        with one_call():
+        token = told.set(told.get(set()))
+        try:
             return function(*given.args, **given.kwargs)
+        finally:
+            told.reset(token)
 
     return checked

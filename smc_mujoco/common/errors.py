@@ -2,7 +2,6 @@
 that raise it.
 """
 
-import contextlib
 import difflib
 import inspect
 import itertools
@@ -11,7 +10,7 @@ import numbers
 import re
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
 from typing import Any, TypeVar
 
@@ -227,24 +226,15 @@ def name(what: str, value: object) -> str:
     return value
 
 
-_told: ContextVar[set[str]] = ContextVar("told")
-
-
-@contextlib.contextmanager
-def one_call() -> Iterator[None]:
-    """Let `warn_once` tell each sentence once, however many scenarios the call makes."""
-    token = _told.set(_told.get(set()))
-    try:
-        yield
-    finally:
-        _told.reset(token)
+# what `warn_once` has told in this call of the user's, however many scenarios it makes
+told: ContextVar[set[str]] = ContextVar("told")
 
 
 def warn_once(sentence: str) -> None:
     """Warn of a doubt, if any, that a call of the user's may raise many times."""
-    told = _told.get(set())
-    if sentence and sentence not in told:
-        told.add(sentence)
+    before = told.get(set())
+    if sentence and sentence not in before:
+        before.add(sentence)
         warnings.warn(sentence, ScenarioWarning, users_stacklevel())
 
 

@@ -483,7 +483,7 @@ def run_of(scenario: Scenario, part: Part) -> Run:
         x0=[s.x0[i] for i in joints],
         v0=[s.v0[i] for i in joints],
         locate=locate,
-        load=lambda step=0: with_values(mechanism(scenario).model, scenario, step),
+        load=lambda step: with_values(mechanism(scenario).model, scenario, step),
         jump_step=s.jump_step,
         draw=draw,
     )

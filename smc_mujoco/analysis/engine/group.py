@@ -211,9 +211,7 @@ class Group:
         parts += [("sensors 0", part) for part in s.sensors]
         parts += [(f"frictions {j}", part) for j, part in enumerate(s.exact_parts)]
         for name, part in parts:
-            size = len(part.names)
-            first = self.places.at[name]
-            table = row[first : first + size * s.plant.n].reshape(-1, size)
+            table = row[self.places.slices[name]].reshape(-1, len(part.names))
             table[[*part.channels(s.plant)]] = part.numbers(run_of(s, part))
         for part in s.friction:
             for name, value in zip(("damping", "levels"), part.added_to_model, strict=True):

@@ -15,9 +15,17 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import urdf
-from smc_mujoco.mechanisms.custom.channels import ONE_JOINT, Pairs
+from smc_mujoco.mechanisms.custom.channels import (
+    FREE,
+    ONE_JOINT,
+    UNIT_OF_JOINT,
+    Pairs,
+    add_motor,
+    goals,
+    joints_of,
+    starts,
+)
 from smc_mujoco.mechanisms.custom.mjcf import Source
 
 OTHERS = ("file", "held", "locked")
@@ -62,8 +70,8 @@ def at_start(
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
     data.qvel[:] = 0.0
-    for joint, x in own.starts(model, own.joints_of(channels), channels, keyframe)[0].items():
-        if model.joint(joint).type[0] != own.FREE:
+    for joint, x in starts(model, joints_of(channels), channels, keyframe)[0].items():
+        if model.joint(joint).type[0] != FREE:
             data.qpos[model.joint(joint).qposadr[0]] = x
     mujoco.mj_forward(model, data)
     return model, data
@@ -72,7 +80,7 @@ def at_start(
 def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
     """Raise ScenarioError if what the channels move starts or should end inside something."""
     model, data = at_start(source, channels, keyframe)
-    joints = own.joints_of(channels)
+    joints = joints_of(channels)
     moved = np.zeros(model.nbody, bool)
     moved[[model.joint(joint).bodyid[0] for joint in joints]] = True
     for i in range(1, model.nbody):
@@ -80,8 +88,8 @@ def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos  # the start, of a free body also the goal
     of_urdf = urdf.read(Path(source.path)) is not None
-    if model.joint(joints[0]).type[0] != own.FREE:
-        for joint, x in zip(joints, own.goals(model, joints, keyframe)[0], strict=True):
+    if model.joint(joints[0]).type[0] != FREE:
+        for joint, x in zip(joints, goals(model, joints, keyframe)[0], strict=True):
             at.qpos[model.joint(joint).qposadr[0]] = x
     for what in ("goal", "start"):
         mujoco.mj_fwdPosition(model, at)
@@ -149,13 +157,13 @@ def _hold(
     mujoco.mj_fullM(model, data, inertia)
     for name in joints:
         joint = model.joint(name)
-        if mujoco.mjtJoint(joint.type[0]) not in own.UNIT_OF_JOINT:
+        if mujoco.mjtJoint(joint.type[0]) not in UNIT_OF_JOINT:
             continue
         dof = joint.dofadr[0]
         kp = inertia[dof, dof] * HELD**2
         kd = 2.0 * inertia[dof, dof] * HELD
         load = data.qfrc_bias[dof] - data.qfrc_passive[dof]
-        made = own.add_motor(spec, f"hold:{name}", name)
+        made = add_motor(spec, f"hold:{name}", name)
         made.biastype = AFFINE
         made.biasprm[:3] = kp * data.qpos[joint.qposadr[0]] + load, -kp, -kd
 
@@ -167,7 +175,7 @@ def _lock(
     at = mujoco.MjData(model)
     at.qpos[:] = data.qpos
     for joint in map(model.joint, joints):  # so that the poses of their bodies stay the file's
-        if joint.type[0] != own.FREE:
+        if joint.type[0] != FREE:
             at.qpos[joint.qposadr[0]] = model.qpos0[joint.qposadr[0]]
     mujoco.mj_kinematics(model, at)
     bodies = list(spec.bodies)  # in the order of the model; their ids are -1 before compilation
@@ -208,9 +216,7 @@ def ties(model: mujoco.MjModel, joints: Collection[str]) -> tuple[Array, Array]:
         first, second = model.eq_obj1id[k], model.eq_obj2id[k]
         between = np.zeros(model.njnt, bool)
         if kind == kinds.mjEQ_JOINT:
-            between[first] = True
-            if second >= 0:
-                between[second] = True
+            between[[*{first, second} - {-1}]] = True
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE.value:
                 first, second = model.site_bodyid[[first, second]]

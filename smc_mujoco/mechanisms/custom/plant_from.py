@@ -38,11 +38,10 @@ from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
-from smc_mujoco.mechanisms.custom import others as rest_of
-from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
+from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.custom.others import OTHERS
+from smc_mujoco.mechanisms.custom.others import OTHERS, check_clear, edit, limp, ties
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue, check_ranges
 
@@ -100,8 +99,8 @@ class UserModel:
         while named := [*spec.tuples, *spec.sensors]:
             # MuJoCo 4 also deletes the tuples that name it, so list them again
             spec.delete(named[0])
-        seen = own.joints_of(self.channels) + list(self.measured)
-        rest_of.edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
+        seen = joints_of(self.channels) + list(self.measured)
+        edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
         return spec
 
     def __call__(self, n: int) -> mujoco.MjSpec:
@@ -111,7 +110,7 @@ class UserModel:
             own.add_pose(spec, self.channels[0][0], self.thrusters)
         else:
             own.add_motors(spec, self.motors)
-            for joint in (*own.joints_of(self.channels), *self.measured):
+            for joint in (*joints_of(self.channels), *self.measured):
                 own.add_joint_sensors(spec, joint)
         # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
         dry = [part for part in (*spec.joints, *spec.tendons) if part.frictionloss > 0.0]
@@ -249,23 +248,23 @@ def plant_from(
     spec = source.read()
     model = source.compiled(spec)
     if _touches(model):
-        rest_of.check_clear(source, pairs, keyframe)
+        check_clear(source, pairs, keyframe)
     read = urdf.read(Path(source.path))
     doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, made)]
-    _, outside = ((), []) if made.pose else own.goals(model, own.joints_of(pairs), keyframe)
+    _, outside = ((), []) if made.pose else own.goals(model, joints_of(pairs), keyframe)
     for joint in outside:
         doubts.append(
             f"{source.label} draws joint {joint!r} outside its range, so that the default goal is "
             "the middle of it: give a keyframe or a reference for another one"
         )
-    seen = [*own.joints_of(pairs), *(measured or ())]
-    if others is None and (names := rest_of.limp(spec, seen)):
+    seen = [*joints_of(pairs), *(measured or ())]
+    if others is None and (names := limp(spec, seen)):
         doubts.append(
             f"joints of {source.label} have motors that nothing commands, "
             f"{joined(map(repr, names))}: give others='held' (+held after the joints in a text), "
             "'locked', or 'file' if they should move freely"
         )
-    if others == "locked" and np.any(rest_of.ties(model, seen)[1]):
+    if others == "locked" and np.any(ties(model, seen)[1]):
         doubts.append(
             f"equality constraints of {source.label} tie its channels to what is locked, and are "
             "left out: give others='held' to keep them"
@@ -369,7 +368,7 @@ def _plant(
     )
     own.check(label, model, pairs)
     seen = own.measured_joints(label, model, pairs, measured)
-    joints = [*own.joints_of(pairs), *seen]
+    joints = [*joints_of(pairs), *seen]
     if keyframe is not None:
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
     if tip is not None:
@@ -386,7 +385,7 @@ def _plant(
         model = source.compiled(build.edited())
     motors = ()
     thrusters = ()
-    if own.is_free(model, joints[0]):
+    if is_free(model, joints[0]):
         if tip or scenarios:
             cure = "leave the tip out" if tip else f"give {', '.join(scenarios)} to the scenario"
             raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
@@ -433,10 +432,10 @@ def _places(
     """Return the units of the channels, and the plant's fields on where they start, end and may
     go.
     """
-    if own.is_free(model, joints[0]):
+    if is_free(model, joints[0]):
         _, units, x0 = own.places(model, joints, {}, keyframe)
         return units, {"x0": x0, "rest": x0}
-    alone = [joint for joint in joints if not own.is_free(model, joint)]
+    alone = [joint for joint in joints if not is_free(model, joint)]
     start, checked = own.starts(model, alone, pairs, keyframe)
     check_ranges(plant, checked, [start[joint] for joint, _, _ in checked])
     names, units, x0 = own.places(model, joints, start, keyframe)
@@ -445,7 +444,7 @@ def _places(
     fields: Fields = {"x0": x0, "ranges": own.ranges(model, names)}
     if any(rest):
         fields |= {"rest": rest, "goal": rest[len(pairs) :]}
-    fields["measured"] = len(names) - len(own.joints_of(pairs))
+    fields["measured"] = len(names) - len(joints_of(pairs))
     for joint in joints:
         if joint not in alone:
             fields["base"] = names.index(joint)
@@ -495,10 +494,10 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
         return f"it has plugins or flexible bodies: {WITHOUT_MODEL}"
     names = [model.joint(joint).name for joint in model.dof_jntid]
     channel_dofs = [dof for dof, name in enumerate(names) if name in joints]
-    if any(own.is_free(model, joint) for joint in joints[1:]):
+    if any(is_free(model, joint) for joint in joints[1:]):
         return f"nothing is known of what its base stands on: {WITHOUT_MODEL}"
     idle = np.ones(model.nactuator, bool)
-    if own.is_free(model, joints[0]):
+    if is_free(model, joints[0]):
         idle[own.thrusters(model, joints[0])] = False
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
@@ -513,7 +512,7 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
         return ""
     named = f"joint {loose[0].name!r}" if loose[0].name else "a joint without a name"
     cure = "make it a channel, or name it in measured if nothing drives it, or "
-    if own.is_free(model, joints[0]) or loose[0].type[0] not in own.UNIT_OF_JOINT:
+    if is_free(model, joints[0]) or loose[0].type[0] not in own.UNIT_OF_JOINT:
         cure = ""
     return f"{named} moves with its channels and is not measured: {cure}{WITHOUT_MODEL}"
 

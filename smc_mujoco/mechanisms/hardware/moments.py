@@ -29,7 +29,7 @@ import dataclasses
 import math
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -212,12 +212,6 @@ class Sight(NamedTuple):
     chance: float
 
 
-class Load(Protocol):
-    """Returns the MjModel with the values from a physics step on, a new copy."""
-
-    def __call__(self, step: int = 0) -> mujoco.MjModel: ...
-
-
 @dataclasses.dataclass(frozen=True)
 class Run:
     """What a part's numbers may depend on. Lists are of the joints that it acts on."""
@@ -229,7 +223,7 @@ class Run:
     x0: Sequence[float]
     v0: Sequence[float]
     locate: Callable[[], Sequence[int]]  # -> degrees of freedom of these joints in the MjModel
-    load: Load
+    load: Callable[[int], mujoco.MjModel]  # physics step -> a copy with the values from then on
     jump_step: int  # the first with what the scenario's jump changes; -1 without a jump
     draw: Callable[[], list[float]]
 
@@ -241,7 +235,7 @@ class Run:
     @property
     def model(self) -> mujoco.MjModel:
         """The MjModel with the scenario's values, a new copy."""
-        return self.load()
+        return self.load(0)
 
     @property
     def phases(self) -> list[float]:
