@@ -374,4 +374,4 @@ def floor_words(scenario: Scenario | None, metric: str) -> str:
     whose = "problem"
     if q > floor(dataclasses.replace(scenario, noise=None, sensor=None), metric):
         whose = "sensor"
-    return f"the {whose}'s {q:.3g} {unit}"
+    return f"the {whose}'s {q:.3g} {unit}".replace("e-0", "e-")

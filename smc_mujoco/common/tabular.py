@@ -58,6 +58,7 @@ class Cell(NamedTuple):
     strong: bool = False  # marked: bold, and with a star where letters have no weight
     colour: str = ""  # in a terminal, as rich names it
     alarm: str = ""  # a last line, such as how many runs failed
+    label: str = ""  # what LaTeX prints instead of the text
 
 
 @named_data
@@ -190,7 +191,10 @@ class Tabular:
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the title and the
         notes; the lines `under` the table are in print.
+
+        Words in cells of numbers become letters, which a line under the table explains.
         """
+        marks: dict[str, str] = {}
         lines = [
             f"% {text}" for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT) if text
         ]
@@ -199,9 +203,12 @@ class Tabular:
             "\\toprule",
         ]
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
-        lines += [_tex_line(map(_tex_cell, row)) for row in self.rows]
+        for row in self.rows:
+            names = map(_tex_cell, row[: self.left])
+            lines.append(_tex_line([*names, *(_tex_cell(c, marks) for c in row[self.left :])]))
         lines.append("\\bottomrule")
-        for text in self.under:
+        meanings = "; ".join(f"{mark}: {words}" for words, mark in marks.items())
+        for text in (*textwrap.wrap(meanings, PLAIN_WIDTH), *self.under):
             wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
             lines.append(_tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"]))
         return "\n".join([*lines, "\\end{tabular}\n"])
@@ -320,18 +327,26 @@ def _tex_line(cells: Iterable[str]) -> str:
     return f"{' & '.join(cells)} \\\\"
 
 
-def _tex_cell(cell: Cell | str) -> str:
-    """Return a cell as LaTeX, with the line below in brackets beside it."""
+def _tex_cell(cell: Cell | str, marks: dict[str, str] | None = None) -> str:
+    """Return a cell as LaTeX, with the lines below in brackets beside it; with `marks`, those of
+    several words as letters, which it adds to them.
+    """
     cell = _cell(cell)
-    power = re.compile(r"([\d.]+)e(-?\d+)")
-    text = tex(power.sub(r"\1·10^\2", cell.text))
+    text = tex(cell.label or cell.text)
     if cell.strong:
         text = f"\\textbf{{{text}}}"
-    if cell.below:
-        below = power.sub(r"\1·10^\2", ", ".join(cell.below.splitlines()))
-        text += f" [{tex(below)}]"
-    if cell.alarm:
-        text += f", {tex(', '.join(cell.alarm.splitlines()))}"
+    below = []
+    letters = []
+    for line in (*cell.below.splitlines(), *cell.alarm.splitlines()):
+        if marks is None or " " not in line:
+            below.append(line)
+        else:
+            again, letter = divmod(len(marks), 26)
+            letters.append(marks.setdefault(line, chr(ord("a") + letter) * (1 + again)))
+    if below:
+        text += f" [{tex(', '.join(below))}]"
+    if letters:
+        text += f"$^{{{','.join(letters)}}}$"
     return text
 
 
@@ -345,4 +360,5 @@ def tex(text: str) -> str:
             return TEX.get(match[2], match[2])
         return f"$^{{{match[1]}}}$"
 
+    text = re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", text)
     return re.sub(r"\^(-?\d+)|(.)", written, text)

@@ -26,10 +26,13 @@ MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
+FEW = (
+    f"With fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, which covers "
+    "less."
+)
 MEDIANS = (
     f"Medians with {100 * LEVEL:g} % intervals over runs or, where runs share gains, over sets of "
-    f"gains. With fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, which "
-    "covers less."
+    f"gains. {FEW}"
 )
 MARKS = (
     "A mark: no law is better, every run has arrived, and there are enough samples to see a lead. "
@@ -421,19 +424,22 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
             cells.setdefault(entry.law, [""] * len(boards))[i] = _cell(board, entry)
     rows = []
     for law in sorted(places, key=lambda law: (places[law], law)):
-        row_name = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
-        rows.append([row_name, *cells[law]])
+        name_cell = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
+        rows.append([name_cell._replace(label=style.law_name(law)), *cells[law]])
     largest = max(boards, key=lambda board: len(board.blocks))
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
     samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
     words = str([*map(tuple, itertools.chain(*cells.values()))])
+    under = [text for word, text in UNDER.items() if word in words]
+    if any(entry.interval.n < MIN_INTERVAL_SAMPLES for board in boards for entry in board.entries):
+        under.insert(1, FEW)
     return Tabular(
         headings=["law", *map(heading, boards)],
         rows=rows,
         title=f"{name}: {samples}",
         notes=_verdicts(boards),
-        under=[text for word, text in UNDER.items() if word in words],
+        under=under,
     )
 
 

@@ -14,7 +14,7 @@ from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
-from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
@@ -115,6 +115,7 @@ class Compared(Tables):
         tables = self._without_times
         times = []
         gains = []
+        notes = self.remarks
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
                 # inf: no bound, or a number of the plant
@@ -122,13 +123,14 @@ class Compared(Tables):
                 for k, v in law.gains.items():
                     if v != math.inf:
                         best.append(f"{k}={gain_text(v)}")
+                if len(sets) > 1 and BEST_SET not in notes:
+                    notes = [BEST_SET, *notes]
                 gains.append((plant, law.name, law.source.words, f"{len(sets)}", ", ".join(best)))
             for name, time in self.times.get(plant, {}).items():
                 of_law = (number(value) for value in (time.ratio, time.median, time.high))
                 times.append((plant, name, *of_law))
         if times:
             tables.append(Tabular(headings=TIME_HEADINGS, rows=times, title=TIMES, left=2))
-        notes = [BEST_SET, *self.remarks]
         return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=5)]
 
     @property
@@ -201,11 +203,20 @@ class Compared(Tables):
 
         Args:
           path, options: path, title, size, format and fig of `smc.figure`.
-          metrics: names of metrics. Default: settling time, ultimate bound and variation of u.
+          metrics: names of metrics. Default: those compared, the first five, or three on a page
+            narrower than 6 in; a ScenarioWarning names the others.
         """
-        from smc_mujoco.draw import dot_plot
+        from smc_mujoco.draw import dot_plot, page
 
-        names = metrics or dot_plot.METRICS
+        names = list(metrics)
+        if not names:
+            width, _ = page.measure(options.get("size"), options.get("fig"))
+            most = 3 if width < page.NARROW else 5
+            compared = {board.metric: None for board in self.leaderboard}
+            compared.pop(paired_runs.OBJECTIVE, None)
+            names = [*compared][:most]
+            if others := [*compared][most:]:
+                warn_once(f"plot leaves out {joined(others)}: draw the rest with metrics={others}")
         return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
 
 

@@ -106,9 +106,10 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     (row,) = frame.query("plant == 'duffing' and condition == 'encoder'").itertuples()
     (entry,) = [entry for entry in boards[3].entries if entry.law == "pid"]
     assert (row.median, row.low, row.high, row.gains) == (*entry.interval[:3], "yours")
+    assert "PID [yours] &" in found.to_latex()
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
     assert found._repr_html_().count("<table") == 8  # times, and gains
-    assert len(found.plot().axes) == 6
+    assert len(found.plot().axes) == 10  # of all five metrics, on both plants
     assert found.traces[0].scenario == found.table.scenario(0)
     assert len(found.traces) == 12
 
