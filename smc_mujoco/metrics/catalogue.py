@@ -312,8 +312,7 @@ def hf_share(trace: Trace) -> float:
 
 @metric(UNIT_OF_S, command=True, absent=0.0)
 def chattering_amplitude(trace: Trace) -> float:
-    """Amplitude of the limit cycle of s in the last part, in the unit of s, worst channel; NaN
-    without one.
+    """Amplitude of the limit cycle of s in the last part, worst channel; NaN without one.
 
     Half the range of s within a period, without slow waves. `limit_cycle` says what counts as a
     limit cycle. Laws without one are compared with the value 0.
@@ -323,8 +322,7 @@ def chattering_amplitude(trace: Trace) -> float:
 
 @metric("Hz", command=True)
 def chattering_frequency(trace: Trace) -> float:
-    """Frequency of the limit cycle of s in the last part, of the channel with the largest; NaN
-    without one.
+    """Frequency of the limit cycle of s in the last part, channel of the largest; NaN without one.
 
     A limit cycle has at least five periods in the last part.
     """
@@ -348,19 +346,16 @@ def stick_time(trace: Trace) -> float:
 
 @metric("{force}", realistic=True)
 def peak_reaction(trace: Trace) -> float:
-    """Largest force of friction, contacts, stops and backlash on a joint, worst channel, at the
-    samples.
-    """
+    """Largest force of friction, contacts, stops and backlash on a joint at a sample."""
     return np.abs(trace.reaction).max()
 
 
 @metric("1/s", realistic=True)
 def reversal_rate(trace: Trace) -> float:
-    """How often e turns back in the last part, per second, worst channel: twice the frequency of a
-    limit cycle.
+    """How often e turns back a second in the last part, worst channel.
 
-    Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle
-    longer than the last part is not seen.
+    It is twice the frequency of a limit cycle. Only swings of at least half the ripple count; 0 for
+    a ripple up to 1e-6 of the scale. A cycle longer than the last part is not seen.
     """
     part = last_part(trace)
     threshold = 1e-6 * scale(trace)

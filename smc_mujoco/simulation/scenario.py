@@ -333,14 +333,20 @@ class Scenario:
             "law": self.law,
             "gains": self.law.source,
         }
-        # values of fields that were left out
-        absent = (None, (), {}, Noise(), Clock())
+        for name, value in {"duration": self.duration, **self.given}.items():
+            rows[name.replace("_", " ")] = shown(value)
+        return html.fields(rows, "Scenario")
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The fields that differ from their defaults, without plant and law."""
+        absent = (None, (), {}, Noise(), Clock())  # of fields that were left out
+        found = {}
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
-            given = f.name not in rows and value != f.default and value not in absent
-            if f.name == "duration" or given:
-                rows[f.name.replace("_", " ")] = shown(value)
-        return html.fields(rows, "Scenario")
+            if f.name not in ("plant", "law") and value != f.default and value not in absent:
+                found[f.name] = value
+        return found
 
     @classmethod
     def fields(cls) -> tuple[str, ...]:

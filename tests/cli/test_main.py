@@ -102,9 +102,9 @@ def undrawn(monkeypatch):
 
 @pytest.fixture
 def trace(folder) -> Path:
-    return smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2)).save(
-        folder / "one.npz"
-    )
+    fault = smc.Fault(at=0.1, gain=0.5)
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.2, fault=fault)
+    return smc.run(scenario).save(folder / "one.npz")
 
 
 def refused(answer: tuple[int, str, str], *words: object) -> None:
@@ -252,14 +252,11 @@ def test_show_prints_every_metric_with_its_value(call, trace):
     everything = score(smc.load(trace))
     realistic = {m.name for m in metrics() if m.realistic}
     assert set(everything) == {m.name for m in metrics() if not m.network}
-    values = {}
-    for name, value in everything.items():
-        if name not in realistic:
-            values[name] = value
     assert set(rows) & realistic == set()
-    assert {name: rows[name] for name in values} == {
-        name: tables.number(value) for name, value in values.items()
-    }
+    for name in everything.keys() - realistic:
+        assert rows[name] == tables.number(everything[name])
+    assert ", fault=Fault(at=0.1, gain=0.5)" in " ".join(out.split())
+    assert all(m.summary.endswith(".") for m in metrics())
 
 
 def test_show_exports_the_columns_and_draws_the_figure_that_it_names(call, trace, folder):

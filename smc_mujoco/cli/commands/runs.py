@@ -87,6 +87,7 @@ def show(
         from smc_mujoco.analysis.step_halving import UNTRIED, repeats_all
         from smc_mujoco.cli import tables
         from smc_mujoco.common.text import capital
+        from smc_mujoco.simulation.conditions import Condition
         from smc_mujoco.simulation.trace import formats, load
 
     endings = () if export is None else formats(export)
@@ -103,7 +104,13 @@ def show(
     plant = (s.plant.name, "bold")
     law = (str(s.law), "bold")
     times = f", {s.duration:g} s at {s.control_period:g} s"
-    terminal.print(Text.assemble(plant, " under ", law, times, f", gains: {s.law.source}"))
+    gains = f", gains: {s.law.source}"
+    fields = {}
+    for name, value in s.given.items():
+        if name not in ("duration", "control_period"):
+            fields[name] = value
+    others = Condition("others", fields).brief(s.plant, s.duration).replace(",)", ")")
+    terminal.print(Text.assemble(plant, " under ", law, times, gains, others and f", {others}"))
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
     else:
