@@ -35,6 +35,7 @@ from smc_mujoco.common.constraints import Boolean, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
+from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
@@ -325,6 +326,15 @@ class Margin:
     def open(self) -> bool:
         """Whether every level that was tried is tolerated."""
         return self.value == self.searched
+
+    @property
+    def text(self) -> str:
+        """The value, as "0.02", "≥ 0.5", or "fails at 0" where not even the unchanged run is
+        tolerated.
+        """
+        if math.isnan(self.value):
+            return f"fails at {MARGIN_KINDS[self.kind].none:g}"
+        return f"{'≥ ' if self.open else ''}{number(self.value)}"
 
 
 @constrained

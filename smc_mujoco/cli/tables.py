@@ -352,16 +352,13 @@ def margins(kind: str, results: Sequence[Margin]) -> Table:
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
     for margin in results:
-        value = number(margin.value)
-        if margin.open:
-            value = f">= {value}"
         theory = ""
         if margin.theory is not None:
             theory = "any" if margin.theory == math.inf else number(margin.theory)
         plant = "" if margin.plant == last else margin.plant
         law = Text(margin.law, style=style.law_colour(margin.law))
         within = number(margin.resolution) if margin.resolution else ""
-        table.add_row(plant, law, value, within, theory, margin.unit)
+        table.add_row(plant, law, margin.text, within, theory, margin.unit)
         last = margin.plant
     return table
 

@@ -265,8 +265,8 @@ class Board(Tables):
             return f"none is named over {joined(self.barred)} with default gains"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
-        unranked = dict.fromkeys(block.unranked for block in self.blocks if block.unranked)
-        if reason := "; ".join(unranked) or self.too_few:
+        reasons = dict.fromkeys(block.unranked or self.too_few for block in self.blocks)
+        if reason := "; ".join(filter(None, reasons)):
             return reason
         if not self.best:
             return "none is unbeaten in every condition"

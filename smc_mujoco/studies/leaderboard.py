@@ -170,6 +170,8 @@ def _board(
     blocks = []
     for at, k in enumerate(scores.blocks):
         floor = paired_runs.floor_words(ran[k], metric)
+        if floor and len(scores.blocks) > 1:
+            floor += f" under {group.blocks[k][1]}"
         blocks.append(_block(group.blocks[k], group.seeds[k], comparison, at, untuned, floor))
     repeated = not np.isnan(comparison.halves).all()
     return Board(

@@ -111,7 +111,6 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
             "--no-tune",
         ),
         ("margins", "duffing", "--law", "st.json", "--kinds", "delay", "--quick"),
-        ("basin", "duffing", "--law", "st.json", "--points", "2", "--duration", "0.1"),
         ("tune", "duffing", "st.json", "--budget", "1"),
     ):
         with pytest.raises(SystemExit) as end:

@@ -146,8 +146,10 @@ def margins(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
+        from smc_mujoco.control.source import in_words
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.simulation.conditions import PLANTS
+        from smc_mujoco.simulation.grid import case
 
     terminal = Terminal(json)
     machines = [
@@ -172,8 +174,13 @@ def margins(
         )
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
-    words = f"{counted(len(results), 'margin')}, set of gains {gains}, {terminal.seconds:.0f} s"
-    terminal.note(words, "dim", wrap=True)
+    sources = {}
+    for machine in machines:
+        for item in chosen:
+            used = case(machine, item, gains=gains).law
+            sources.setdefault(used.name, []).append(used.source)
+    words = [counted(len(results), "margin"), in_words(sources), f"{terminal.seconds:.0f} s"]
+    terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
     terminal.finish([dataclasses.asdict(margin) for margin in results])
 
 

@@ -253,13 +253,12 @@ def margin_table(plant: str, found: Sequence[Margin]) -> Tabular:
         heads.append(label if unit == "1" else f"{label} ({unit})")
     rows: dict[str, list[Cell | str]] = {}
     for margin in found:
-        value = f"{'≥ ' if margin.open else ''}{number(margin.value)}"
         theory = margin.theory
         if theory is None:
             below = ""
         else:
             below = f"theory {number(theory)}"
-        rows.setdefault(margin.law, [margin.law]).append(Cell(value, below))
+        rows.setdefault(margin.law, [margin.law]).append(Cell(margin.text, below))
     return Tabular(headings=["law", *heads], rows=list(rows.values()), title=plant)
 
 
