@@ -338,7 +338,7 @@ def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> boo
     """
     if path.parent.name in CATALOGUES or ast.unparse(node.body[0]) == "...":
         return True
-    of_part = "edit edit_on fields structure placed meets numbers start channels suits exact"
+    of_part = "edit edit_on fields structure placed meets numbers start channels suits exact friction_rows"
     return node.name in ("value", "bounds", "parameters", "stage_force", *of_part.split())
 
 
