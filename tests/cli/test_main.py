@@ -122,7 +122,7 @@ def refused(answer: tuple[int, str, str], *words: object) -> None:
 # list
 
 
-def test_list_names_everything_there_is(call):
+def test_list_names_everything_there_is_or_all_of_a_kind(call):
     code, out, err = call("list")
     assert code == 0
     assert err == ""
@@ -133,6 +133,7 @@ def test_list_names_everything_there_is(call):
     names = [*smc.plants(), *smc.laws(), *scenes, *smc.paper.CONDITIONS]
     names += [*smc.laws(kind="surface"), *smc.laws(kind="estimator")]
     assert [name for name in names if not re.search(rf"(?<![\w]){name}(?![\w])", out)] == []
+    assert "hard_stops" in call("list", "scenes")[1]
     assert "…" not in out
     assert max(map(len, out.splitlines())) <= 80
 

@@ -12,6 +12,7 @@ from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import annexes
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
+KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", "conditions")
 C_TIME = 10.0  # s, that compiler and trial of a law in C may take, each; chosen
 
 
@@ -22,8 +23,8 @@ def list_(
         typer.Argument(
             metavar="NAME|FILE",
             autocompletion=options.LAWS,
-            help="A law, surface, velocity estimator or plant, or a file with a law; by "
-            "default all, and scenes.",
+            help="A law, surface, velocity estimator or plant, a file with a law, or plants, laws, "
+            "surfaces, estimators, scenes or conditions; by default all of these.",
         ),
     ] = None,
     needs: Annotated[
@@ -65,7 +66,7 @@ def list_(
             loader = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {name},")
         lines = loader.check(Path(name), None, None, "smc_law", (), C_TIME)
         terminal.print(*lines, sep="\n", soft_wrap=True)
-    elif name is not None:
+    elif name is not None and name not in KINDS:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages
         law_pages.print_pages(name, terminal)
@@ -74,12 +75,14 @@ def list_(
             from smc_mujoco.cli import law_pages
         law_pages.print_suitable(options.names(needs), plant, terminal)
     else:
-        _print_all(terminal)
+        _print_all(terminal, name or "")
     terminal.finish()
 
 
-def _print_all(terminal: Terminal) -> None:
-    """Print a line about each plant, law, surface, estimator, scene and condition."""
+def _print_all(terminal: Terminal, kind: str) -> None:
+    """Print a line about each plant, law, surface, estimator, scene and condition, or about each of
+    a kind.
+    """
     with delay_ctrl_c():
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -99,7 +102,8 @@ def _print_all(terminal: Terminal) -> None:
         for name, condition in NAMED.items()
     ]
     for title, rows in lists.items():
-        terminal.print(tables.catalogue(title, rows), "")
+        if kind in title.lower():
+            terminal.print(tables.catalogue(title, rows), "")
     page = ("smc-mujoco list NAME", "cyan")
     some = ("--needs one-gain,continuous", "cyan")
     terminal.print(

@@ -4,9 +4,9 @@ the others friction and contact alone.
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows
 how far a control swings that switches faster than the film. With a drive, arrow and bar show its
 force, and a pale arrow the command. Arrows lie along a pendulum's arc, beyond the bob; or along the
-rail, above the cart, in the picture if it carries something. At a hinge of a user's model, whose
-links may have any shape, they bend around its axis. A free body has one arrow, of the disturbance's
-force. All are drawn over the picture, so that no link hides them.
+rail, above the cart in the picture. At a hinge of a user's model, whose links may have any shape,
+they bend around its axis. A free body has one arrow, of the disturbance's force. All are drawn over
+the picture, so that no link hides them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -106,9 +106,8 @@ def mounts(
         slide = Mount(0, USER_LENGTH * extent, USER_THICKNESS * extent, front)
         hinge = slide._replace(unit=1.0, radius=USER_RADIUS * extent)
     else:
-        before = front if plant.free else None
         thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
-        slide = Mount(0, SLIDE_LENGTH * rail, thick, before, plant.network)
+        slide = Mount(0, SLIDE_LENGTH * rail, thick, front, plant.network)
         turning = NETWORK_FACTOR if plant.n > 1 else 1.0
         usual = catalogue().get(plant.name)
         if plant.n == 1 and "l" in plant.parameters and usual:  # as large on any rod
@@ -162,6 +161,8 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
             lasting.append(push)
             continue
         reaction = max(map(abs, panels.span(parts, "reaction")))
+        if not group.driven and traces[0].scenario.plant.base >= 0:
+            reaction = 0.0  # the floor's, which bears the machine
         brief.append(reaction)
         if not group.driven:
             found[group] = Scale(0.0, 0.0, reaction)

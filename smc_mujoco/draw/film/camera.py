@@ -131,11 +131,13 @@ def tiles(
         tall = int((size[1] - top) / rows) - TILE_GAP
         edge = TILE_EDGE * tall
         head = HEAD_ROOM * size[0]
-        foot = max(tall - edge - strip(wide), MIN_HEIGHT * tall)
+        least = head + MIN_HEIGHT * tall
+        foot = tall - edge - strip(wide)
+        fits = foot >= least
+        foot = max(foot, least)
         place = fit(points, turn, (wide, tall), Room(edge, head, wide - edge, foot))
         distance = float((place - points.mean(axis=0)) @ turn[:, 2])
         scale = 1.0 / (pixel((wide, tall)) * distance)
-        fits = strip(wide) < tall
         layouts.append(((fits, scale), columns, View((wide, tall), turn, place)))
     _, columns, view = max(layouts, key=lambda one: one[0])
     wide, tall = view.size

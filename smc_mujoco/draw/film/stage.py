@@ -157,12 +157,17 @@ class Stage:
         return None if motion is None else motion.at(time)
 
     def aim(self, r: Array | None, time: float = 0.0) -> None:
-        """Show where the reference r, (shown,) rad or m, wants the machine, as a ghost; None: show
-        no ghost.
+        """Show where the reference r, (shown,) rad or m, wants the machine, as a ghost; none where
+        r is None, or where a camera that follows the machine does not see all of the ghost.
         """
         self.aimed = r is not None
         if r is not None:
             self.goal.qpos[:] = self.puppet.qpos(r, rest=self.rest(time))
+        if self.aimed and self.followed is not None:
+            scene.forward(self.model, self.goal)
+            corners = scene.boxes(self.model, self.goal)[self.links]
+            seen = self.project(corners.reshape(-1, 3))
+            self.aimed = bool(((seen >= 0.0) & (seen <= self.size)).all())
 
     def arrange(self, x: Array, ahead: Array | float = 0.0, time: float = 0.0) -> None:
         """Put the channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their

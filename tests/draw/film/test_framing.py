@@ -12,7 +12,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import arrows, film, scene, track
+from smc_mujoco.draw.film import arrows, camera, film, scene, track
 from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.simulation import model as models
 
@@ -79,9 +79,8 @@ def test_a_stranger_that_goes_far_is_followed_and_fills_half_of_its_tile(base, c
     if base == "free":
         poses = []
         monkeypatch.setattr(track, "motion", lambda trace, times: poses[0])
-        start = models.initial_state(models.compile_model(traces[0].scenario), traces[0].scenario)[
-            0
-        ]
+        scenario = traces[0].scenario
+        start = models.initial_state(models.compile_model(scenario), scenario)[0]
         times = np.linspace(0.0, 2.0, 60)
         moved = np.tile(start, (60, 1))
         moved[:, 0] += 5.0 * times
@@ -132,24 +131,21 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
     traces = []
     for law in ("super_twisting", "pid"):
-        traces.append(
-            smc.run(
-                smc.Scenario(
-                    plant=plant,
-                    law=law,
-                    duration=0.3,
-                    x0=0.1,
-                )
-            )
-        )
+        traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3, x0=0.1)))
     with filmed(traces, monkeypatch) as (stages, _):
         for shown, mount in itertools.product(stages, stages[0].mounts):
             for part in (-1.0, 1.0):
-                line, _ = arrows.path(
-                    shown.model, shown.data, mount, arrows.Arrow(0.0, part, (0.0,) * 4)
-                ) or (None, 0)
-                assert line is not None
+                whole = arrows.Arrow(0.0, part, (0.0,) * 4)
+                line, _ = arrows.path(shown.model, shown.data, mount, whole)
                 anchor = shown.project(shown.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(shown.project(line) - anchor, axis=1)
                 assert radius.max() <= 0.1 * shown.size[1] + 1.0
                 assert shown.project(line).min() > 0.0
+
+
+def test_five_machines_keep_room_above_their_words():
+    turn = camera.turn(90.0, -12.0)
+    cube = scene.CORNERS
+    view = camera.tiles(5, (800, 288), 54.0, lambda wide: 33.0, cube, turn)[1]
+    seen = camera.project(cube, turn, view.place, view.size)
+    assert ((seen >= 0.0) & (seen <= view.size)).all()
