@@ -104,7 +104,7 @@ def _nearest(name: str, names: list[str]) -> list[str]:
         if abbreviated:
             return abbreviated
     close = difflib.get_close_matches(wanted, list(plain), n=1)
-    if not close and wanted:
+    if not close and len(wanted) > 1:
         close = [known for known in plain if wanted in known]
     return [plain[close[0]]] if close else []
 

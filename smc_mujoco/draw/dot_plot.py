@@ -94,8 +94,11 @@ def plot(
     for plant in plants:
         conditions_of[plant] = [name for name in conditions if (plant, name) in ran]
     units = {}
+    labels = {}
     for group in groups(table, GROUPS[:1]):
-        units[group.name["plant"]] = unit_of_x(group.name["plant"], scenarios(table, group))
+        plant = group.name["plant"]
+        units[plant] = unit_of_x(plant, runs := scenarios(table, group))
+        labels[plant] = next((one.plant for one in runs if one), plant)
     with style.page(width):
         least = min(interval.n for interval in intervals.values())
         key, shared = _key(table, looks, least)
@@ -116,12 +119,12 @@ def plot(
                 _panel(ax, of_panel, conditions_of[plant], looks, name, rings)
                 ax.set_xlabel(_label(name, units[plant]))
                 ax.tick_params(labelleft=ax is of_plant[0])
-            words = style.plant_name(plant) if title or len(plants) > 1 else ""
+            words = style.plant_name(labels[plant]) if title or len(plants) > 1 else ""
             place = None
             if style.width(f"{words}  not arrived", text, bold=True) >= room:
                 place = 1.0 + 1.7 * text / 72 / style.points(high)  # above the note
             of_plant[0].set_title(words, y=place, parse_math=False)
-        heading = style.heading(plants, conditions, short=len(plants) > 1)
+        heading = style.heading([*labels.values()], conditions, short=len(plants) > 1)
         pages.set_head(page, width, title or f"Medians: {heading}", key, shared)
         return pages.write(page, paths)
 

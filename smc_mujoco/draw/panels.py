@@ -235,9 +235,7 @@ def mean_error(panel: Panel) -> float:
 
 
 def by_channel(panel: Panel) -> list[Panel]:
-    """Return a panel for each channel of a panel's group whose error counts, first that of the
-    largest.
-    """
+    """Return a panel for each channel of a panel's group whose error counts."""
     if panel.quantity in SINGLE:
         return [panel]
     panels = []
@@ -247,7 +245,7 @@ def by_channel(panel: Panel) -> list[Panel]:
         traces = [group_trace(trace, within) for trace in panel.traces]
         group = dataclasses.replace(panel.group, channels=(channel,))
         panels.append(Panel(panel.quantity, group, traces, channel))
-    return sorted(panels, key=mean_error, reverse=True)
+    return panels
 
 
 def actuators(traces: Sequence[Trace]) -> list[Panel]:

@@ -369,7 +369,10 @@ def _settings(trace: Trace) -> Mapping[str, str]:
     for name in Scenario.fields():
         if name not in ("law", "plant", "mismatch"):
             values[name] = getattr(scenario, name)
-    return {name: _setting(name, value) for name, value in values.items()}
+    words = {name: _setting(name, value) for name, value in values.items()}
+    if scenario.plant.is_user_model:  # whose file may have some
+        words["friction"] = _setting("added friction", scenario.friction)
+    return words
 
 
 def _parameters(trace: Trace) -> dict[str, str]:

@@ -34,6 +34,7 @@ MAX_TIP_ERROR = 0.015  # m: only a tip farther off has a ghost; a nearer one wou
 FORCE_ARROW = 0.6  # m, length of the arrow for the largest force or blow
 SHAFT_WIDTH = 4.0
 BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
+RIM = 4  # of the picture, which arrows leave free
 BLOW_TIME = 0.12  # s for which a blow is shown after its end
 
 
@@ -50,9 +51,9 @@ def key(traces: Sequence[Trace]) -> list[str]:
         joints = traces[0].scenario.plant.n
         words.append(f"bars: torque of joints 1 to {joints}, share of their limits")
     if any(tip.knows_contacts(trace.scenario) for trace in traces):
-        words.append("violet arrow: force on what the tip touches")
+        words.append("violet arrow: mean force of a frame on what the tip touches")
     if style.pushes(traces):
-        words.append("violet arrow: the blow")
+        words.append(f"dark arrow: the blow, shown {BLOW_TIME:g} s longer")
     if any(tip.tip_error(trace).max() > MAX_TIP_ERROR for trace in traces):
         words.append("translucent: reference")
     return words
@@ -111,14 +112,14 @@ class Overlay:
             size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
                 at = self.stage.find(self.trace.scenario.plant.tip)
-                self.arrow(image, at, at - self.newton * self.forces[frame], size, after=True)
+                self.arrow(image, at, at - self.newton * self.forces[frame], size, style.REACTION)
         for blow in style.pushes([self.trace]):
             end = blow.time + blow.width + BLOW_TIME
             if self.edges[frame] <= end and time >= blow.time:
                 peak = np.array([blow.x, blow.y, blow.z])
                 size = float(np.linalg.norm(peak))
                 place = self.stage.find(blow.body) - BLOW_DISTANCE * peak / size
-                self.arrow(image, place - self.newton * peak, place, size, after=False)
+                self.arrow(image, place - self.newton * peak, place, size, style.DISTURBANCE)
         return np.asarray(image)
 
     def trail(
@@ -141,15 +142,21 @@ class Overlay:
         ImageDraw.Draw(mask).line(places, round(255 * opacity), thick, joint="curve")
         image.paste(style.rgb(colour), (0, 0), mask.reduce(fine))
 
-    def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, after: bool) -> None:
+    def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, colour: str) -> None:
         """Draw an arrow with smooth edges between two points, (3,) m, and its force, N, beyond it
-        or before it, within the picture.
+        or, for a blow, before it, within the picture, at whose edge a longer one ends.
         """
         s = self.scale
+        after = colour == style.REACTION
         start, end = self.stage.project(np.array([tail, tip]))
+        near, far = (start, end) if after else (end, start)
+        way = far - near
+        edge = np.where(way > 0.0, np.array(image.size) - RIM * s, RIM * s)
+        shares = np.divide(edge - near, way, out=np.ones(2), where=way != 0.0)
+        far += way * (shares.clip(0.0, 1.0).min() - 1.0)
         if np.linalg.norm(end - start) > 1.0:
             outline = arrows.outline(np.linspace(start, end, 40), SHAFT_WIDTH * s)
-            arrows.paint(image, outline, arrows.rgba(style.REACTION))
+            arrows.paint(image, outline, arrows.rgba(colour))
         words = f"{force:.0f} N"
         wide = style.width(words, LETTERS * s, bold=True)
         x, y = (end if after else start).tolist()
@@ -158,7 +165,7 @@ class Overlay:
         y = min(max(y, LETTERS * s), image.height - LETTERS * s)
         letters = style.font(LETTERS * s, bold=True)
         rim = {"stroke_width": round(2 * s), "stroke_fill": style.PAPER}
-        ImageDraw.Draw(image).text((x, y), words, style.REACTION, letters, anchor="lm", **rim)
+        ImageDraw.Draw(image).text((x, y), words, colour, letters, anchor="lm", **rim)
 
     def beside(self, picture: Array, frame: int) -> Array:
         """Return the whole picture with the arm's bars, and how far its tip is off its path, below
