@@ -87,7 +87,9 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))
     hint = "there are none with a name"
     if names:
-        hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}"
+        hint = (
+            f"choose from {re.sub('[^ ]+[.]{3}$', '...', one_line(', '.join(names), MAX_LISTED))}"
+        )
     if isinstance(name, str) and (near := _nearest(name, names)):
         hint = f"did you mean {' or '.join(map(repr, near))}?"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")

@@ -136,8 +136,6 @@ def test_a_printed_median_lies_in_its_printed_interval(values):
 
 DIGITS = [  # value, metric, text
     (0.12345, "itae", "0.123"),
-    (12345.0, "itae", "12345"),
-    (4e-7, "itae", "4.0e-7"),
     (math.inf, "itae", "fails"),
     (math.inf, "settling_time", "never"),
     (0.525, "settles", "52"),
@@ -249,7 +247,6 @@ def test_latex_has_no_letter_that_an_engine_may_not_know():
         assert text.isascii()
         assert text.startswith(("\\", "$")) or character == "–"
         assert character == "$" or text.count("$") % 2 == 0
-    assert TEX["μ"] == r"$\mu$"
 
 
 @pytest.fixture(scope="module")

@@ -221,10 +221,6 @@ def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path
     assert blocks == ([4] if most == 3 else [1] * 4)
 
 
-def test_up_to_twelve_blocks_have_a_table_each():
-    assert compare.MAX_BLOCKS == 12
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):

@@ -12,7 +12,7 @@ from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import annexes
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", "conditions")
+KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", "conditions", "metrics")
 C_TIME = 10.0  # s, that compiler and trial of a law in C may take, each; chosen
 
 
@@ -23,8 +23,8 @@ def list_(
         typer.Argument(
             metavar="NAME|FILE",
             autocompletion=options.LAWS,
-            help="A law, surface, velocity estimator or plant, a file with a law, or plants, laws, "
-            "surfaces, estimators, scenes or conditions; by default all of these.",
+            help="A law, surface, velocity estimator, plant, scene, condition or metric, a file "
+            "with a law, or a kind, such as scenes; by default all of these.",
         ),
     ] = None,
     needs: Annotated[
@@ -69,7 +69,14 @@ def list_(
     elif name is not None and name not in KINDS:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages
-        law_pages.print_pages(name, terminal)
+            from smc_mujoco.mechanisms.plant import catalogue as plants
+            from smc_mujoco.metrics.catalogue import CATALOGUE
+            from smc_mujoco.simulation.conditions import NAMED
+            from smc_mujoco.studies.scene import scenes
+        if name in {*NAMED, *CATALOGUE, *scenes()} - {*plants()}:
+            _print_all(terminal, name)
+        else:
+            law_pages.print_pages(name, terminal)
     elif needs is not None or plant is not None:
         with delay_ctrl_c():
             from smc_mujoco.cli import law_pages
@@ -80,12 +87,13 @@ def list_(
 
 
 def _print_all(terminal: Terminal, kind: str) -> None:
-    """Print a line about each plant, law, surface, estimator, scene and condition, or about each of
-    a kind.
+    """Print a line about each plant, law, surface, estimator, scene and condition, about each of a
+    kind, or about what has this name, which may be a metric's.
     """
     with delay_ctrl_c():
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.mechanisms.plant import catalogue as plants
+        from smc_mujoco.metrics.catalogue import metrics
         from smc_mujoco.simulation.conditions import DURATION, NAMED
         from smc_mujoco.studies import scene
 
@@ -101,9 +109,10 @@ def _print_all(terminal: Terminal, kind: str) -> None:
         (name, condition.brief(machine, DURATION) or "the scenario's defaults")
         for name, condition in NAMED.items()
     ]
+    lists["Metrics"] = [(metric.name, metric.summary) for metric in metrics()]
     for title, rows in lists.items():
-        if kind in title.lower():
-            terminal.print(tables.catalogue(title, rows), "")
+        if found := rows if kind in title.lower() else [row for row in rows if row[0] == kind]:
+            terminal.print(tables.catalogue(title, found), "")
     page = ("smc-mujoco list NAME", "cyan")
     some = ("--needs one-gain,continuous", "cyan")
     terminal.print(
