@@ -139,7 +139,6 @@ DIGITS = [  # value, metric, text
     (math.inf, "itae", "fails"),
     (math.inf, "settling_time", "never"),
     (0.525, "settles", "52"),
-    (1.0, "settles", "100"),
     (2.34567, "objective", "2.35"),
     (math.nan, "itae", ""),
 ]
