@@ -48,7 +48,6 @@ START = 600.0  # s in which a process is ready, compiling included
 LIMIT = 60.0  # s a case may take
 SLICE = 10_000  # cases a process at most; each process compiles its laws again, for a minute
 MOST = 400  # physics steps times channels of a run that is played
-HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
 # 10 minutes on two cores
 CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000, "calls": 5_000, "commands": 5_000}

@@ -60,6 +60,7 @@ INTERRUPTED = (
     "that its law was not called: call mujoco.set_mjcb_control and its like before or after the "
     "run, or restore what mujoco.get_mjcb_control() returned"
 )
+TIPPED_OVER = "the base has tipped over, by more than 60 degrees"
 DISTURBANCE_NOT_FINITE = "the disturbance became NaN or inf"
 PLANT_DIVERGED = f"{PLANT_DIVERGED_SHORT} (|x| or |v| above {MAX_STATE:g}, or NaN)"
 
@@ -503,6 +504,9 @@ class ScenarioBatch:
         elif self.lost_contacts(i):
             failure = LOST_CONTACTS
             step = 0
+        elif self.tips_over(i):
+            failure = TIPPED_OVER
+            step = self.step
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
 
     def lost_contacts(self, i: int) -> bool:
@@ -511,6 +515,15 @@ class ScenarioBatch:
             return False
         warnings = self.batch.get_data(i, self.scratch).warning
         return any(warnings[kind].number for kind in FULL_WARNINGS)
+
+    def tips_over(self, i: int) -> bool:
+        """Return whether the free base of a user's model lies on its side at the end."""
+        plant = self.scenarios[i].plant
+        if plant.pose or not plant.is_user_model:
+            return False
+        from smc_mujoco.mechanisms.custom import scales
+
+        return scales.tips_over(self.model, self.batch.get_data(i, self.scratch))
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""

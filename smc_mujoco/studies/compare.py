@@ -32,7 +32,7 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
-from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
+from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
 from smc_mujoco.studies.study import FULL, QUICK
 from smc_mujoco.studies.table import Table
 
@@ -320,6 +320,7 @@ def compare(
         by = ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant)
     holdout = trial.holdout(candidates, seeds)
+    _leave_out_failed(holdout, table)
     sources = {}
     for p in holdout:
         sources[p] = {c.law.name: (c.law.source,) for c in candidates[p]}
@@ -331,6 +332,15 @@ def compare(
         worst=found,
         times=_times(trial, candidates),
     )
+
+
+def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:
+    """Let no law win J that failed in every run of the table: J's runs may be shorter."""
+    columns = (table.column(name) for name in ("plant", "law", "failure"))
+    fine = {(plant, law) for plant, law, failure in zip(*columns, strict=True) if failure is None}
+    for plant, runs in holdout.items():
+        for law, arrived in runs.arrived.items():
+            arrived[:] = arrived & ((plant, law) in fine)
 
 
 def _class(worst: object) -> "Uncertainty | None":

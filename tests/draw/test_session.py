@@ -27,7 +27,6 @@ HARD = smc.Scenario(
     jump=smc.Jump(time=0.15, factors={"m": 1.5}),
     seed=3,
 )
-ROOT = Path(__file__).parents[2]
 NETWORK = smc.Scenario(
     plant=smc.plant("pendulum_network", n=3), law=smc.law("classical"), duration=0.2
 )

@@ -9,7 +9,6 @@ killed is all that the next one knows.
 import json
 import os
 import sys
-from pathlib import Path
 
 import pytest
 from helpers.commands import python
@@ -17,7 +16,6 @@ from helpers.commands import python
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.study import study
 
-ROOT = Path(__file__).parents[2]
 LOADED = """
 import os, random, signal, sys, time
 from pathlib import Path

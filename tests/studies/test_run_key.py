@@ -4,7 +4,6 @@ import dataclasses
 import functools
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -26,7 +25,6 @@ from smc_mujoco.studies.run_key import condition, key
 
 pytestmark = pytest.mark.quick
 
-ROOT = Path(__file__).parents[2]
 scenario = functools.partial(runs.scenario, duration=0.05)
 
 

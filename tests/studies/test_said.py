@@ -9,7 +9,6 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common import cache
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
-from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import run_key, study, worst_case
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.worst_case import WorstCase, default_budget
@@ -129,18 +128,6 @@ def test_a_task_of_the_arm_has_its_part_its_seed_and_all_that_disturbs_it(task):
     assert (one.jump is not None) is (task == "payload")
     assert bool(one.disturbance) is (task == "blow")
     assert (bool(one.contact) and one.contact[0].kind == "wall") is (task in ("wall", "behind"))
-
-
-SETUP = (
-    smc.plant("duffing"),
-    find_condition("constant"),
-    "classical",
-    (4e-3, 1e-3),
-    [0],
-    "tuned",
-    2.0,
-    None,
-)
 
 
 def test_a_part_with_scores_by_other_code_counts_as_not_done(tmp_path, monkeypatch):

@@ -26,6 +26,7 @@ STIFFNESS = 60.0  # 1/s^2, of the inertia, in the need
 DAMPING = 8.0  # 1/s, of the damping, in the need
 MOST = 100.0  # of the need: a larger bound on u is no scale
 UNSTABLE = mujoco.mjtWarning.mjWARN_BADQACC.value
+TIPPED = 0.5  # the cosine of 60 degrees
 ROUNDS = 4  # of T and the mobility, which depend on each other
 
 
@@ -141,6 +142,22 @@ def falls(plant: Plant) -> str:
         "size: no law of a joint can be judged there, so give others='locked' (+locked in a text), "
         "or a keyframe in which it stands"
     )
+
+
+def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Return whether a base that the law does not read lies more than 60 degrees from its pose in
+    the file.
+    """
+    base = _free_base(model)
+    if not (base and model.opt.gravity.any()) or base in model.jnt_bodyid[joint_ids(model)]:
+        return False
+    first = mujoco.MjData(model)
+    first.qpos[:] = initial_pose(model)
+    directions = []
+    for one in (first, data):
+        mujoco.mj_kinematics(model, one)
+        directions.append(model.opt.gravity @ one.xmat[base].reshape(3, 3))
+    return bool(directions[0] @ directions[1] < TIPPED * model.opt.gravity @ model.opt.gravity)
 
 
 @functools.lru_cache(maxsize=32)

@@ -43,9 +43,6 @@ def law(body: str, more: str = "") -> str:
 
 
 FALLS = law("out[0] = -y->e;", "int smc_setup(void) { return *(volatile int *)16; }")
-WAITS = law(
-    "out[0] = -y->e;", "#include <unistd.h>\nint smc_setup(void) { for (;;) pause(); return 0; }"
-)
 # state that is neither in memory nor in static data
 KEPT = """#include <fenv.h>
 #include <signal.h>

@@ -339,6 +339,19 @@ def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch):
     assert scales.falls(plant("walker", "locked")) == ""
 
 
+TALL = """<mujoco><worldbody><geom type="plane" size="9 9 1"/><body pos="0 0 .2"><freejoint/>
+<geom type="box" size=".03 .2 .2" mass="1"/><body pos="0 0 .2"><joint name="j" axis="0 1 0"/>
+<geom pos="0 0 .15" size=".03" mass=".5"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("x0", "tips"), [(0.02, False), (1.2, True)])
+def test_a_run_whose_base_ends_on_its_side_has_failed(x0, tips):
+    tall = smc.plant_from(TALL, {"j": {"motor": True}})
+    assert scales.falls(tall) == ""  # it stands at the goal
+    trace = smc.run(smc.Scenario(plant=tall, law=PID, x0=x0, u_max=9.0, duration=2.0))
+    assert ("tipped over" in str(trace.failure)) == tips
+
+
 BLOCK = """<mujoco model="block"><worldbody>
 <geom name="wall" type="box" size=".05 .05 .3"/><body name="rod" pos="-.4 0 0"><joint name="j" axis="0 0 1"/>
 <geom name="arm" type="capsule" fromto="0 0 0 .39 0 0" size=".02"/></body></worldbody>
