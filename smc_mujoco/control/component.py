@@ -24,7 +24,6 @@ from smc_mujoco.common.constraints import Each, Number, Whole, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.control.outer_law import on_computed_torque
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
 
@@ -281,6 +280,8 @@ class Template:
 
     def on_computed_torque(self) -> "Template":
         """Return the template of the law of many joints whose outer law this one is."""
+        from smc_mujoco.control.outer_law import on_computed_torque
+
         own = {}
         values = []
         for name, gain in self.gains.items():
