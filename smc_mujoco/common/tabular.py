@@ -14,7 +14,6 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from smc_mujoco.common import html
 from smc_mujoco.common.data import named_data
 
 if TYPE_CHECKING:
@@ -164,7 +163,9 @@ class Tabular:
         )
         return [Text(heading), *texts]
 
-    def _repr_html_(self) -> html.Html:
+    def _repr_html_(self) -> str:
+        from smc_mujoco.common import html
+
         lines = [list(map(_html, row)) for row in self.rows]
         note = html.Html("<br>".join(map(html.text, self.notes)))
         numbers = range(self.left, len(self.headings))
@@ -313,8 +314,10 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
     return parts
 
 
-def _html(cell: Cell | str) -> html.Html:
+def _html(cell: Cell | str) -> str:
     """Return a cell as HTML, with the lines below in smaller letters."""
+    from smc_mujoco.common import html
+
     cell = _cell(cell)
     text = html.strong(cell.text) if cell.strong else html.text(cell.text)
     lines = [*cell.below.splitlines(), *cell.alarm.splitlines()]

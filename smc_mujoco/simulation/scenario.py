@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import html
 from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, suggesting
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.mjcb import compiled
@@ -321,10 +320,12 @@ class Scenario:
         vars(resolved).update(self.__getstate__() | _defaults(self))
         return resolved
 
-    def _repr_html_(self) -> html.Html:
+    def _repr_html_(self) -> str:
         """Return plant, law, duration and the fields that differ from their defaults, in SI
         units.
         """
+        from smc_mujoco.common import html
+
         parameters = ", ".join(
             f"{name} = {value:g}" for name, value in self.plant.parameters.items()
         )

@@ -33,7 +33,6 @@ from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
-from smc_mujoco.common.html import table as html_table
 from smc_mujoco.common.text import counted, number
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
@@ -191,6 +190,8 @@ class Table:
         return f"Table({len(self)} runs: {', '.join(counts)}{checked and '; '}{checked})"
 
     def _repr_html_(self) -> str:
+        from smc_mujoco.common import html
+
         names = []
         for name in PREVIEW:
             if name in self.data.column_names:
@@ -208,7 +209,7 @@ class Table:
             note = f"and {rest} more: Table.rows, Table.column"
         else:
             note = ""
-        return html_table(names, cells, repr(self), note, range(4, 9))
+        return html.table(names, cells, repr(self), note, range(4, 9))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the rows as a stream of Arrow's C interface, as polars reads it."""
