@@ -173,5 +173,3 @@ def test_a_view_says_what_it_needs(monkeypatch):
     monkeypatch.setattr(spec, str)
     with pytest.raises(smc.ScenarioError, match="one or two"):
         smc.view("duffing", laws=["pid", "adrc", "twisting"])
-    with pytest.raises(smc.ScenarioError, match="give a Scenario or two, or a plant"):
-        smc.view(["duffing"])
