@@ -95,7 +95,6 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
     tuned.save("st.json")
     assert smc.exchange.law_to_c("st.json") == smc.exchange.law_to_c(tuned.law)
     for words in (
-        ("export", "st.json", "st.c"),
         ("export", "st.json", "st.fmu", "--no-binary"),
         (
             "compare",

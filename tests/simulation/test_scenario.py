@@ -152,7 +152,6 @@ def test_a_state_of_the_wrong_length_is_refused(refused):
     for field in ("x0", "v0"):
         for value in (
             [],
-            [1.0, 2.0],
             np.zeros((10, 10)),
         ):
             words = f"{len(value)} values", "3 channels"
