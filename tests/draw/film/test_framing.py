@@ -136,7 +136,9 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
         for shown, mount in itertools.product(stages, stages[0].mounts):
             for part in (-1.0, 1.0):
                 whole = arrows.Arrow(0.0, part, (0.0,) * 4)
-                line, _ = arrows.path(shown.model, shown.data, mount, whole)
+                found = arrows.path(shown.model, shown.data, mount, whole)
+                assert found
+                line, _ = found
                 anchor = shown.project(shown.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(shown.project(line) - anchor, axis=1)
                 assert radius.max() <= 0.1 * shown.size[1] + 1.0
