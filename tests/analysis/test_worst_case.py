@@ -165,7 +165,7 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
         Members([scenario(duration=0.1)], CLASSES[name]),
         CATALOGUE["rms_error"],
         9,
-        Runs({}, many=False),
+        Runs({}, worth_compiling=False),
         lambda _: None,
     )
     searcher.search(np.random.default_rng(0), [])
@@ -351,7 +351,7 @@ def searching(tried: list[tuple[Any, float, int]], **members: Any) -> Search:
     """A search that has tried members of these values and origins; nothing is run."""
     made: Any = SimpleNamespace(**members)
     metric: Any = None
-    search = Search(made, metric, 10**6, Runs({}, many=False), lambda done: None)
+    search = Search(made, metric, 10**6, Runs({}, worth_compiling=False), lambda done: None)
     search.tried = [attack.Tried(member, (value, 0.0), origin) for member, value, origin in tried]
     return search
 

@@ -148,7 +148,7 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     body = (2.0, 0.0, 1.0)  # 250, 100 px
     shown = overlay(hit, body=body)
     before, during = (shown.over(paper(), frame) for frame in (0, 1))
-    hue = np.array(style.rgb(style.REACTION))
+    hue = np.array(style.rgb(style.DISTURBANCE))
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
     assert 250 - 100 * arm.BLOW_DISTANCE - 3 <= x.max() <= 250 - 100 * arm.BLOW_DISTANCE + 1
     assert abs(np.median(y) - 100) <= 1
