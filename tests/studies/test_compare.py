@@ -9,6 +9,7 @@ import time
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
@@ -19,7 +20,7 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import batches, compare, fair_gains, worst_case
-from smc_mujoco.studies.leaderboard import METRICS
+from smc_mujoco.studies.leaderboard import METRICS, Holdout
 
 SHORT = {"duration": 0.5, "budget": 16, "progress": False}
 PLANTS = ["duffing", "inverted_pendulum"]
@@ -112,6 +113,12 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
     assert found.traces[0].scenario == found.table.scenario(0)
     assert len(found.traces) == 12
+
+
+def test_a_law_without_a_run_that_did_not_fail_arrives_in_no_run_of_j(found):
+    arrived = {"pid": np.ones(1, bool), "gone": np.ones(1, bool)}
+    compare._leave_out_failed({"duffing": Holdout({}, arrived, {}, {}, 1.0)}, found.table)
+    assert arrived == {"pid": True, "gone": False}
 
 
 def test_the_same_call_goes_on_from_its_folder(found, folder, monkeypatch):
@@ -344,7 +351,6 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
 def test_shells_complete_the_last_name():
     assert options.PLANTS("duffing,inverted_pendulum_") == ["duffing,inverted_pendulum_network"]
     assert options.CONDITIONS("friction,noise+enc") == ["friction,noise+encoder"]
-    assert options.LAWS("pid,super_twisting_u") == ["pid,super_twisting_unclamped"]
     assert "furuta" in options.SCENES("fur")
 
 

@@ -145,8 +145,8 @@ def falls(plant: Plant) -> str:
 
 
 def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Return whether a base that the law does not read lies more than 60 degrees from its pose in
-    the file.
+    """Return whether a base that the law does not read lies more than 60 degrees from its initial
+    pose.
     """
     base = _free_base(model)
     if not (base and model.opt.gravity.any()) or base in model.jnt_bodyid[joint_ids(model)]:
