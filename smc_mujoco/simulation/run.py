@@ -498,32 +498,27 @@ class ScenarioBatch:
         """Return the Trace of simulation i."""
         code = int(self.records["failure"][i])
         step = int(self.records["failed_step"][i])
-        failure = None
         if code != state.FINE:
             failure = self.failure(i, code)
-        elif self.lost_contacts(i):
-            failure = LOST_CONTACTS
-            step = 0
-        elif self.tips_over(i):
-            failure = TIPPED_OVER
-            step = self.step
+        else:
+            failure = self.spoiled(i)
+            step = self.step if failure == TIPPED_OVER else 0
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
 
-    def lost_contacts(self, i: int) -> bool:
-        """Return whether MuJoCo had no room for all contacts of simulation i."""
-        if not (self.model.npair or self.scenarios[i].plant.is_user_model):
-            return False
-        warnings = self.batch.get_data(i, self.scratch).warning
-        return any(warnings[kind].number for kind in FULL_WARNINGS)
-
-    def tips_over(self, i: int) -> bool:
-        """Return whether the free base of a user's model lies on its side at the end."""
+    def spoiled(self, i: int) -> str | None:
+        """Return why simulation i counts as failed though it came to its end, or None."""
         plant = self.scenarios[i].plant
-        if plant.pose or not plant.is_user_model:
-            return False
-        from smc_mujoco.mechanisms.custom import scales
+        if not (self.model.npair or plant.is_user_model):
+            return None
+        data = self.batch.get_data(i, self.scratch)
+        if any(data.warning[kind].number for kind in FULL_WARNINGS):
+            return LOST_CONTACTS
+        if plant.is_user_model and not plant.pose:
+            from smc_mujoco.mechanisms.custom import scales
 
-        return scales.tips_over(self.model, self.batch.get_data(i, self.scratch))
+            if scales.tips_over(self.model, data):
+                return TIPPED_OVER
+        return None
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""

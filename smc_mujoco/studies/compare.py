@@ -293,8 +293,22 @@ def compare(
     if conditions is None:
         conditions = applicable(extent.conditions, machines, length)
     tested = [find_condition(name) for name in listed("conditions", conditions)]
-    folder = Path(out)
-    trial = Trial(machines, tested, length, starts, folder, threads, progress, seed, device=device)
+    trial = Trial(
+        machines,
+        tested,
+        length,
+        starts,
+        Path(out),
+        threads,
+        progress,
+        defaults,
+        searches or (QUICK_SEARCHES if quick else SEARCHES),
+        budget,
+        tune and gains == "tuned",
+        gains,
+        seed,
+        device=device,
+    )
     chosen: dict[str, list[Law | Template]] = {}
     if laws is None:
         of_all = None
@@ -303,14 +317,7 @@ def compare(
     for plant in machines:
         chosen[plant.name] = of_all or [law_or_template(law) for law in _usual(plant)]
     trial.check(chosen)
-    candidates = trial.gains(
-        chosen,
-        defaults,
-        searches or (QUICK_SEARCHES if quick else SEARCHES),
-        budget,
-        tune and gains == "tuned",
-        gains,
-    )
+    candidates = trial.gains(chosen)
     table = trial.run(candidates, seeds)
     found = {}
     if worst:
@@ -335,7 +342,11 @@ def compare(
 
 
 def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:
-    """Let no law win J that failed in every run of the table: J's runs may be shorter."""
+    """Let no law win J that failed in every run of the table.
+
+    A failed run has no other metric either, but J has runs of its own, which may end before the law
+    fails.
+    """
     columns = (table.column(name) for name in ("plant", "law", "failure"))
     fine = {(plant, law) for plant, law, failure in zip(*columns, strict=True) if failure is None}
     for plant, runs in holdout.items():

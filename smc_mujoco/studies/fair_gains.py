@@ -119,8 +119,8 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
 
 
 class Trial(NamedTuple):
-    """The plants and conditions of a comparison, and its folder; `threads` and `progress` are as in
-    `run`.
+    """The plants and conditions of a comparison, how its gains are searched, and its folder;
+    `threads` and `progress` are as in `run`.
     """
 
     plants: Sequence[Plant]
@@ -130,6 +130,12 @@ class Trial(NamedTuple):
     folder: Path
     threads: int | None
     progress: bool
+    # whether a law may win over rivals that have their defaults
+    defaults: bool = False
+    searches: int = SEARCHES
+    budget: int = BUDGET  # sets of gains that a search tries at most, for each gain
+    tune: bool = True  # whether laws without gains are tuned
+    gain_set: str = "tuned"  # of the package's gains
     seed: int = 0  # another one draws other instances, noise and starts
     brief: bool = False  # whether searches have BRIEF as objective
     device: str = "cpu"  # on which the fast engine searches
@@ -166,15 +172,7 @@ class Trial(NamedTuple):
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
 
-    def gains(
-        self,
-        laws: Mapping[str, Laws],
-        defaults: bool,
-        searches: int = SEARCHES,
-        budget: int = BUDGET,
-        tune: bool = True,
-        gains: str = "tuned",
-    ) -> dict[str, list[Candidate]]:
+    def gains(self, laws: Mapping[str, Laws]) -> dict[str, list[Candidate]]:
         """Return plant -> its laws with gains: given, shipped, tuned or default ones, in this order
         of preference.
 
@@ -188,45 +186,44 @@ class Trial(NamedTuple):
         known: dict[str, list[Candidate | None]] = {}
         starts: dict[str, Starts | None] = {}
         for plant in self.plants:
-            candidates = [_without_search(plant, law, gains) for law in laws[plant.name]]
+            candidates = [_without_search(plant, law, self.gain_set) for law in laws[plant.name]]
             kinds = {candidate.law.source.kind for candidate in candidates if candidate}
             known[plant.name] = candidates
             if source.SHIPPED in kinds:
                 starts[plant.name] = None
             else:
                 starts[plant.name] = self.starts
-            if tune and not defaults:
+            if self.tune and not self.defaults:
                 self._check_tunable(plant, laws[plant.name], candidates, starts[plant.name])
         made: dict[str, list[Candidate]] = {}
         count = sum(of_plant.count(None) for of_plant in known.values())
         begun = 0
-        if self.progress and tune:
+        if self.progress and self.tune:
             for plant in self.plants:
                 untuned = []
                 for law, found in zip(laws[plant.name], known[plant.name], strict=True):
                     if found is None:
                         untuned.append(law)
-                seconds, size = self.expected(plant, untuned, starts[plant.name], budget)
-                told(f"gains on {plant.name}", seconds * searches * size)
+                seconds, size = self.expected(plant, untuned, starts[plant.name])
+                told(f"gains on {plant.name}", seconds * self.searches * size)
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
                 candidate = found or _default(law)
-                if found is None and tune:
+                if found is None and self.tune:
                     begun += 1
                     if self.progress:
                         print(f"gains of law {begun} of {count}", file=sys.stderr)
-                    candidate = self.tuned(plant, law, starts[plant.name], searches, budget)
+                    candidate = self.tuned(plant, law, starts[plant.name])
                 made[plant.name].append(candidate)
         return made
 
-    def expected(
-        self, plant: Plant, laws: Laws, starts: Starts | None, budget: int
-    ) -> tuple[float, int]:
+    def expected(self, plant: Plant, laws: Laws, starts: Starts | None) -> tuple[float, int]:
         """Return what `search.expected_of` does with the objective of this trial."""
         from smc_mujoco.analysis.tuning import search
 
-        return search.expected_of(plant, laws, self._goal(plant, starts), budget, self.threads)
+        goal = self._goal(plant, starts)
+        return search.expected_of(plant, laws, goal, self.budget, self.threads)
 
     def _check_tunable(
         self,
@@ -266,14 +263,7 @@ class Trial(NamedTuple):
         conditions = tuple(c for c in usual.conditions if c.name in fit)
         return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
-    def tuned(
-        self,
-        plant: Plant,
-        law: Component | Template,
-        starts: Starts | None,
-        searches: int,
-        budget: int,
-    ) -> Candidate:
+    def tuned(self, plant: Plant, law: Component | Template, starts: Starts | None) -> Candidate:
         """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if
         it cannot.
         """
@@ -297,12 +287,12 @@ class Trial(NamedTuple):
                 return search.tune(
                     plant,
                     law,
-                    budget,
+                    self.budget,
                     0,
                     goal,
                     self.threads,
                     self.progress,
-                    searches=searches,
+                    searches=self.searches,
                     folder=folder / "searches",
                     device=self.device,
                 )
@@ -311,7 +301,7 @@ class Trial(NamedTuple):
             first = goal.scenarios(plant, default)[0]
             code = fingerprint.of((default.function, ranges))
             tuned = cached(
-                folder / f"{plant.name}-{law.name}-{searches}-{budget}.json",
+                folder / f"{plant.name}-{law.name}-{self.searches}-{self.budget}.json",
                 [run_key.key(first), goal.describe(), code],
                 searched,
                 lambda made, path: made.save(path),

@@ -18,7 +18,6 @@ import numpy as np
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
-from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.progress import told
@@ -189,13 +188,22 @@ def which(
     if conditions is None:
         conditions = applicable(DEFAULT_CONDITIONS, [machine], length)
     tested = [find_condition(name) for name in listed("conditions", conditions)]
-    folder = Path(out)
-    trial = Trial([machine], tested, length, starts, folder, threads, progress, seed, brief, device)
-    trial.check({machine.name: chosen})
+    trial = Trial(
+        [machine],
+        tested,
+        length,
+        starts,
+        Path(out),
+        threads,
+        progress,
+        defaults,
+        seed=seed,
+        brief=brief,
+        device=device,
+    )
     if quick:
-        searches, budget = QUICK_SEARCHES, QUICK_BUDGET
-    else:
-        searches, budget = (SEARCHES, BUDGET)
+        trial = trial._replace(searches=QUICK_SEARCHES, budget=QUICK_BUDGET)
+    trial.check({machine.name: chosen})
 
     def judged(table: Table) -> tuple[dict[str, float], Boards]:
         settles, fit = _fit(table)
@@ -211,12 +219,12 @@ def which(
         _tell_time(trial, machine, chosen, seeds)
     left_out: list[str] = []
     if brief and len(chosen) > FINALISTS:
-        first = trial.gains({machine.name: chosen}, defaults, 1, budget)
+        first = trial._replace(searches=1).gains({machine.name: chosen})
         _, boards = judged(trial.run(first, min(FEW, seeds), half_steps=False))
         best = _order(boards)[:FINALISTS]
         left_out = [law.name for law in chosen if law.name not in best]
         chosen = [law for law in chosen if law.name in best]
-    candidates = trial.gains({machine.name: chosen}, defaults, searches, budget)
+    candidates = trial.gains({machine.name: chosen})
     table = trial.run(candidates, seeds)
     settles, boards = judged(table)
     found = {}
@@ -228,7 +236,7 @@ def which(
 
 def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
     """Tell how long the quick answer for a user's model takes at most, by timing one evaluation."""
-    seconds, size = trial.expected(plant, laws, trial.starts, QUICK_BUDGET)
+    seconds, size = trial.expected(plant, laws, trial.starts)
     last = min(FINALISTS, len(laws))
     searches = size * (1.0 + (QUICK_SEARCHES - 1) * last / len(laws))
     runs = len(laws) * FEW + 3 * last * seeds  # each of these also at half the step

@@ -21,23 +21,23 @@ FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 DUFFING = smc.plant("duffing")
 
 
-def trial(folder, plants=(), starts=None) -> Trial:
-    return Trial(plants, [], 1.0, starts, folder, None, False)
+def trial(folder, plants=(), starts=None, **search) -> Trial:
+    return Trial(plants, [], 1.0, starts, folder, None, False, **search)
 
 
 def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
     asked = []
 
-    def tuned(self, plant, law, starts, *effort):
-        asked.append((starts, *effort))
+    def tuned(self, plant, law, starts):
+        asked.append(starts)
 
     monkeypatch.setattr(Trial, "tuned", tuned)
     other = smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
-        trial(Path("gains"), [plant], other).gains({"duffing": laws}, True, 3, 16)
-    assert asked == [(None, 3, 16), (other, 3, 16), (other, 3, 16)]
+        trial(Path("gains"), [plant], other, defaults=True).gains({"duffing": laws})
+    assert asked == [None, other, other]
 
 
 def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_path, monkeypatch):
@@ -59,7 +59,8 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
     # no catalogue has it, so its name says nothing to what reads the file of a tuning
     heavy = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
     for _ in range(2):
-        (found,) = trial(tmp_path, [heavy]).gains({"mine": [my_pd]}, False, 2, 8)["mine"]
+        searched = trial(tmp_path, [heavy], searches=2, budget=8)
+        (found,) = searched.gains({"mine": [my_pd]})["mine"]
         assert found.law.function is my_pd.function
         assert found.law.gains == tuned[0].law.gains != my_pd.defaults
         assert [dict(law.gains) for law in found.sets] == [
@@ -96,7 +97,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         (DUFFING, held),
         (other, held),
     ):
-        trial(tmp_path).tuned(plant, law, None, 3, 16)
+        trial(tmp_path).tuned(plant, law, None)
     assert asked[0] == asked[1]
     assert len(set(asked)) == 3
 
@@ -117,12 +118,12 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     )
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
     default = smc.law("observer_free")
-    own = trial(tmp_path).tuned(DUFFING, default, None, 3, 16)
+    own = trial(tmp_path).tuned(DUFFING, default, None)
     assert own.law == default
     assert own.remark == "its defaults, better than those tried"
     assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
-    found = trial(tmp_path).tuned(DUFFING, default, None, 3, 16)
+    found = trial(tmp_path).tuned(DUFFING, default, None)
     assert found.law == FAST
     assert found.remark == ""
     # also with another seed of the comparison run i has the gains of search i

@@ -26,6 +26,7 @@ from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import (
     BATCH_BYTES,
+    LOST_CONTACTS,
     PlainLoopWarning,
     ScenarioBatch,
     cores,
@@ -230,7 +231,7 @@ class _Again(ScenarioBatch):
     def failed_at(self, i: int) -> float | None:
         """Return the time at which a run failed, s, or None."""
         if self.records["failure"][i] == state.FINE:
-            return 0.0 if self.lost_contacts(i) else None
+            return 0.0 if self.spoiled(i) == LOST_CONTACTS else None
         return int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
 
 

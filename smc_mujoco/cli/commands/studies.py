@@ -161,12 +161,19 @@ def compare(
         from smc_mujoco.common.files import with_ending
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
-        from smc_mujoco.studies.leaderboard import METRICS, leaderboard
-        from smc_mujoco.studies.study import FULL, study
+        from smc_mujoco.studies.leaderboard import METRICS
 
     terminal = Terminal(json)
-    start = options.starts(x0)
-    names = options.names(metrics, METRICS)
+    shared = {
+        "out": out,
+        "metrics": options.names(metrics, METRICS),
+        "duration": duration,
+        "starts": options.starts(x0),
+        "defaults": defaults,
+        "searches": searches,
+        "relevant": relevant,
+        "threads": threads,
+    }
     if rig is not None:
         own = (plants, condition, worst, quick, not tune, figure, latex, seed)
         if any(own) or gains != "tuned" or device != "cpu":
@@ -178,14 +185,7 @@ def compare(
         ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
         machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
         chosen = options.laws(law, of_rig=machine.laws) or None
-        length = FULL.duration if duration is None else duration
-        searched = {"folder": out / "searches", "threads": threads, "progress": True}
-        found = []
-        if searches is not None:
-            found = ensemble.tuned(machine, chosen, searches, starts=start, **searched)
-        scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, start)
-        table = study(scenarios, out, True, threads, progress=True, half_steps=True)
-        boards = leaderboard(table, names, defaults=defaults, relevant=relevant)
+        table, boards, found = ensemble.compare(machine, chosen, seeds, **shared)
         terminal.print(boards)
         for candidate in found:
             terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
@@ -202,18 +202,11 @@ def compare(
         seeds,
         tune,
         worst,
-        out=out,
-        metrics=names,
-        duration=duration,
-        starts=start,
         gains=gains,
         quick=quick,
-        defaults=defaults,
-        searches=searches,
-        relevant=relevant,
-        threads=threads,
         seed=seed,
         device=device,
+        **shared,
     )
     terminal.print(comparison)
     if latex:

@@ -12,6 +12,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
@@ -24,7 +25,11 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, all_combinations, grid
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, candidate_of
+from smc_mujoco.studies.leaderboard import leaderboard
+from smc_mujoco.studies.study import FULL, study
+from smc_mujoco.studies.table import Table
 
 BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace
 
@@ -124,6 +129,39 @@ def tuned(
         else:
             found.append(candidate_of(law, made))
     return found
+
+
+def compare(
+    rig: Rig,
+    laws: Sequence[str | Law] | None,
+    seeds: int,
+    out: Path,
+    duration: float | None,
+    starts: Starts | None,
+    searches: int | None,
+    threads: int | None,
+    **options: Any,
+) -> tuple[Table, Boards, list[Candidate]]:
+    """Return the runs of laws on all parameter sets, their boards, and those that were tuned: all
+    if `searches` is given, otherwise none.
+
+    Arguments are as in `smc.compare`; `options` are those of `leaderboard`.
+    """
+    found = []
+    if searches is not None:
+        found = tuned(
+            rig,
+            laws,
+            searches,
+            starts=starts,
+            folder=out / "searches",
+            threads=threads,
+            progress=True,
+        )
+    length = FULL.duration if duration is None else duration
+    scenarios = runs(rig, found or laws, seeds, duration=length, starts=starts)
+    table = study(scenarios, out, True, threads, progress=True, half_steps=True)
+    return table, leaderboard(table, **options), found
 
 
 def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
