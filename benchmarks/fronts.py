@@ -638,46 +638,50 @@ def summary(points: Sequence[dict]) -> Iterator[str]:
         yield f"{name}: {', '.join(f'{count} {word}' for word, count in found.items())}"
 
 
-COLUMNS = (  # condition, price, what is at the top and at the bottom
+ROWS = (  # condition, price, words above the panel and below it
     ("middle", "J", "no noise", "J / least J"),
     ("noisy", "J", "sensor's noise", "J / least J"),
     ("middle", "rate", "no noise", "calm: TV rate / bound, 1/s"),
 )
-TICKS = {"J": (1.5, 2, 3, 5, 10, 20), "rate": (10, 30, 100, 300, 1000)}
+TICKS = {"J": (1.5, 3, 5, 10, 20), "rate": (10, 30, 100, 300, 1000)}
 NOT_DRAWN = ("observer_free",)  # its line is that of boundary_layer
-WIDTH, ROW = 8.8, 2.6  # inches
+WIDTH, ROW = 4.6, 1.9  # inches: letters are read on a phone
 
 
 def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
-    """Draw the fronts: a row a plant, a column a price and condition."""
+    """Draw the fronts: a column a plant, a row a price and condition."""
     from smc_mujoco.draw import page, style
 
     points = [point for point in points if point["model"] == "none"]
     plants = list(dict.fromkeys(point["plant"] for point in points))
     colours = style.law_colours(laws)
     with style.page(WIDTH):
-        figure = page.blank(WIDTH, ROW * len(plants) + 0.9, None)
-        panels = figure.subplots(len(plants), len(COLUMNS), squeeze=False, sharey=True)
-        for row, plant in zip(panels, plants, strict=True):
-            for ax, (condition, price, title, label) in zip(row, COLUMNS, strict=True):
+        handles = []
+        for law, colour, mark in zip(laws, colours, style.MARKS, strict=False):
+            look = {"marker": mark, "lw": 1.2, "ms": 4}
+            handles.append(page.entry(style.law_name(law), colour, **look))
+        height = page.head_height(WIDTH, handles) + ROW * len(ROWS) + 0.2
+        figure = page.blank(WIDTH, height, None)
+        panels = figure.subplots(len(ROWS), len(plants), squeeze=False, sharey=True)
+        for row, (condition, price, title, label) in zip(panels, ROWS, strict=True):
+            for ax, plant in zip(row, plants, strict=True):
                 wanted = {"plant": plant, "condition": condition, "price": price}
-                for law, colour, mark in zip(laws, colours, style.MARKS, strict=False):
+                for law, line in zip(laws, handles, strict=True):
                     its = [one for one in points if (wanted | {"law": law}).items() <= one.items()]
                     x = [one["level"] for one in its]
                     y = [np.median(one["errors"]) for one in its]
-                    ax.plot(x, y, color=colour, marker=mark, ms=4)
+                    look = {"color": line.get_color(), "marker": line.get_marker()}
+                    ax.plot(x, y, ms=3, lw=1, **look)
                 ax.axhspan(1e-9, FLOOR, color=style.BAND, lw=0, zorder=0)
-                ax.set(xscale="log", yscale="log", ylim=(5e-9, 3e-2), xlabel=label)
+                ax.set(xscale="log", yscale="log", ylim=(3e-9, 1.0), xlabel=label)
                 ax.set_xticks(TICKS[price], [f"{tick:g}" for tick in TICKS[price]])
                 ax.minorticks_off()
                 ax.set_title(title, fontsize=style.points(9.5), weight="normal")
                 place = {"transform": ax.transAxes, "ha": "right", "color": style.MUTED}
                 ax.text(0.98, 0.03, "not ranked", fontsize=style.points(9.0), **place)
-            row[0].set_title(f"{style.plant_name(plant)}\n{row[0].get_title(loc='left')}")
             row[0].set_ylabel("rms error / start")
-        handles = []
-        for law, colour, mark in zip(laws, colours, style.MARKS, strict=False):
-            handles.append(page.entry(style.law_name(law), colour, marker=mark, lw=1.5))
+        for ax, plant in zip(panels[0], plants, strict=True):
+            ax.set_title(f"{style.plant_name(plant)}\n{ROWS[0][2]}")
         page.set_head(figure, WIDTH, "The price of following a load", handles)
         page.write(figure, page.files(path))
 

@@ -12,6 +12,7 @@ from smc_mujoco.analysis.ranking import LEVEL_SHARE, RELEVANT, Comparison
 
 FILE = Path(__file__).parents[1] / "winners.svg"
 UNITS = 12
+WIDTH = 4.6  # inches: letters are read on a phone
 NUMBER = 3  # of the draw; any shows the same four verdicts
 
 
@@ -51,26 +52,24 @@ def draw(file: Path = FILE) -> None:
 
     from smc_mujoco.draw import style
 
-    with style.page():
+    with style.page(WIDTH):
         matplotlib.rcParams["svg.hashsalt"] = "winners"
-        figure = Figure(figsize=(7.0, 2.9), layout="constrained")
+        figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
         ax = figure.subplots()
         ax.axvspan(-100 * LEVEL_SHARE, 100 * LEVEL_SHARE, color=style.GRID, lw=0)
         ax.axvline(100 * RELEVANT, color=style.INK, ls="--", lw=1)
-        ax.text(100 * RELEVANT, 0.6, f" {100 * RELEVANT:.0f} %", va="top")
+        ax.text(100 * RELEVANT, 0.8, f" {100 * RELEVANT:.0f} %", va="bottom")
         for row, (name, comparison) in enumerate(cases()):
             as_run = 1.0 - comparison.cells[0, 0] / comparison.cells[1, 0]
             charged = 1.0 - np.exp(-comparison.leads[0, 0, 1])
             rows = np.full(UNITS, -row) + np.linspace(-0.22, 0.22, UNITS)
             ax.hlines(rows, 100 * charged, 100 * as_run, color=style.MUTED, lw=1)
-            ax.plot(100 * as_run, rows, "o", ms=4, mfc="none", color=style.MUTED)
-            ax.plot(100 * charged, rows, "o", ms=4, color="#0072B2")
-            ax.text(58, -row + 0.12, name, va="bottom", color=style.MUTED)
-            ax.text(58, -row + 0.06, verdict(comparison), va="top", color=style.INK, weight="bold")
-        ax.set(
-            xlim=(-80, 145), ylim=(-3.5, 0.65), yticks=[], xlabel="lead of A over B in a run (%)"
-        )
-        ax.set_xticks([-75, -50, -25, 0, 25, 50])
+            ax.plot(100 * as_run, rows, "o", ms=3, mfc="none", color=style.MUTED)
+            ax.plot(100 * charged, rows, "o", ms=3, color="#0072B2")
+            ax.text(-65, -row + 0.3, name, va="bottom", color=style.MUTED)
+            ax.text(64, -row + 0.3, verdict(comparison), va="bottom", ha="right", weight="bold")
+        ax.set(xlim=(-67, 66), ylim=(-3.4, 0.8), yticks=[], xlabel="lead of A over B in a run (%)")
+        ax.set_xticks([-50, -25, 0, 25, 50])
         ax.spines["left"].set_visible(False)
         figure.savefig(file, metadata={"Date": None, "Creator": None})
 

@@ -55,8 +55,7 @@ def nyquist(
         for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True):
             words = "no limit cycle predicted, L and 1/N do not cross"
             if cycle:
-                size = style.short(cycle.amplitude)
-                words = f"amplitude {size} at {cycle.frequency:.3g} Hz predicted"
+                words = f"{cycle.frequency:.3g} Hz predicted"
             label = f"{style.law_name(scenario.law)}: {words}{source}"
             handles.append(pages.entry(label, colour))
         whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)
@@ -73,7 +72,7 @@ def nyquist(
                 right.set_subplotspec(grid.get_gridspec()[grid.rowspan.start, :])
             last_periods(right, trace, cycle, channel, colour)
             if change.marked:
-                words = style.wrapped(NOTE, 72 * 0.5 * style.FULL_WIDTH, size, lines=2)
+                words = style.wrapped(NOTE, 72 * 0.53 * style.FULL_WIDTH, size, lines=2)
                 right.set_title(words, loc="left", fontsize=size, fontweight="normal")
         title = f"Chattering: {style.head(scenarios)}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)

@@ -581,14 +581,11 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     if not shared or height < MIN_WORDS * size:
         return
     forever = [one for one in shared if one[1] == np.inf]
-    choices = [agreement_words(shared, names, True), agreement_words(shared, names, False)]
-    choices += [agreement_words(forever, names, named) for named in (True, False)]
+    choices = [agreement_words(shared, names, True), agreement_words(forever, names, True)]
+    choices += [agreement_words(shared, names, False), agreement_words(forever, names, False)]
     fitting = [words for words in choices if words and style.width(words, size) <= room]
     if not fitting:
         return
-    for _, stop in shared:
-        if stop < np.inf:
-            ax.axvline(stop, color=style.RULE, lw=style.points(0.9), zorder=1.5)
     free = 1.0 - 1.8 * size / height
     axis = ax.yaxis.get_transform()
     low, high = axis.transform(np.array(ax.get_ylim()))

@@ -20,7 +20,7 @@ from smc_mujoco.draw import style
 SHADES = 3  # from early to late
 UNDECIDED = "#F4F4F4"
 LIGHTEST = 82.0  # lightness of the latest shade in CIELAB
-MAP_SIZE = (5.4, 5.3)  # inches on a full page, width and height of a map
+MAP_SIZE = (4.4, 5.0)  # inches on a full page, width and height of a map
 
 
 def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> Figure:
@@ -31,7 +31,7 @@ def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> F
     width = MAP_SIZE[0] * len(maps)
     with style.page():
         cross = {"marker": "+", "ms": style.points(11), "lw": 0}
-        rest = pages.entry("rest", style.INK, **cross)
+        rest = pages.entry("rest, and its region of attraction", style.INK, **cross)
         page = pages.blank(width, MAP_SIZE[1] + pages.head_height(width, [rest]))
         axes = page.subplots(1, len(maps), squeeze=False)[0]
         after = convergence_times(maps)
@@ -44,8 +44,7 @@ def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> F
             if len(plants) > 1:
                 name += f", {style.plant_name(region.plant, short=True)}"
             draw_map(ax, region, after, name + source.replace(", ", "\n"))
-        title = f"Region of attraction: {style.heading(plants, short=True)}"
-        pages.set_head(page, width, title, [rest], gains)
+        pages.set_head(page, width, style.heading(plants, short=len(plants) > 1), [rest], gains)
         return pages.write(page, paths)
 
 
@@ -71,8 +70,8 @@ def draw_map(ax: Axes, region: Basin, after: Sequence[float], title: str) -> Non
         if share := (classes == k).mean():
             label = f"{meanings[k]}: {100 * share:.3g} %"
             marks.append(Patch(facecolor=colours[k], edgecolor=style.RULE, label=label))
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
-    ax.legend(handles=marks, ncols=2, fontsize=style.points(9.5), **place)
+    place = {"loc": "upper left", "bbox_to_anchor": (0.0, -0.16)}
+    ax.legend(handles=marks, fontsize=style.points(9.5), **place)
 
 
 def colours_of(law: str) -> list[str]:

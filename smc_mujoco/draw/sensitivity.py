@@ -24,6 +24,7 @@ MIN_HEIGHT = 3.6  # of the panels
 PALE_SHARE = 0.6  # of white in a bar's light part: chosen
 DOT_SIZE = 26.0  # points squared, of a run
 TONES = 12  # of runs, from the best score to the worst
+LIGHTEST = 80.0  # lightness of the best in CIELAB: chosen
 
 
 def draw(
@@ -50,8 +51,10 @@ def draw(
         if found.failed.any():
             handles.append(pages.entry("a run that fails", style.INK, lw=0, marker="x"))
         tall = style.points(max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes)))
-        page = pages.blank(width, height or pages.head_height(width, handles) + tall, fig)
-        bars, runs = page.subplots(1, 2, width_ratios=[1.0, 1.1])
+        rows, columns = (2, 1) if width < pages.NARROW else (1, 2)
+        tall = pages.head_height(width, handles) + rows * tall
+        page = pages.blank(width, height or tall, fig)
+        bars, runs = page.subplots(rows, columns)
         _bars(bars, found, colour, pale)
         _runs(runs, found, colour)
         about = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
@@ -105,7 +108,7 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
         columns.append(found.values)
         ax.set_ylabel(f"{CATALOGUE[found.metric].label} ({found.unit})")
     order = np.argsort(found.values)  # the worst on top
-    shades = np.array(style.ramp(colour, TONES))
+    shades = np.array(style.ramp(colour, TONES, LIGHTEST))
     tones = np.empty(len(order), object)
     tones[order] = shades[np.linspace(0.0, TONES - 0.5, len(order)).astype(int)]
     tones[found.failed] = style.INK
