@@ -112,6 +112,35 @@ def measurement_at(address):
     )
 
 
+@njit
+def begun(address, t, dt, model, dynamics, n, driven):
+    """Store what is before the arrays of a measurement at an address, and return the
+    measurement.
+    """
+    head = head_at(address, 0)
+    head.t = t
+    head.dt = dt
+    head.model = model
+    head.dynamics = dynamics
+    head.n = n
+    head.driven = driven
+    return measurement_at(address)
+
+
+@njit
+def put_channel(y, i, x, v, a, limit, r, dr, ddr):
+    """Store what is measured of channel i, and its reference, in a measurement."""
+    y.x[i] = x
+    y.v[i] = v
+    y.e[i] = x - r
+    y.de[i] = v - dr
+    y.r[i] = r
+    y.dr[i] = dr
+    y.ddr[i] = ddr
+    y.a[i] = ddr if math.isnan(a) else a
+    y.limit[i] = limit
+
+
 def coriolis(y, w):
     """Return C(x, v) w, (n,), for a vector w (n,). C is made of Christoffel symbols, so M' - 2 C is
     skew-symmetric.

@@ -7,8 +7,8 @@ At the first stage of a control sample, for each channel:
 A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of
 the sample before. At the first stage of a physics step, the command whose delay has passed goes to
 ctrl, or to the drive that a part is. At every stage, disturbance(t) goes to xfrc_applied. Each
-sample is logged with the mean forces since the last one. At every stage the parts act last, see
-hardware/moments.py: the controller knows none of them.
+sample is logged with the mean forces since the last one. How signals act is in exogenous.py. At
+every stage the parts act last, see hardware/moments.py: the controller knows none of them.
 
 The controller counts its calls, because mjData.time does not tell the last stage of a step from the
 start of the next: RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
@@ -26,32 +26,29 @@ from collections import namedtuple
 
 from numba import njit
 
-from smc_mujoco.common.jit import call, integers, place, pointer
+from smc_mujoco.common.jit import integers, pointer
 from smc_mujoco.common.mjcb import slots
-from smc_mujoco.control.joint_law import head_at
+from smc_mujoco.control.joint_law import begun, put_channel
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import (
-    PART,
     channel_at,
     drive_at,
     function_at,
     generalised_disturbance,
-    part_at,
+    raises,
     reader_at,
     state_at,
-    torque,
 )
-from smc_mujoco.simulation import philox
+from smc_mujoco.simulation import exogenous, parts, philox
 from smc_mujoco.simulation import state as record
+from smc_mujoco.simulation.parts import MAX_CONTROL
 from smc_mujoco.simulation.signals import after_pauses
-from smc_mujoco.simulation.state import disturbance_at, log_at
+from smc_mujoco.simulation.state import log_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
 LAST_STAGE = 1.0 - 1e-8
 OTHER_CALLBACKS = len(slots())
-PART_BYTES = PART.itemsize
-MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
 # Arrays of one mjData, as pointers to their numbers; of its mjModel the levels of dry friction, and
@@ -78,9 +75,9 @@ def control(address, sim, data):  # noqa: PLR0912
     k = step // steps
     within = step % steps
     failure = record.FINE
-    _clear_joints(sim, data)
+    parts.clear_joints(sim, data)
     if sim.reaches != 0:
-        _keep_reach(sim.reach, data)
+        parts.keep_reach(sim.reach, data)
     sim.stage = stage
     sim.now = step
     sim.arrived = 0
@@ -99,14 +96,13 @@ def control(address, sim, data):  # noqa: PLR0912
         else:
             fraction = LAST_STAGE if stage == 3 else 0.5
         sample = k if stage + within == 0 else -1
-        failure = _apply_disturbances(
-            address, sim, data, k * sim.period + (within + fraction) * sim.step, sample
-        )
+        t = k * sim.period + (within + fraction) * sim.step
+        failure = exogenous.disturb(address, sim, data, t, sample)
     if failure == record.FINE:
         if stage == 0 and within == 0:
             _log(sim, data, k)
         if sim.part_count != 0:
-            failure = _act(address, sim, data)
+            failure = parts.act(address, sim, data)
     if failure != record.FINE:
         sim.failure = failure
         sim.failed_step = step
@@ -182,24 +178,9 @@ def _interfered(sim):
 
 
 @njit(error_model="numpy", inline="always")
-def _call(function, i, inputs, outputs):
-    """Call a function for channel i, with the addresses of its inputs and outputs.
-
-    Return 1 if it raised, or 0.
-    """
-    return call(
-        function.address,
-        inputs,
-        function.parameters,
-        function.memory + i * function.stride,
-        outputs,
-    )
-
-
-@njit(error_model="numpy", inline="always")
-def _read_sensor(address, sim, i, k, t, hinge):
+def _sensor_raises(address, sim, i, k, t, hinge):
     """Give the reading of channel i at sample k, at t s, its noise, and what the sensor makes of
-    it. Return 1 if that raised, or 0.
+    it. Return whether that raised.
     """
     reading = sim.reading
     j = k
@@ -212,7 +193,7 @@ def _read_sensor(address, sim, i, k, t, hinge):
         reading.x += sim.sigma_x * z[0]
         reading.v += sim.sigma_v * z[1]
     if sim.readers == 0 or reader_at(sim.readers, i).function.address == 0:
-        return 0
+        return False
     function = reader_at(sim.readers, i).function
     sight = sim.sight
     sight.x = reading.x
@@ -220,25 +201,11 @@ def _read_sensor(address, sim, i, k, t, hinge):
     sight.j = j
     sight.hinge = hinge
     sight.chance = philox.uniform(sim.seed, i, philox.DROPOUT, j)
-    if _call(function, 0, address + record.AT.sight, address + record.AT.raw) != 0:
-        return 1
+    if raises(function, 0, address + record.AT.sight, address + record.AT.raw):
+        return True
     reading.x = sim.raw.x
     reading.v = sim.raw.v
-    return 0
-
-
-@njit(error_model="numpy", inline="always")
-def _measurement_error(address, sim, function, t):
-    """Return a measurement error at time t, s:
-
-    NaN if its signal raised, -0 (which changes no bit) without a signal.
-    """
-    if function.address == 0:
-        return -0.0
-    sim.instant.t = t
-    if _call(function, 0, address + record.AT.instant, address + record.AT.motion) != 0:
-        return math.nan
-    return sim.motion.value
+    return False
 
 
 @njit(error_model="numpy", inline="always")
@@ -267,17 +234,17 @@ def _measure(address, sim, data, k, t):
     reading = sim.reading
     estimate = sim.estimate
     reading.dt = sim.period
-    x_error = _measurement_error(address, sim, sim.position_error, t)
-    v_error = _measurement_error(address, sim, sim.velocity_error, t)
+    x_error = exogenous.measurement_error(address, sim, sim.position_error, t)
+    v_error = exogenous.measurement_error(address, sim, sim.velocity_error, t)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
         reading.x = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
         reading.v = data.sensordata[channel.v_sensor] + v_error
         sim.seen.i = i
-        if _read_sensor(address, sim, i, k, t, channel.hinge_body >= 0) != 0:
+        if _sensor_raises(address, sim, i, k, t, channel.hinge_body >= 0):
             return record.RAISED
-        if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
+        if raises(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate):
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
         if sim.other_forces != 0:
@@ -288,10 +255,10 @@ def _measure(address, sim, data, k, t):
 
 
 @njit(error_model="numpy", inline="always")
-def _evaluate_model(address, sim, i):
-    """Write nominal f and g of channel i into the record. Return 1 if the model raised, or 0."""
+def _model_raises(address, sim, i):
+    """Write nominal f and g of channel i into the record. Return whether the model raised."""
     sim.seen.i = i
-    return _call(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
+    return raises(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
 
 
 @njit(error_model="numpy")
@@ -307,16 +274,16 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
     last_u = pointer(sim.seen.u)  # the forces of the drives, as the model knows them
     v = pointer(sim.seen.v)
     feedforward = 0.0
-    joint = sim.joint.head != 0
+    joint = sim.joint != 0
     commands = pointer(sim.commands)
-    y = sim.joint.head if joint else address + record.AT.y
+    y = sim.joint if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
     for i in range(n if sim.other_forces != 0 else 0):
         # what the model takes for the force on each joint
         last_u[i] += pointer(sim.other_forces)[i]
     if sim.feedforward.address != 0:
-        if _call(sim.feedforward, 0, address + record.AT.instant, address + record.AT.motion) != 0:
+        if exogenous.signal_raises(address, sim.feedforward, 0):
             return record.RAISED
         feedforward = sim.motion.value
     for first in range(0, sim.driven, width):
@@ -330,7 +297,7 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
             law = sim.law
         else:
             law = function_at(sim.laws, first)
-        if _call(law, first, y, sim.commands) != 0:
+        if raises(law, first, y, sim.commands):
             return record.LAW_RAISED
         for j in range(min(width, sim.driven)):
             i = first + j
@@ -358,7 +325,7 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
         buffer[i], sample.u, sample.s = 0.0, 0.0, 0.0
         if sim.referenced <= i:
             sample.r = 0.0
-        elif not joint and _evaluate_reference(address, sim, k, i) != 0:
+        elif not joint and exogenous.reference_raises(address, sim, k, i):
             return record.RAISED
     for i in range(n if sim.other_forces != 0 else 0):
         drive = drive_at(sim.drives, i)
@@ -384,35 +351,12 @@ def _mix(sim, u, controls):
 
 
 @njit(error_model="numpy", inline="always")
-def _evaluate_reference(address, sim, k, i):
-    """Write the reference of channel i into the record and the log. Return 1 if it raised, or 0."""
-    if sim.references != 0:
-        if (
-            _call(
-                function_at(sim.references, i),
-                0,
-                address + record.AT.instant,
-                address + record.AT.motion,
-            )
-            != 0
-        ):
-            return 1
-    elif (
-        i == 0
-        and _call(sim.reference, 0, address + record.AT.instant, address + record.AT.motion) != 0
-    ):
-        return 1
-    log_at(sim.log, k * sim.n + i).r = sim.motion.value
-    return 0
-
-
-@njit(error_model="numpy", inline="always")
 def _measure_channel(address, sim, k, t, i):
     """Write what the law of channel i reads.
 
     The force in its nominal model is that of the drive, gain u - drag v.
     """
-    if _evaluate_reference(address, sim, k, i) != 0:
+    if exogenous.reference_raises(address, sim, k, i):
         return record.RAISED
     y = sim.y
     x = pointer(sim.seen.x)
@@ -432,13 +376,13 @@ def _measure_channel(address, sim, k, t, i):
     y.gq = 0.0
     if sim.partners != 0:  # a joint without actuator moves with channel i
         partner = i + sim.driven
-        if _evaluate_model(address, sim, partner) != 0:
+        if _model_raises(address, sim, partner):
             return record.RAISED
         y.q = x[partner]
         y.dq = v[partner]
         y.fq = model.f - drive.drag * v[i] * model.g
         y.gq = drive.gain * model.g
-    if _evaluate_model(address, sim, i) != 0:
+    if _model_raises(address, sim, i):
         return record.RAISED
     y.f = model.f - drive.drag * v[i] * model.g
     y.g = drive.gain * model.g
@@ -460,7 +404,7 @@ def _measure_channel(address, sim, k, t, i):
     y.s = 0.0
     y.v_eq = 0.0
     if sim.surface.address != 0:
-        if _call(sim.surface, i, address + record.AT.y, address + record.AT.sliding) != 0:
+        if raises(sim.surface, i, address + record.AT.y, address + record.AT.sliding):
             return record.RAISED
         y.has_surface = 1.0
         y.s = sim.sliding.s
@@ -471,100 +415,79 @@ def _measure_channel(address, sim, k, t, i):
 @njit(error_model="numpy")
 def _measure_joints(address, sim, k, t):
     """Write what a law of many joints reads at sample k, at time t, s."""
-    y = sim.joint
-    n = sim.n
-    motion = sim.motion
     seen = sim.seen
-    head = head_at(y.head, 0)
-    head.t = t
-    head.dt = sim.period
-    head.model = sim.uses_model
-    head.n = n
-    head.driven = sim.driven
+    motion = sim.motion
+    dynamics = 0
     if sim.handle.coriolis != 0.0:
-        head.dynamics = address + record.AT.handle
-    else:
-        head.dynamics = 0
-    for i in range(n):
-        if _evaluate_reference(address, sim, k, i) != 0:
+        dynamics = address + record.AT.handle
+    y = begun(sim.joint, t, sim.period, sim.uses_model, dynamics, sim.n, sim.driven)
+    for i in range(sim.n):
+        if exogenous.reference_raises(address, sim, k, i):
             return record.RAISED
-        x = pointer(seen.x)[i]
-        v = pointer(seen.v)[i]
-        a = pointer(sim.a)[i]
-        pointer(y.x)[i], pointer(y.v)[i] = x, v
-        pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
-        pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = (
+        put_channel(
+            y,
+            i,
+            pointer(seen.x)[i],
+            pointer(seen.v)[i],
+            pointer(sim.a)[i],
+            drive_at(sim.drives, i).limit,
             motion.value,
             motion.rate,
             motion.acceleration,
         )
-        pointer(y.a)[i], pointer(y.limit)[i] = (
-            motion.acceleration if math.isnan(a) else a,
-            drive_at(sim.drives, i).limit,
-        )
     if sim.mixer != 0:
-        rotation.put_attitude_error(
-            pointer(y.x),
-            pointer(y.v),
-            pointer(y.r),
-            pointer(y.dr),
-            pointer(y.e),
-            pointer(y.de),
-        )
-    return _measure_dynamics(address, sim)
+        rotation.put_attitude_error(y.x, y.v, y.r, y.dr, y.e, y.de)
+    return _measure_dynamics(address, sim, y)
 
 
 @njit(error_model="numpy")
-def _measure_dynamics(address, sim):
+def _measure_dynamics(address, sim, y):
     """Write nominal M, h and g of all channels, per unit of u, into a joint measurement."""
     n = sim.n
-    v = pointer(sim.seen.v)
-    M = pointer(sim.joint.M)
-    h = pointer(sim.joint.h)
-    g = pointer(sim.joint.g)
     failure = record.FINE
     if sim.uses_model == 0.0:
-        for i in range(n * n):
-            M[i] = 1.0 if i % (n + 1) == 0 else 0.0
+        y.M[:] = 0.0
+        y.h[:] = 0.0
+        y.g[:] = 0.0
         for i in range(n):
-            h[i], g[i] = 0.0, 0.0
+            y.M[i, i] = 1.0
         return failure
     if sim.dynamics.address == 0:
-        failure = _separate_equations(address, sim, M, h, g)
-    elif _call(sim.dynamics, 0, address + record.AT.seen, sim.joint.M) != 0:
+        failure = _separate_equations(address, sim, y)
+    elif raises(sim.dynamics, 0, address + record.AT.seen, y.M.ctypes.data):
         failure = record.RAISED
+    v = pointer(sim.seen.v)
     for i in range(n):
         drive = drive_at(sim.drives, i)
         for j in range(n):
-            M[n * i + j] /= drive.gain
-        h[i], g[i] = (h[i] + drive.drag * v[i]) / drive.gain, g[i] / drive.gain
+            y.M[i, j] /= drive.gain
+        y.h[i] = (y.h[i] + drive.drag * v[i]) / drive.gain
+        y.g[i] /= drive.gain
     return failure
 
 
 @njit(error_model="numpy")
-def _separate_equations(address, sim, M, h, g):
+def _separate_equations(address, sim, y):
     """Write M, h and g of channels that each have their own equation x'' = f + g u:
 
     M is diagonal.
     """
     n = sim.n
     v = pointer(sim.seen.v)
-    measured = pointer(sim.joint.v)
-    for i in range(n * n):
-        M[i] = 0.0
+    y.M[:] = 0.0
     for moving in (True, False):  # h at v, then g at rest
         for i in range(n):
-            v[i] = measured[i] if moving else 0.0
+            v[i] = y.v[i] if moving else 0.0
         for i in range(n):
-            if _evaluate_model(address, sim, i) != 0:
+            if _model_raises(address, sim, i):
                 return record.RAISED
-            M[(n + 1) * i] = 1.0 / sim.model.g
+            y.M[i, i] = 1.0 / sim.model.g
             if moving:
-                h[i] = -sim.model.f / sim.model.g
+                y.h[i] = -sim.model.f / sim.model.g
             else:
-                g[i] = -sim.model.f / sim.model.g
+                y.g[i] = -sim.model.f / sim.model.g
     for i in range(n):
-        v[i] = measured[i]
+        v[i] = y.v[i]
     return record.FINE
 
 
@@ -596,243 +519,11 @@ def _arrive(sim, data, step):
 @njit(error_model="numpy", inline="always")
 def _zero_inputs(sim, data):
     """Set all commands and disturbances to 0."""
+    exogenous.clear(sim, data)
     for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        _zero_disturbance(data, channel)
-        if channel.ctrl >= 0:
-            data.ctrl[channel.ctrl] = 0.0
-
-
-@njit(error_model="numpy", inline="always")
-def _zero_disturbance(data, channel):
-    """Set the disturbances of a channel to 0."""
-    data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.horizontal] = 0.0, 0.0
-    if channel.qfrc >= 0:
-        data.qfrc_applied[channel.qfrc] = 0.0
-
-
-@njit(error_model="numpy")
-def _apply_pushes(address, sim, data):
-    """Set all disturbances to 0, and apply those of kind `Push`."""
-    for i in range(sim.n):
-        _zero_disturbance(data, channel_at(sim.channels, i))
-    for j in range(sim.disturbance_count):
-        body = disturbance_at(sim.disturbances, j).body
-        for k in range(3 if body >= 0 else 0):
-            data.xfrc_applied[body + k] = 0.0
-    for j in range(sim.disturbance_count):
-        signal = disturbance_at(sim.disturbances, j)
-        if signal.body >= 0:
-            if (
-                _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion)
-                != 0
-            ):
-                return record.RAISED
-            for k in range(3):
-                data.xfrc_applied[signal.body + k] += sim.motion.value * signal.peak[k]
-    return record.FINE
-
-
-@njit(error_model="numpy")
-def _apply_wind(address, sim):
-    """Let the part that has drag push by the wind, whose signals have an axis in each channel."""
-    for i in range(3):
-        sim.wind[i] = 0.0
-    for j in range(sim.disturbance_count):
-        signal = disturbance_at(sim.disturbances, j)
-        sim.instant.stream = signal.stream
-        for i in range(3 if signal.air != 0 else 0):
-            sim.instant.channel = i
-            if (
-                _call(signal.function, i, address + record.AT.instant, address + record.AT.motion)
-                != 0
-            ):
-                return record.RAISED
-            sim.wind[i] += sim.motion.value * signal.peak[i]
-    call(sim.push.function.address, address, address + record.AT.push, 0, 0)
-    return record.FINE
-
-
-@njit(error_model="numpy", inline="always")
-def _add_force(data, channel, force, cartesian):
-    """Add a force to a channel: a horizontal one on its body, or one on its joint, if an actuator
-    acts there.
-    """
-    if cartesian:
-        data.xfrc_applied[channel.horizontal] += force
-    elif channel.ctrl >= 0 and channel.qfrc >= 0:
-        data.qfrc_applied[channel.qfrc] += force
-    elif channel.ctrl >= 0 or channel.gathered >= 0:
-        data.xfrc_applied[channel.xfrc] += channel.sign * force
-
-
-@njit(error_model="numpy")
-def _evaluate_feedback(address, sim, data, signal, i, k):
-    """Write the force of a disturbance that sees the loop: the last one again if k < 0.
-
-    Return 1 if it raised, or 0.
-    """
-    if i > 0 or k < 0:
-        sim.motion.value = pointer(signal.function.memory)[0]
-        return 0
-    channel = channel_at(sim.channels, 0)
-    sample = log_at(sim.log, k * sim.n)
-    instant = sim.instant
-    if k == 0:
-        before = sample.r
-    else:
-        before = log_at(sim.log, (k - 1) * sim.n).r
-    instant.e = data.qpos[channel.qpos] - sample.r
-    instant.de = data.qvel[channel.qvel] - (sample.r - before) / sim.period
-    instant.s = sample.s
-    return _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion)
-
-
-@njit(error_model="numpy")
-def _apply_disturbances(address, sim, data, t, k):
-    """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at
-    all others.
-    """
-    instant = sim.instant
-    motion = sim.motion
-    instant.t = t
-    instant.seed = sim.seed
-    if _apply_pushes(address, sim, data) != record.FINE:
-        return record.RAISED
-    if sim.push.function.address != 0 and _apply_wind(address, sim) != record.FINE:
-        return record.RAISED
-    for j in range(sim.disturbance_count):
-        signal = disturbance_at(sim.disturbances, j)
-        instant.stream = signal.stream
-        if signal.body >= 0 or signal.air != 0:
-            continue
-        for i in range(sim.n):
-            channel = channel_at(sim.channels, i)
-            if signal.sees != 0:
-                raised = _evaluate_feedback(
-                    address,
-                    sim,
-                    data,
-                    signal,
-                    i,
-                    k,
-                )
-            elif (
-                signal.stream != 0.0 or i == 0
-            ):  # without random numbers it is the same in every channel
-                instant.channel = i
-                raised = _call(
-                    signal.function, i, address + record.AT.instant, address + record.AT.motion
-                )
-            else:
-                raised = 0
-            if raised != 0:
-                return record.RAISED
-            _add_force(data, channel, motion.value, signal.cartesian != 0)
-    for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        on_joint = data.xfrc_applied[channel.xfrc]
-        horizontal = data.xfrc_applied[channel.horizontal]
-        if not (math.isfinite(on_joint) and math.isfinite(horizontal)):
-            return record.DISTURBANCE_NOT_FINITE
-        if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
-            return record.DISTURBANCE_NOT_FINITE
-    return record.FINE
-
-
-@njit(error_model="numpy", inline="always")
-def _clear_joints(sim, data):
-    """Take what parts exerted at the last stage from the joints."""
-    for i in range(sim.n if sim.exerts != 0 else 0):
-        data.qfrc_applied[channel_at(sim.channels, i).qvel] = 0.0
-        state_at(sim.states, i).exerted = 0.0
-
-
-@njit(error_model="numpy", inline="always")
-def _keep_reach(reach, data):
-    """Keep where the arrays are that `act` and `push` reach."""
-    reach.qpos = place(data.qpos)
-    reach.qvel = place(data.qvel)
-    reach.ctrl = place(data.ctrl)
-    reach.xfrc_applied = place(data.xfrc_applied)
-    reach.qfrc_applied = place(data.qfrc_applied)
-    reach.actuator_force = place(data.actuator_force)
-    reach.actuator_user = data.actuator_user
-    reach.body_user = data.body_user
-
-
-@njit(error_model="numpy")
-def _act(address, sim, data):
-    """Let the parts act at a stage, in their order."""
-    for j in range(sim.part_count):
-        part = part_at(sim.parts, j)
-        if part.acts != 0:
-            call(part.function.address, address, sim.parts + PART_BYTES * j, 0, 0)
-        elif (part.staged != 0 or sim.stage == 0) and _exert(address, sim, data, part) != 0:
-            return record.RAISED
-    for i in range(sim.n if sim.exerts != 0 else 0):
-        data.qfrc_applied[channel_at(sim.channels, i).qvel] += state_at(sim.states, i).exerted
-    return record.FINE
-
-
-@njit(error_model="numpy")
-def _exert(address, sim, data, part):
-    """Give a joint the force of a part. Return 1 if that raised or is no number, or 0."""
-    i = part.channel
-    channel = channel_at(sim.channels, i)
-    state = state_at(sim.states, i)
-    drive = drive_at(sim.drives, i)
-    joint = channel.qvel
-    y = sim.joint_state
-    pushed = generalised_disturbance(data, channel)
-    y.t = sim.now * sim.step
-    y.h = sim.step
-    y.x = data.qpos[channel.qpos]
-    y.v = data.qvel[joint]
-    y.u = state.delayed
-    y.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
-    y.load += data.qfrc_constraint[joint] + pushed
-    held = data.qfrc_constraint[joint]
-    # the stops of a play pass on the drive's force: on shaft and joint they cancel
-    if channel.shaft >= 0 and channel.shaft != joint:
-        y.load += data.qfrc_constraint[channel.shaft]
-        held += data.qfrc_constraint[channel.shaft]
-    if part.row >= 0:  # without what dry friction took of the constraints' force
-        y.load -= min(max(held, -state.level), state.level)
-    y.motor = 0.0
-    weight = 1.0
-    if part.staged != 0:
-        y.stage = sim.stage
-        if channel.ctrl >= 0:
-            y.motor = torque(drive.torque, data.ctrl[channel.ctrl], y.v)
-        y.mean = state.middle if drive.sums_force != 0.0 else y.motor
-        y.others = data.qfrc_passive[joint] - data.qfrc_bias[joint] + pushed
-        y.level = data.dof_frictionloss[joint]
-        y.mobility = data.qLDiagInv[joint]
-        weight = 6.0 if sim.stage % 3 == 0 else 3.0  # the first stage, or the last
-    elif channel.force >= 0:
-        y.motor = data.actuator_force[channel.force]
-    sim.seen.i = i
-    out = sim.exerted
-    if _call(part.function, 0, address + record.AT.joint_state, address + record.AT.exerted) != 0:
-        return 1
-    if sim.stage == 0 and not abs(out.force) < MAX_CONTROL:
-        return 1
-    if part.row >= 0:
-        state.level = data.dof_frictionloss[joint] + out.grip
-        if not state.level < MAX_CONTROL:
-            return 1
-        if place(data.efc_frictionloss) != 0:  # MuJoCo has had room for its constraints
-            data.efc_frictionloss[part.row] = state.level
-            data.efc_aref[part.row] -= out.away / (sim.step * sim.step)
-    if part.ctrl >= 0:
-        data.ctrl[part.ctrl] = out.force
-        return 0
-    state.exerted += out.force
-    state.reaction += out.force / weight
-    if part.staged != 0:
-        state.held += out.grip
-    return 0
+        ctrl = channel_at(sim.channels, i).ctrl
+        if ctrl >= 0:
+            data.ctrl[ctrl] = 0.0
 
 
 @njit(error_model="numpy", inline="always")

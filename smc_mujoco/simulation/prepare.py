@@ -435,12 +435,8 @@ def _joint_measurement(
     s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: Functions
 ) -> dict[str, Any]:
     """Return the fields of a record that only a law of many joints has."""
-    stored = joint_law.stored_dtype(s.plant.n)
-    head = buffer.reserve(stored.itemsize // 8)
-    arrays = {}
-    for name, (_, offset, *_) in (stored.fields or {}).items():
-        arrays[name] = state.Index(head + offset // 8)
-    fields: dict[str, Any] = {"joint": arrays | {"head": head}}
+    size = joint_law.stored_dtype(s.plant.n).itemsize // 8
+    fields: dict[str, Any] = {"joint": buffer.reserve(size)}
     if nominal is not None:
         fields["handle"] = {
             **s.plant.nominal.handles(),

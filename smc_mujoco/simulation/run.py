@@ -564,7 +564,7 @@ class ScenarioBatch:
         memory = state.view(numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
         if s.law.joint:
             law = s.law
-            y = int(record["joint"]["head"])
+            y = int(record["joint"])
         else:
             law = s.law.of_channel(channel)
             memory = memory[channel]

@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.common.jit import floats, record_at
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import ARRAYS, HANDLE
+from smc_mujoco.control.joint_law import HANDLE
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.moments import (
     FUNCTION,
@@ -27,7 +27,7 @@ from smc_mujoco.mechanisms.hardware.moments import (
 from smc_mujoco.mechanisms.plant import SEEN
 
 # Inputs and outputs of functions.
-#   law: MEASUREMENT, or the numbers at JOINT_MEASUREMENT -> u and s, one or n of each
+#   law: MEASUREMENT, or the measurement of a law of many joints -> u and s, one or n of each
 #   surface: MEASUREMENT -> SLIDING; estimator: READING -> ESTIMATE; nominal model: SEEN -> MODEL
 #   reference and disturbance: INSTANT -> MOTION; sensor: SIGHT -> RAW
 #   force of a part: JOINT_STATE -> EXERTED
@@ -44,10 +44,6 @@ JOINT_STATE = floats(JointState._fields)
 # grip: the level of dry friction, N m (N), of a `brake`; for how many s it holds the joint, of a
 # `stage_force`
 EXERTED = floats(("force", "grip", "away"))
-
-# Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
-# and of its arrays.
-JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
 
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable,
 # disturbance, reference, the drive's force, what friction and contacts exert.
@@ -171,10 +167,10 @@ SIMULATION = np.dtype(
         # (2, width)
         ("width", "i8"),
         ("commands", "i8"),
-        # a law of many joints: its measurement, all 0 for a law of one channel; the nominal M, h
-        # and g (0: from `nominal`, one equation per channel), and the functions of C and of the
-        # tip's Jacobian (0: there are none)
-        ("joint", JOINT_MEASUREMENT),
+        # a law of many joints: the address of its measurement, see control/joint_law.py, and 0 for
+        # a law of one channel; the nominal M, h and g (0: from `nominal`, one equation per
+        # channel), and the functions of C and of the tip's Jacobian (0: there are none)
+        ("joint", "i8"),
         ("dynamics", FUNCTION),
         ("handle", HANDLE),
         # inputs and outputs of functions

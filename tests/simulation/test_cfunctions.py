@@ -272,7 +272,7 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
     In a law it ends the run.
     """
     from smc_mujoco.control import law
-    from smc_mujoco.simulation import controller, philox, signals, time_series
+    from smc_mujoco.simulation import controller, exogenous, parts, philox, signals, time_series
 
     def models(*modules):
         found = []
@@ -283,7 +283,7 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
         own = [one for module, one in found if one.py_func.__module__ == module.__name__]
         return [one.targetoptions.get("error_model", "python") for one in own]
 
-    callbacks = models(controller, philox, signals, time_series)
+    callbacks = models(controller, exogenous, parts, philox, signals, time_series)
     assert len(callbacks) > 20
     assert set(callbacks) == {"numpy"}
     assert set(models(law)) == {"python"}

@@ -35,7 +35,7 @@ from smc_mujoco.analysis.engine.scores import own, tallying
 from smc_mujoco.common.jit import call, named, place
 from smc_mujoco.common.numba_internals import arrayobj, cgutils
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import head_at, measurement_at
+from smc_mujoco.control.joint_law import begun, put_channel
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.drives import kept_at
 from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
@@ -459,27 +459,15 @@ def _asking_all(form: Form, refer: Any, compile_user: Compiler) -> Any:
     def measure(row, tables, work, t):
         for i in range(size):
             work[MEASURED + i] = 0.0
-        head = head_at(place(work) + 8 * MEASURED, 0)
-        head.t = t
-        head.dt = row[PERIOD]
-        head.model = row[USES_MODEL]
-        head.n = n
-        head.driven = driven
-        y = measurement_at(place(work) + 8 * MEASURED)
+        address = place(work) + 8 * MEASURED
+        y = begun(address, t, row[PERIOD], row[USES_MODEL], 0, n, driven)
         known = values(row, KNOWN)
         xs = view(work, SEEN_X, n)
         vs = view(work, SEEN_V, n)
         for i in range(n):
-            y.r[i], y.dr[i], y.ddr[i] = refer(row, tables, work, t, i)
-            work[R + i] = y.r[i]
-            y.x[i] = xs[i]
-            y.v[i] = vs[i]
-            y.e[i] = xs[i] - y.r[i]
-            y.de[i] = vs[i] - y.dr[i]
-            y.a[i] = work[SEEN_A + i]
-            if math.isnan(y.a[i]):
-                y.a[i] = y.ddr[i]
-            y.limit[i] = row[LIMITS + i]
+            r, dr, ddr = refer(row, tables, work, t, i)
+            work[R + i] = r
+            put_channel(y, i, xs[i], vs[i], work[SEEN_A + i], row[LIMITS + i], r, dr, ddr)
             y.M[i, i] = 1.0
             if row[USES_MODEL] != 0.0:  # M is diagonal
                 f, g = nominal(xs, vs, i, known)

@@ -25,6 +25,8 @@ simulation/state.py, the Reach of its mjData, and their PART. They write ctrl, a
 exert in the channel's state.
 """
 
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
 import dataclasses
 import math
 from collections import namedtuple
@@ -36,7 +38,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from smc_mujoco.common.jit import floats, record_at
+from smc_mujoco.common.jit import call, floats, record_at
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
 #   qpos, qvel, ctrl: in the arrays of these names
@@ -148,6 +150,15 @@ REACH = np.dtype([(name, "i8") for name in Reach._fields])  # their addresses
 channel_at, state_at, drive_at, reader_at, function_at, part_at = map(
     record_at, (CHANNEL, CHANNEL_STATE, DRIVE, READER, FUNCTION, PART)
 )
+
+
+@njit(error_model="numpy", inline="always")
+def raises(function, i, inputs, outputs):
+    """Call a FUNCTION for channel i, with the addresses of its inputs and outputs. Return whether
+    it raised.
+    """
+    memory = function.memory + i * function.stride
+    return call(function.address, inputs, function.parameters, memory, outputs) != 0
 
 
 @njit(error_model="numpy", inline="always")

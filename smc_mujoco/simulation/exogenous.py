@@ -1,0 +1,172 @@
+"""The signals of a run, as the control callback evaluates them: references, measurement errors, and
+disturbances, of which each kind acts in its own way.
+
+Functions take what those of the controller take, and return a failure code of state.py, unless they
+say otherwise.
+"""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import math
+
+from numba import njit
+
+from smc_mujoco.common.jit import call, pointer
+from smc_mujoco.mechanisms.hardware.moments import channel_at, function_at, raises
+from smc_mujoco.simulation import state as record
+from smc_mujoco.simulation.state import disturbance_at, log_at
+
+
+@njit(error_model="numpy", inline="always")
+def signal_raises(address, signal, i):
+    """Write the value of a signal in channel i, at the record's instant, into its motion.
+
+    Return whether the signal raised.
+    """
+    return raises(signal, i, address + record.AT.instant, address + record.AT.motion)
+
+
+@njit(error_model="numpy", inline="always")
+def measurement_error(address, sim, signal, t):
+    """Return a measurement error at time t, s:
+
+    NaN if its signal raised, -0 (which changes no bit) without a signal.
+    """
+    if signal.address == 0:
+        return -0.0
+    sim.instant.t = t
+    if signal_raises(address, signal, 0):
+        return math.nan
+    return sim.motion.value
+
+
+@njit(error_model="numpy", inline="always")
+def reference_raises(address, sim, k, i):
+    """Write the reference of channel i into the record and the log. Return whether it raised."""
+    if sim.references != 0:
+        if signal_raises(address, function_at(sim.references, i), 0):
+            return True
+    elif i == 0 and signal_raises(address, sim.reference, 0):
+        return True
+    log_at(sim.log, k * sim.n + i).r = sim.motion.value
+    return False
+
+
+@njit(error_model="numpy")
+def disturb(address, sim, data, t, k):
+    """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at
+    all others.
+    """
+    sim.instant.t = t
+    sim.instant.seed = sim.seed
+    clear(sim, data)
+    wind = sim.push.function.address != 0
+    if _push_bodies(address, sim, data) or (wind and _blow(address, sim)):
+        return record.RAISED
+    for j in range(sim.disturbance_count):
+        signal = disturbance_at(sim.disturbances, j)
+        if signal.body < 0 and signal.air == 0 and _load(address, sim, data, signal, k):
+            return record.RAISED
+    for i in range(sim.n):
+        channel = channel_at(sim.channels, i)
+        on_joint = data.xfrc_applied[channel.xfrc]
+        horizontal = data.xfrc_applied[channel.horizontal]
+        if not (math.isfinite(on_joint) and math.isfinite(horizontal)):
+            return record.DISTURBANCE_NOT_FINITE
+        if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
+            return record.DISTURBANCE_NOT_FINITE
+    return record.FINE
+
+
+@njit(error_model="numpy")
+def clear(sim, data):
+    """Set all disturbances to 0."""
+    for i in range(sim.n):
+        channel = channel_at(sim.channels, i)
+        data.xfrc_applied[channel.xfrc] = 0.0
+        data.xfrc_applied[channel.horizontal] = 0.0
+        if channel.qfrc >= 0:
+            data.qfrc_applied[channel.qfrc] = 0.0
+    for j in range(sim.disturbance_count):
+        body = disturbance_at(sim.disturbances, j).body
+        for axis in range(3 if body >= 0 else 0):
+            data.xfrc_applied[body + axis] = 0.0
+
+
+@njit(error_model="numpy")
+def _push_bodies(address, sim, data):
+    """Apply the disturbances of kind `Push`, forces in space. Return whether one raised."""
+    for j in range(sim.disturbance_count):
+        signal = disturbance_at(sim.disturbances, j)
+        if signal.body >= 0:
+            if signal_raises(address, signal.function, 0):
+                return True
+            for axis in range(3):
+                data.xfrc_applied[signal.body + axis] += sim.motion.value * signal.peak[axis]
+    return False
+
+
+@njit(error_model="numpy")
+def _blow(address, sim):
+    """Let the part that has drag push by the wind, whose signals have an axis in each channel.
+
+    Return whether one raised.
+    """
+    for axis in range(3):
+        sim.wind[axis] = 0.0
+    for j in range(sim.disturbance_count):
+        signal = disturbance_at(sim.disturbances, j)
+        sim.instant.stream = signal.stream
+        for axis in range(3 if signal.air != 0 else 0):
+            sim.instant.channel = axis
+            if signal_raises(address, signal.function, axis):
+                return True
+            sim.wind[axis] += sim.motion.value * signal.peak[axis]
+    call(sim.push.function.address, address, address + record.AT.push, 0, 0)
+    return False
+
+
+@njit(error_model="numpy")
+def _load(address, sim, data, signal, k):
+    """Apply a disturbance that is a force on every channel. Return whether it raised."""
+    instant = sim.instant
+    instant.stream = signal.stream
+    for i in range(sim.n):
+        channel = channel_at(sim.channels, i)
+        if signal.sees != 0:
+            if _feedback_raises(address, sim, data, signal.function, i, k):
+                return True
+        elif signal.stream != 0.0 or i == 0:  # without random numbers all channels have the same
+            instant.channel = i
+            if signal_raises(address, signal.function, i):
+                return True
+        force = sim.motion.value
+        if signal.cartesian != 0:
+            data.xfrc_applied[channel.horizontal] += force
+        elif channel.ctrl >= 0 and channel.qfrc >= 0:
+            data.qfrc_applied[channel.qfrc] += force
+        elif channel.ctrl >= 0 or channel.gathered >= 0:
+            data.xfrc_applied[channel.xfrc] += channel.sign * force
+    return False
+
+
+@njit(error_model="numpy")
+def _feedback_raises(address, sim, data, function, i, k):
+    """Write the force of a disturbance that sees the loop: the last one again if k < 0.
+
+    Return whether it raised.
+    """
+    if i > 0 or k < 0:
+        sim.motion.value = pointer(function.memory)[0]
+        return False
+    channel = channel_at(sim.channels, 0)
+    sample = log_at(sim.log, k * sim.n)
+    instant = sim.instant
+    if k == 0:
+        before = sample.r
+    else:
+        before = log_at(sim.log, (k - 1) * sim.n).r
+    instant.e = data.qpos[channel.qpos] - sample.r
+    instant.de = data.qvel[channel.qvel] - (sample.r - before) / sim.period
+    instant.s = sample.s
+    return signal_raises(address, function, 0)
