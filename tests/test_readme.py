@@ -173,8 +173,10 @@ def test_readme_s_command_gives_the_winners_of_its_table(tmp_path):
     (tmp_path / "my_law.py").write_text(titled(PAGES[0])["my_law.py"])
     (line,) = [line for line in commands(README) if line.startswith("smc-mujoco compare ")]
     done = python("-m", "smc_mujoco", *shlex.split(line)[1:], folder=tmp_path, COLUMNS="200")
-    printed = re.findall(r"^(.+?) on .*?: (\w+) wins: (\S+) of (\w+)", done.stdout, re.MULTILINE)
-    shown = re.findall(r"(\w[\w ]*): `(\w+)`\s+wins, with (\S+) of `(\w+)`", README)
+    printed = re.findall(
+        r"(?m)^(.+?) on .*: (\w+) wins; its value is (\S+) times (\w+)", done.stdout
+    )
+    shown = re.findall(r"(\w[\w ]*): `(\w+)`\swins;\sits\svalue\sis\s(\S+)\stimes\s`(\w+)`", README)
     assert sorted((metric.lower(), *rest) for metric, *rest in printed) == sorted(
         (metric.lower(), *rest) for metric, *rest in shown
     )

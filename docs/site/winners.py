@@ -42,7 +42,7 @@ def verdict(comparison: Comparison) -> str:
         return f"{winner} beats B"
     if comparison.level[0, 0, 1]:
         return f"level within {100 * LEVEL_SHARE:.0f} %"
-    return f"cannot tell (detects {100 * comparison.visible(0, 'A', 'B'):.0f} %)"
+    return f"cannot tell (detects a {100 * comparison.visible(0, 'A', 'B'):.0f} % lead)"
 
 
 def draw(file: Path = FILE) -> None:
@@ -67,8 +67,8 @@ def draw(file: Path = FILE) -> None:
             ax.plot(100 * as_run, rows, "o", ms=3, mfc="none", color=style.MUTED)
             ax.plot(100 * charged, rows, "o", ms=3, color="#0072B2")
             ax.text(-65, -row + 0.3, name, va="bottom", color=style.MUTED)
-            ax.text(64, -row + 0.3, verdict(comparison), va="bottom", ha="right", weight="bold")
-        ax.set(xlim=(-67, 66), ylim=(-3.4, 0.8), yticks=[], xlabel="lead of A over B in a run (%)")
+            ax.text(66, -row + 0.3, verdict(comparison), va="bottom", ha="right", weight="bold")
+        ax.set(xlim=(-67, 67), ylim=(-3.4, 0.8), yticks=[], xlabel="lead of A over B in a run (%)")
         ax.set_xticks([-50, -25, 0, 25, 50])
         ax.spines["left"].set_visible(False)
         figure.savefig(file, metadata={"Date": None, "Creator": None})

@@ -3,7 +3,6 @@ which every law ran.
 """
 
 import contextlib
-import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -367,11 +366,7 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
 
 
 def floor_words(scenario: Scenario | None, metric: str) -> str:
-    """Return q in words, such as "the sensor's 0.01 rad"; "" where it is not known."""
+    """Return q in words, such as "0.01 rad"; "" where it is not known."""
     if not (q := floor(scenario, metric)) or scenario is None:
         return ""
-    unit = CATALOGUE[metric].unit_in(scenario)
-    whose = "problem"
-    if q > floor(dataclasses.replace(scenario, noise=None, sensor=None), metric):
-        whose = "sensor"
-    return f"the {whose}'s {q:.3g} {unit}".replace("e-0", "e-")
+    return f"{q:.3g} {CATALOGUE[metric].unit_in(scenario)}".replace("e-0", "e-")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH = 20  # characters of a name before it is broken
 HEADING_WIDTH = 8  # characters of a heading at least
+NARROW_WIDTH = 12  # characters of a line below a number where space is short
 MAX_HTML_ROWS = 40
 NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH_HINT = (
@@ -106,8 +107,8 @@ class Tabular:
             yield Text(note)
 
     def _columns(self, width: int) -> "list[list[Text]]":
-        """Return the columns of names, then those of numbers, with wide intervals on two lines
-        where space is short.
+        """Return the columns of names, then those of numbers, the widest ones narrow where space
+        is short.
         """
         names = [self._names(i) for i in range(self.left)]
         numbers = range(self.left, len(self.headings))
@@ -139,13 +140,13 @@ class Tabular:
     def _column(self, i: int, narrow: bool = False) -> "list[Text]":
         """Return the heading and the cells of a column of numbers.
 
-        If `narrow`, intervals are on two lines.
+        If `narrow`, the lines below its numbers are broken, an interval after its dash.
         """
         from rich.text import Text
 
         cells = [_cell(row[i]) for row in self.rows]
         if narrow:
-            cells = [cell._replace(below=cell.below.replace("–", "–\n")) for cell in cells]
+            cells = [cell._replace(below=_narrow(cell.below)) for cell in cells]
         pad = " " if any(cell.strong for cell in cells) else ""  # below the stars
         texts = []
         for cell in cells:
@@ -158,10 +159,7 @@ class Tabular:
             texts.append(text)
         width = max([HEADING_WIDTH, *map(_width, texts)])
         whole = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
-        heading = "\n".join(textwrap.wrap(whole, width, break_long_words=False)).replace(
-            NO_BREAK, " "
-        )
-        return [Text(heading), *texts]
+        return [Text(_wrapped(whole, width)), *texts]
 
     def _repr_html_(self) -> str:
         from smc_mujoco.common import html
@@ -290,6 +288,17 @@ def _value(cell: Cell | str) -> object:
         return float(cell)
     except ValueError:
         return cell
+
+
+def _wrapped(text: str, width: int) -> str:
+    """Return a text on lines of a width, broken only at spaces that may break."""
+    return "\n".join(textwrap.wrap(text, width, break_long_words=False)).replace(NO_BREAK, " ")
+
+
+def _narrow(text: str) -> str:
+    """Return a text on narrow lines; a number stays with its unit."""
+    lines = re.sub(r"(\d) ", rf"\1{NO_BREAK}", text.replace("–", "–\n")).splitlines()
+    return "\n".join(_wrapped(line, NARROW_WIDTH) for line in lines)
 
 
 def _width(text: "Text") -> int:

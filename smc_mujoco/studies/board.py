@@ -20,7 +20,7 @@ from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
-LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
+LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
@@ -38,18 +38,22 @@ MARKS = (
     "A mark: no law is better, every run has arrived, and there are enough samples to see a lead. "
     "Arrived: in the last fifth of the run the error stays within 10 % of the start, or within 5 "
     "times the sensor's resolution. "
-    "'detects 24 %': a lead of 24 % between the law and the one in front would have been seen in "
-    f"{100 * POWER:g} % of such comparisons; 'detects no lead': no lead would have been, however "
-    "large. 'never', 'fails' and 'not arrived' rank behind every value. 'by the step': the medians "
-    f"at the physics step and at half of it, where they differ by more than {APART}; {RANGE}."
+    "'detects a 24 % lead': a lead of 24 % between the law and the one in front would have been "
+    f"seen in {100 * POWER:g} % of such comparisons; 'detects no lead': no lead, however large, "
+    "would have been seen. 'never', 'fails' and 'not arrived' rank behind every value. 'below 0.01 "
+    "rad': below the floor, the least that the problem can show (half a count of the encoder, the "
+    f"noise, 1e-4 of the start, or {100 * MIN_COMMAND_SHARE:g} % of the bound on u); such values "
+    "count as equal. "
+    "'by the step': the medians at the physics step and at half of it, where they differ by more "
+    f"than {APART}; {RANGE}."
 )
 
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval]; bold: no law is better.",
-    "detects": f"Detects 24 %: a lead of 24 % would be seen in {100 * POWER:g} % of such tests.",
+    "detects": f"Detects a 24 % lead: it would be seen in {100 * POWER:g} % of such tests.",
     "no lead": "Detects no lead: too few runs to see any lead.",
-    "below": "Below: smaller than what the problem can show; laws below it are not ranked.",
+    "below": "Below 0.01 rad: below the least that the problem can show; such laws are not ranked.",
     "by the step": "By the step: the median at the physics step, and at half of it.",
 }
 
@@ -74,30 +78,30 @@ class Lead(NamedTuple):
     law: str
     rival: str
     effect: Effect
-    floor: str = ""  # in words, if the law is below it and the rival is not
+    floor: str = ""  # in words, if the law is below it and the rival is not, else ""
     lacking: str = ""  # how many runs of the rival have no value, such as "5 of 24"
 
     @property
     def words(self) -> str:
-        """The ratio with its interval, such as "0.88 of pid's (0.84 to 0.92), ahead in 24 of 24
-        runs"; "5 of 24 runs of pid have no value, ahead in 24 of 24 runs"; "a is below the
-        sensor's 0.01 rad, b is not: at least 1.3 times less".
+        """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), ahead in 24 of
+        24 runs"; "there in every run, while pid has none in 5 of 24, ahead in 24 of 24 runs";
+        "below the floor of 0.01 rad, and pid's is at least 1.3 times that".
         """
         ratio, low, high = map(number, self.effect[:3])
         if self.floor:
-            text = f"{self.law} is below {self.floor}, {self.rival} is not"
             least = 1.0 / self.effect.high
             if least < MIN_TIMES:
-                return text
-            return f"{text}: at least {number(least)} times less"
+                return f"below the floor of {self.floor}, unlike {self.rival}'s"
+            text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
+            return f"{text} {number(least)} times that"
         if self.effect.sets:
             samples = "sets of gains"
         else:
             samples = "runs"
         ahead = f"ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
         if self.lacking:
-            return f"{self.lacking} runs of {self.rival} have no value, {ahead}"
-        return f"{ratio} of {self.rival}'s ({low} to {high}), {ahead}"
+            return f"there in every run, while {self.rival} has none in {self.lacking}, {ahead}"
+        return f"{ratio} times {self.rival}'s ({low} to {high}), {ahead}"
 
 
 @named_data
@@ -112,7 +116,7 @@ class Block:
     best: Names  # laws that no other is better than, of which every run has arrived
     worse: Names  # laws that another is better than
     below: Names  # laws below the floor, which are not ranked among themselves
-    floor: str  # in words, such as "the sensor's 0.01 rad"; "" where it is not known
+    floor: str  # in words, such as "0.01 rad"; "" where it is not known
     away: Names  # laws with runs that failed or have not arrived, which do not win
     ahead: str | None  # the law that is better than every other, laws with default gains included
     # None for one law, for "settles", or if the law in front has runs without a value
@@ -154,7 +158,7 @@ class Block:
         names = joined(low)
         if len(low) == len(self.medians) == 2:
             names = "both"
-        return f"{names} are below {self.floor}, so not ranked"
+        return f"{names} are below the floor of {self.floor}, so they are not ranked"
 
     @property
     def sample(self) -> str:
@@ -224,7 +228,7 @@ class Board(Tables):
     def where(self) -> str:
         """The plant and the conditions in words, such as " on duffing under noise"."""
         if self.metric == OBJECTIVE:
-            return f" on {self.group['plant']}"
+            return f" of {self.group['plant']}"
         conditions = joined([block.condition for block in self.blocks])
         return f" on {self.group['plant']} under {conditions}"
 
@@ -236,33 +240,35 @@ class Board(Tables):
     @property
     def result(self) -> str:
         """The winner and its least lead; else where laws win and lose; else why none wins."""
-        where = ""
+        where = at_worst = ""
         if len(self.blocks) > 1:
             where = f" in {every(len(self.blocks))} conditions"
+            at_worst = "at worst "
         given = ""
         if any(block.given for block in self.blocks):
             given = ", for these gains"
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
             if leads:
-                where += f": {max(leads, key=lambda lead: lead.effect.high).words}"
+                least = max(leads, key=lambda lead: lead.effect.high)
+                where += f"; {at_worst}its value is {least.words}"
             return f"{self.winner} wins{where}{given}"
         results = []
         for entry in self.entries:
             if wins := self.wins(entry.law):
                 lost = joined(self.losses(entry.law)) or "none"
-                results.append(f"{entry.law} wins under {joined(wins)}, loses under {lost}")
+                results.append(f"{entry.law} wins under {joined(wins)} and loses under {lost}")
         if results:
-            return f"no winner{where}: {'; '.join(results)}{given}"
-        return f"no winner: {self._why}"
+            return f"no law wins{where}; {'; '.join(results)}{given}"
+        return f"no winner; {self._why}"
 
     @property
     def _why(self) -> str:
         """Why no law wins in any block."""
         if len(self.entries) == 1:
-            return "one law"
+            return "there is one law"
         if self.barred:
-            return f"none is named over {joined(self.barred)} with default gains"
+            return f"none is named over the default gains of {joined(self.barred)}"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
         reasons = dict.fromkeys(block.unranked or self.too_few for block in self.blocks)
@@ -286,7 +292,9 @@ class Board(Tables):
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         for block in self.blocks:
             if block.lead and block.lead.floor:
-                return f"{names} are undefeated; {block.lead.words}"
+                return (
+                    f"{names} are undefeated; the value of {block.lead.law} is {block.lead.words}"
+                )
         seen = []
         for lead in map(self.visible, self.best):
             if not math.isnan(lead):
@@ -328,7 +336,7 @@ class Board(Tables):
         if largest.sets > 1:
             few = "sets of gains"
             cure = "give more searches, or leave out quick"
-        return f"too few {few} ({largest.samples}): a verdict needs at least {least}; {cure}"
+        return f"too few {few} ({largest.samples}) for a verdict, which needs {least}: {cure}"
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, have not arrived, or never reach a time, such as
@@ -472,12 +480,12 @@ def _cell(board: Board, entry: Entry) -> Cell:
 
 
 def _detects(lead: float, silent: int) -> str:
-    """Return the least lead that would have been seen, such as "detects 24 %"."""
+    """Return the least lead that would have been seen, such as "detects a 24 % lead"."""
     if silent:
         return "detects no lead"
     if lead >= MAX_VISIBLE:
-        return f"detects {number(1.0 / (1.0 - lead))} times less"
-    return f"detects {100 * lead:.2g} %"
+        return f"detects a {number(1.0 / (1.0 - lead))}-fold lead"
+    return f"detects a {100 * lead:.2g} % lead"
 
 
 def key(boards: Sequence[Board]) -> str:
@@ -487,7 +495,7 @@ def key(boards: Sequence[Board]) -> str:
         "A winner is better than every other law in a paired test, corrected for "
         f"{counted(family, 'comparison')} per metric. The rival that a verdict names is the one "
         "hardest to tell from the winner. A lead is measured on pairs of runs, not on medians. "
-        f"Ahead means by more than {relevance(boards[0].relevant)}."
+        f"Ahead means by more than {100 * boards[0].relevant:g} % of the larger value."
     )
     parts = [MEDIANS, MARKS, winner]
     if any(board.by_step for board in boards):
@@ -495,15 +503,6 @@ def key(boards: Sequence[Board]) -> str:
     if gains := in_words(sources(boards)):
         parts.append(f"{capital(gains)}.")
     return " ".join(parts)
-
-
-def relevance(share: float) -> str:
-    """Return the least relevant difference in words."""
-    return (
-        f"{100 * share:g} % of the larger value; values too small for the problem to show count "
-        "as equal (below half a count of the encoder, the noise, 1e-4 of the start, or "
-        f"{100 * MIN_COMMAND_SHARE:g} % of the bound on u)"
-    )
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:
@@ -520,4 +519,4 @@ def _verdicts(boards: Sequence[Board]) -> list[str]:
     labels: dict[str, list[str]] = {}
     for board in boards:
         labels.setdefault(f"{board.where}: {board.result}.", []).append(board.label)
-    return [f"{', '.join(names)}{result}" for result, names in labels.items()]
+    return [f"{joined(names)}{result}" for result, names in labels.items()]

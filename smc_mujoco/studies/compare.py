@@ -98,16 +98,16 @@ class Compared(Tables):
     @property
     def remarks(self) -> list[str]:
         """Remarks on the gains: which laws have their defaults, and why."""
-        plants_of: dict[str, list[str]] = {}
+        plants_of: dict[tuple[str, str], list[str]] = {}
         for plant, candidates in self.candidates.items():
             for candidate in candidates:
                 words = [candidate.remark]
                 if candidate.law.source.kind == source.DEFAULT:
                     words.insert(0, "default gains")
                 if any(words):
-                    text = f"{candidate.law.name}: {'; '.join(filter(None, words))}"
-                    plants_of.setdefault(text, []).append(plant)
-        return [f"{words} (on {joined(plants)})" for words, plants in plants_of.items()]
+                    key = candidate.law.name, "; ".join(filter(None, words))
+                    plants_of.setdefault(key, []).append(plant)
+        return [f"{law} on {joined(on)}: {words}" for (law, words), on in plants_of.items()]
 
     @property
     def tables(self) -> list[Tabular]:

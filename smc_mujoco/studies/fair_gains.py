@@ -337,7 +337,7 @@ class Trial(NamedTuple):
         left out.
         """
         found = {}
-        words = "J on runs that no search has seen"
+        words = "J on unseen runs"
         laws = sum(map(len, candidates.values()))
         with bar(words, laws, self.progress, counted=True) as shown:
             for plant in self.plants:
@@ -387,5 +387,5 @@ def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
     best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
     remark = ""
     if names := list(search_space.without_unit(default)):
-        remark = f"searched about the default, for want of a unit: {joined(names)}"
+        remark = f"no unit is given for {joined(names)}, so the search is centred on the default"
     return Candidate(best, tuple(sets), remark)

@@ -73,7 +73,7 @@ class Advice(Tables):
         gains = ", ".join(f"{name}={gain_text(value)}" for name, value in first.gains.items())
         return [
             f"Use: {self._name}",
-            f"Gains: {gains or 'none'} ({first.source})",
+            f"Gains: {gains or 'none'}, {first.source}",
             f"Second: {self.second or 'none'}",
             f"How sure: {self._sure}",
         ]
@@ -82,7 +82,7 @@ class Advice(Tables):
     def _name(self) -> str:
         """The first law's name, or a sentence if it does not settle reliably."""
         if self.settles[self.law.name] < RELIABLE:
-            return f"none settles reliably, nearest: {self.law.name}"
+            return f"no law settles reliably; the nearest is {self.law.name}"
         return self.law.name
 
     @property
@@ -95,9 +95,9 @@ class Advice(Tables):
         if len(self.laws) < 2:
             return "there is no second law"
         if barred := [law for board in boards for law in board.barred if law != self.law.name]:
-            return f"first so far: {barred[0]} has default gains (defaults=True, --defaults)"
+            return f"first so far; {barred[0]} has default gains (defaults=True, --defaults)"
         if all(board.too_few for board in boards):
-            return f"first so far: {boards[0].too_few}"
+            return f"first so far; {boards[0].too_few}"
         name = self.law.name
         blocks = sum(len(board.blocks) for board in boards)
         wins = sum(len(board.wins(name)) for board in boards)
@@ -105,7 +105,7 @@ class Advice(Tables):
         text = f"it wins {wins} of {blocks} comparisons, and another law is better in {losses}"
         if wins:
             return text
-        return f"first so far: {text}"
+        return f"first so far; {text}"
 
     @property
     def tables(self) -> list[Tabular]:

@@ -704,16 +704,16 @@ def test_the_smallest_value_that_matters_by_hand(scenario, metric, floor):
 
 
 SHOWN = [
-    (NOISY, "the sensor's 0.02 m"),
-    (COARSE, "the sensor's 0.01 m"),
-    (FINE, "the problem's 0.00015 m"),
+    (NOISY, "0.02 m"),
+    (COARSE, "0.01 m"),
+    (FINE, "0.00015 m"),
 ]
 BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
-    ((0.3, 0.9), None, "both are below {q}, so not ranked"),
-    ((0.5, 0.6, 3.0), None, "a and b are below {q}, so not ranked"),
-    ((0.5, 1.01), None, "a is below {q}, b is not"),
-    ((0.5, 4.0, 5.0), "a", "a wins: a is below {q}, b is not: at least 4."),
-    ((2.0, 3.0), "a", "a wins: 0.6"),
+    ((0.3, 0.9), None, "both are below the floor of {q}, so they are not ranked"),
+    ((0.5, 0.6, 3.0), None, "a and b are below the floor of {q}, so they are not ranked"),
+    ((0.5, 1.01), None, "a is below the floor of {q}, unlike b's"),
+    ((0.5, 4.0, 5.0), "a", "a wins; its value is below the floor of {q}, and b's is at least 4."),
+    ((2.0, 3.0), "a", "a wins; its value is 0.6"),
     ((2.0, 2.0), None, "level within 10 %"),
 ]
 
@@ -736,7 +736,7 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
     if "both" in words:  # and in another condition neither is
         two = {law: np.vstack([scores[law], 9.0 * scores["a"]]) for law in "ab"}
         table = table_of(two, "ultimate_bound", scenario=np.tile(rows, 2))
-        both = f"both are below {q} under c0, so not ranked"
+        both = f"both are below the floor of {q} under c0, so they"
         assert both in leaderboard(table, ["ultimate_bound"])[0].result
     cells = {}
     for row in board.tables[0].rows:
@@ -809,7 +809,7 @@ def test_a_law_wins_nothing_with_a_run_that_has_not_arrived(metric, lost, others
 def test_where_no_law_arrives_none_wins_and_it_is_said():
     table = table_of({"a": A, "b": B}, "tv_rate", arrived=np.zeros(24, bool))
     (board,) = leaderboard(table, ["tv_rate"])
-    assert board.result == "no winner: every law has runs that fail or do not arrive"
+    assert board.result == "no winner; every law has runs that fail or do not arrive"
     assert [row[1].text for row in board.tables[0].rows] == ["not arrived"] * 2
 
 

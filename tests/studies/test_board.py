@@ -113,9 +113,9 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
                 assert power in tex
     assert re.fullmatch(r"[34]\.\de-7", table.rows[0][1].text)  # 4e-7 times 0.9 to 1.1
     assert table.rows[0][1].below.startswith(spread(boards[0].entries[0].interval, "itae"))
-    assert re.search(r"detects [\d.]+ %", table.rows[0][1].below)
+    assert re.search(r"detects a [\d.]+ % lead", table.rows[0][1].below)
     below = table.to_latex().partition("bottomrule")[2]
-    assert "Detects 24" in below
+    assert "Detects a 24" in below
     assert below.count("multicolumn") == 3
     assert table.rows[2][2][:2] == ("100", "84–100")
 
@@ -188,7 +188,7 @@ def test_where_a_law_wins_no_cell_says_that_no_lead_is_seen(spread, never, condi
     assert found.tables[0].rows[0][1].strong
     if never:
         assert re.search(
-            r"wins.*: \d+ of 20 runs of (50|second).* have no value, ahead in", board.result
+            r"wins.*while (50|second).* has none in \d+ of 20, ahead in \d+", board.result
         )
     assert not re.search(r"\b0 of|\(0 to", board.result)
 
@@ -236,7 +236,7 @@ def test_each_group_has_a_table_with_its_units_and_its_sample():
     assert first.title == "duffing, nominal: 20 seeds"
     assert second.title == "inverted_pendulum, noise: 20 seeds"
     for board in boards:
-        assert (board.winner is None) == ("no winner" in board.result)
+        assert (board.winner is None) == ("no winner;" in board.result)
     assert "no boards" in Boards()._repr_html_()
     assert Boards().to_latex() == ""
 
@@ -260,15 +260,15 @@ LOST = {
     "worse": LAWS,
 }
 RESULTS = {  # changes of both blocks -> the result
-    "barred": ({"untuned": ("second", "third")}, "none is named over second with default gains"),
+    "barred": ({"untuned": ("second", "third")}, "none is named over the default gains of second"),
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
         {"ahead": None, "samples": 3, "sets": 3},
-        "too few sets of gains (3): a verdict needs at least 7; give more searches, or leave out quick",
+        "too few sets of gains (3) for a verdict, which needs 7: give more searches, or leave out quick",
     ),
     "few runs": (
         {"ahead": None, "samples": 4, "runs": 4},
-        "too few runs (4): a verdict needs at least 7; give more seeds",
+        "too few runs (4) for a verdict, which needs 7: give more seeds",
     ),
 }
 
@@ -277,19 +277,19 @@ RESULTS = {  # changes of both blocks -> the result
 def test_where_there_is_no_winner_the_reason_is_said(case, pair):
     change, reason = RESULTS[case]
     blocks = tuple(dataclasses.replace(block, **change) for block in pair.blocks)
-    assert f"no winner: {reason}" in dataclasses.replace(pair, blocks=blocks).result
+    assert f"no winner; {reason}" in dataclasses.replace(pair, blocks=blocks).result
 
 
 def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     assert re.fullmatch(
-        r"third wins in both conditions: \S+ of \S+.* \(\S+ to \S+\), ahead in 20 of 20 runs, for "
-        "these gains",
+        r"third wins in both conditions; at worst its value is \S+ times \S+.* \(\S+ to \S+\), "
+        "ahead in 20 of 20 runs, for these gains",
         pair.result,
     )
     first, second = pair.blocks
     turned = dataclasses.replace(second, ahead="second", worse=("third", EVIL))
     split = dataclasses.replace(pair, blocks=(first, turned)).result
-    assert "third wins under nominal, loses under noise" in split
-    assert "second wins under noise, loses under nominal" in split
+    assert "third wins under nominal and loses under noise" in split
+    assert "second wins under noise and loses under nominal" in split
     lead = Lead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
-    assert lead.words == "0.850 of b's (0.800 to 0.900), ahead in 5 of 8 sets of gains"
+    assert lead.words == "0.850 times b's (0.800 to 0.900), ahead in 5 of 8 sets of gains"

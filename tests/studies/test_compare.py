@@ -243,9 +243,7 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
         )
     assert kinds(made)["plain_law"] == "tuned here"
     (remark,) = made.remarks
-    assert remark.startswith(
-        "plain_law: searched about the default, for want of a unit: lam and k1"
-    )
+    assert remark.startswith("plain_law on duffing: no unit is given for lam and k1, so ")
 
 
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
@@ -260,7 +258,7 @@ def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_the
         **SHORT,
     )
     assert kinds(made) == {"my_law": "default", "classical": "shipped"}
-    assert made.remarks == ["my_law: default gains (on duffing)"]
+    assert made.remarks == ["my_law on duffing: default gains"]
     assert "classical" not in [board.winner for board in made.leaderboard]
 
 
@@ -315,7 +313,7 @@ def test_one_command_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
     table = smc.Table.read("results")
     assert set(table.column("condition")) == {"friction", "worn"}
     assert set(table.column("seed")) == {2_000_000, 2_000_001}
-    assert "mine: default gains (on inverted_pendulum and duffing)" in " ".join(printed.split())
+    assert "mine on inverted_pendulum and duffing: default gains" in " ".join(printed.split())
     assert max(map(len, printed.splitlines())) <= 80
     assert Path("fig.svg").exists()
     assert Path("table.tex").read_text().count(r"\toprule") == 6

@@ -40,7 +40,7 @@ def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_
     assert unfair.winner is None
     assert unfair.blocks[0].winner is None
     assert unfair.wins("fast") == []
-    assert unfair.result == "no winner: none is named over slow with default gains"
+    assert unfair.result == "no winner; none is named over the default gains of slow"
     assert "textbf" not in boards.to_latex()
     assert unfair.verdict in " ".join(repr(boards).split())
     (asked,) = ranked([FAST, at_default(SLOW)], folder, defaults=True)
@@ -98,7 +98,7 @@ def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
                 ["compare", "duffing", "--law", laws, *options, "--out", str(tmp_path), *extra]
             )
         printed = " ".join(capsys.readouterr().out.split())
-        assert ("none is named over adaptive with default gains" in printed) == (not extra)
+        assert ("none is named over the default gains of adaptive" in printed) == (not extra)
         assert "adaptive default" in printed
 
 

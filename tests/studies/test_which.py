@@ -69,7 +69,7 @@ def test_the_answer_has_four_lines_and_counts_comparisons(advice):
     wins = sum(len(board.wins("observer_free")) for board in advice.leaderboard)
     assert advice.answer == [
         "Use: observer_free",
-        "Gains: lam=6, k1=2 (yours)",
+        "Gains: lam=6, k1=2, yours",
         f"Second: {SLOW}",
         f"How sure: it wins {wins} of 4 comparisons, and another law is better in 0",
     ]
@@ -85,9 +85,9 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         duration=2.5,
         seeds=3,
     )
-    assert few.answer[3].startswith("How sure: first so far: too few runs (3): ")
+    assert few.answer[3].startswith("How sure: first so far; too few runs (3) ")
     same = smc.which("duffing", laws=[FAST, FAST.named("same")], out=folder, **COMMON)
-    assert same.answer[3].startswith("How sure: first so far: it wins 0 of 6 comparisons, ")
+    assert same.answer[3].startswith("How sure: first so far; it wins 0 of 6 comparisons, ")
     alone = smc.which("duffing", laws=FAST, out=folder, **COMMON)
     assert alone.second is None
     assert alone.answer[2:] == ["Second: none", "How sure: there is no second law"]
@@ -99,11 +99,11 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         seeds=4,
     )
     assert "no law is reliable here, this one settles in 0 %" in short.answer[3]
-    assert short.answer[0].startswith("Use: none settles reliably, nearest: ")
+    assert short.answer[0].startswith("Use: no law settles reliably; the nearest is ")
     barred = dataclasses.replace(advice.leaderboard[0].blocks[0], untuned=("slow",))
     board = dataclasses.replace(advice.leaderboard[0], blocks=(barred,))
     untuned = dataclasses.replace(advice, leaderboard=[board])
-    assert untuned.answer[3].startswith("How sure: first so far: slow has default gains")
+    assert untuned.answer[3].startswith("How sure: first so far; slow has default gains")
 
 
 def test_gains_of_the_package_are_taken_where_there_are_some(folder):
@@ -182,6 +182,6 @@ def test_the_command_prints_the_tables_and_the_answer(folder, capsys, monkeypatc
     assert not end.value.code
     printed = capsys.readouterr().out
     assert max(map(len, printed.splitlines())) <= 80
-    assert re.search(r"Use: fast\nGains: lam=6, k1=2 \(yours\)\nSecond: slow\(", printed)
+    assert re.search(r"Use: fast\nGains: lam=6, k1=2, yours\nSecond: slow\(", printed)
     seeds = smc.Table.read(folder).column("seed")
     assert seeds.min() == 1_000_000

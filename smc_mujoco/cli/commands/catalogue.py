@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.text import Text
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
@@ -113,8 +112,7 @@ def _print_all(terminal: Terminal, kind: str) -> None:
     for title, rows in lists.items():
         if found := rows if kind in title.lower() else [row for row in rows if row[0] == kind]:
             terminal.print(tables.catalogue(title, found), "")
-    page = ("smc-mujoco list NAME", "cyan")
-    some = ("--needs one-gain,continuous", "cyan")
     terminal.print(
-        Text.assemble(page, " shows a law or a plant in full, ", some, " the laws that have both")
+        "smc-mujoco list NAME shows a law or a plant in full; --needs one-gain,continuous lists "
+        "the laws that have both"
     )
