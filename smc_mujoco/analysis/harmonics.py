@@ -28,7 +28,8 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
-from smc_mujoco.mechanisms.hardware.part import Actuator, dof_ids, drive_ids
+from smc_mujoco.mechanisms.hardware.part import Actuator
+from smc_mujoco.mechanisms.layout import dof_ids, drive_ids
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario

@@ -13,7 +13,7 @@ from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control import design
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.written import state_feedback
-from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
+from smc_mujoco.mechanisms.layout import dof_ids, drive_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models

@@ -10,7 +10,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.design import DIFFERENCE_STEP
-from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, joint_names
+from smc_mujoco.mechanisms.layout import dof_ids, drive_ids, joint_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models

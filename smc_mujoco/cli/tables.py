@@ -19,7 +19,7 @@ from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
-from smc_mujoco.mechanisms.hardware.part import joint_names
+from smc_mujoco.mechanisms.layout import joint_names
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.conventions import CATALOGUE, Group, Metric, groups

@@ -18,7 +18,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
-from smc_mujoco.mechanisms.hardware.part import joint_names
+from smc_mujoco.mechanisms.layout import joint_names
 from smc_mujoco.simulation.trace import Trace
 
 TIME_PANELS = {  # panel -> quantity, from top to bottom

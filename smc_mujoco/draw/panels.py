@@ -22,7 +22,7 @@ from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
-from smc_mujoco.mechanisms.hardware.part import joint_names
+from smc_mujoco.mechanisms.layout import joint_names
 from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
 from smc_mujoco.simulation.trace import Trace
 

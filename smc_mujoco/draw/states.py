@@ -18,7 +18,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import HIT, RUB
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
-from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models

@@ -20,7 +20,7 @@ from smc_mujoco.common.aliases import ArrayPair
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.envs.gymnasium_env import PlantEnv, action_space
 from smc_mujoco.mechanisms import rotation
-from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
+from smc_mujoco.mechanisms.layout import drive_ids, exerted, free_joint
 from smc_mujoco.mechanisms.plant import Plant
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Fields
 from smc_mujoco.mechanisms.custom.scales import beside_goal
-from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, Values
 from smc_mujoco.simulation.signals import Signal, Sine

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.mechanisms.hardware.part import initial_pose, joint_ids
+from smc_mujoco.mechanisms.layout import initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 TOLERANCE = 1e-9  # m, of the tip

@@ -22,7 +22,13 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, ArrayPair, Numbers
 from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.part import OWN, drive_ids, initial_pose, joint_ids, joint_names
+from smc_mujoco.mechanisms.layout import (
+    OWN,
+    drive_ids,
+    initial_pose,
+    joint_ids,
+    joint_names,
+)
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups

@@ -23,15 +23,8 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.part import (
-    Actuator,
-    Friction,
-    OnJoints,
-    all_joints,
-    chains,
-    driven_names,
-    joint_names,
-)
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, OnJoints, chains
+from smc_mujoco.mechanisms.layout import all_joints, driven_names, joint_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE

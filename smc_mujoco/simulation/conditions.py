@@ -52,8 +52,9 @@ from smc_mujoco.mechanisms.hardware.contact import Obstacle
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.hardware.stepper import of_rig
+from smc_mujoco.mechanisms.layout import joint_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce

@@ -22,12 +22,12 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.encoder import remember
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL
-from smc_mujoco.mechanisms.hardware.part import (
+from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.mechanisms.layout import (
     BASE,
     PASSIVE,
     PLACES,
     POSE,
-    Part,
     base_joint,
     drive_ids,
     exerted,

@@ -31,18 +31,9 @@ from smc_mujoco.mechanisms.hardware.drives import in_series
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import DryFriction, LuGre
 from smc_mujoco.mechanisms.hardware.moments import Torque
-from smc_mujoco.mechanisms.hardware.part import (
-    Actuator,
-    Friction,
-    NominalDrive,
-    Part,
-    chains,
-    drive_ids,
-    driven_names,
-    joint_names,
-    moves_alone,
-)
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, Part, chains
 from smc_mujoco.mechanisms.hardware.rotors import Rotors, flies
+from smc_mujoco.mechanisms.layout import drive_ids, driven_names, joint_names, moves_alone
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
@@ -396,7 +387,7 @@ class Scenario:
             return False
         if not self.plant.is_user_model or not all(part.drives for part in self.actuator):
             return False
-        from smc_mujoco.mechanisms.custom.plant_from import held_by_noslip
+        from smc_mujoco.mechanisms.custom.stiffness import held_by_noslip
 
         return held_by_noslip(self.plant, REALISTIC_STEP)
 

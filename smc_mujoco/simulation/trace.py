@@ -24,7 +24,7 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
-from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
+from smc_mujoco.mechanisms.layout import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.scenario import Scenario

@@ -18,8 +18,8 @@ from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, drive_step, rippled
 from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.moments import torque
-from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
+from smc_mujoco.mechanisms.layout import joint_names
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed

@@ -10,7 +10,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
 pytestmark = pytest.mark.quick

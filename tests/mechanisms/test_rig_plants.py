@@ -16,7 +16,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
-from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0
 
 GRAV = 9.81

@@ -18,7 +18,7 @@ from helpers.runs import assert_loops_agree, assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import suits
-from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import REALISTIC_STEP

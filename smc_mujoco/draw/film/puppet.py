@@ -12,7 +12,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.states import shapes
-from smc_mujoco.mechanisms.hardware.part import OWN, ROTOR, joint_ids
+from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 

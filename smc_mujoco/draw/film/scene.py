@@ -17,7 +17,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import find
 from smc_mujoco.draw.film import camera
 from smc_mujoco.draw.film.camera import Camera
-from smc_mujoco.mechanisms.hardware.part import OWN, joint_ids
+from smc_mujoco.mechanisms.layout import OWN, joint_ids
 from smc_mujoco.mechanisms.plant import model_path
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario

@@ -18,7 +18,7 @@ from smc_mujoco.draw.film import arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.track import MachineTrack
-from smc_mujoco.mechanisms.hardware.part import joints
+from smc_mujoco.mechanisms.layout import joints
 from smc_mujoco.simulation import model as models
 
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen

@@ -10,7 +10,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import states
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, scene
-from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
+from smc_mujoco.mechanisms.layout import ROTOR, joint_ids
 from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses

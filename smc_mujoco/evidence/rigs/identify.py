@@ -29,7 +29,7 @@ from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
 from smc_mujoco.evidence.rigs.rig import Fall, Quantity, Rig, Source
 from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.evidence.rigs.uncertainty import BLOCKS, MAX_CORRELATION, statistics
-from smc_mujoco.mechanisms.hardware.part import column_ends
+from smc_mujoco.mechanisms.layout import column_ends
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace

@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
-from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
+from smc_mujoco.mechanisms.layout import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 CUBIC_WINDOW, CUBIC_DEGREE = 0.04, 3  # s, and degree, of the cubic about each sample; chosen

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.exchange.c.translate import Kind
-from smc_mujoco.mechanisms.hardware.part import PLACES
+from smc_mujoco.mechanisms.layout import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import mix, put_attitude_error, rotation_vector
 from smc_mujoco.simulation.model import keeps_torques, mixer

@@ -25,7 +25,7 @@ from smc_mujoco.exchange.c.translate import (
     rows,
     translate,
 )
-from smc_mujoco.mechanisms.hardware.part import PLACES
+from smc_mujoco.mechanisms.layout import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.model import mixer

@@ -26,7 +26,7 @@ from smc_mujoco.common.errors import (
     users_stacklevel,
 )
 from smc_mujoco.mechanisms.custom.mjcf import pick
-from smc_mujoco.mechanisms.hardware.part import BASE, PASSIVE, PLACES, POSE, exerted
+from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
 from smc_mujoco.mechanisms.rotation import rotation_vector
 

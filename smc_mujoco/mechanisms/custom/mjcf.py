@@ -26,7 +26,7 @@ from smc_mujoco.common import guard, libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import no_room, scratch
 from smc_mujoco.mechanisms.custom import mjcf_trial, urdf
-from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR
+from smc_mujoco.mechanisms.layout import PLAY, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie

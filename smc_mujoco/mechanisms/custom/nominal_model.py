@@ -47,7 +47,7 @@ from smc_mujoco.common.jit import Function, Key, floats, pointer, record_at
 from smc_mujoco.common.mjcb import silence
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import rotation
-from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids
+from smc_mujoco.mechanisms.layout import dof_ids, drive_ids, free_joint, joint_ids
 from smc_mujoco.mechanisms.plant import (
     SEEN,
     Dynamics,

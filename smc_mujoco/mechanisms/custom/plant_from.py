@@ -18,7 +18,6 @@ inertias, and grav in m/s^2.
 
 import base64
 import dataclasses
-import functools
 import math
 import os
 import warnings
@@ -30,159 +29,27 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.aliases import Array, Fields, Names
+from smc_mujoco.common.aliases import Fields, Names
 from smc_mujoco.common.constraints import OneOf, Timeout, constrained
-from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
-from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.custom.others import OTHERS, check_clear, edit, limp, ties
-from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, OWN, ROTOR, START
-from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue, check_ranges
+from smc_mujoco.mechanisms.custom.others import OTHERS, check_clear, limp, ties
+from smc_mujoco.mechanisms.custom.stiffness import default_friction, smooth, soft, touches
+from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
+from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges
 
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
-SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
-GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of constraints that give way by more
-CREEP = 1e-6  # rad/s (m/s), chosen: of dry friction that creeps faster
-STEP = 2.5e-4  # s, of runs with constraints
-# MuJoCo's noslip pass, which keeps stuck joints from creeping: the most iterations, and tolerance
-NOSLIP = 100, 1e-12
-SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give model='none' and a law that reads no model"
 # dynamics of an actuator whose state changes even at ctrl = 0
 DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
-
-
-def _touches(model: mujoco.MjModel) -> bool:
-    """Return whether two geoms may meet, by their bodies and masks, or a pair of the file."""
-    if model.npair:
-        return True
-    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT.value:
-        return False
-    first, second = np.triu_indices(model.ngeom, 1)
-    masks = model.geom_contype[first] & model.geom_conaffinity[second]
-    masks |= model.geom_contype[second] & model.geom_conaffinity[first]
-    body = model.body_weldid[model.geom_bodyid]
-    parent = model.body_weldid[model.body_parentid[body]]
-    a, b = body[first], body[second]
-    # the world is no parent here, as MuJoCo does not count it
-    kin = (a == b) | ((parent[first] == b) & (b > 0)) | ((parent[second] == a) & (a > 0))
-    return bool(np.any((masks != 0) & ~kin))
-
-
-@frozen_data
-class UserModel:
-    """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
-
-    source: Source
-    keyframe: str | None
-    channels: Pairs
-    motors: tuple[Motor, ...]
-    tip: str = ""
-    # indices of the actuators of a free joint, which is then the only channel
-    thrusters: tuple[int, ...] = ()
-    others: str = ""  # one of others.OTHERS, or "" if not given
-    measured: Names = ()  # joints that are measured beside the channels
-
-    def edited(self) -> mujoco.MjSpec:
-        """Return the model without sensors, and with its other joints as wanted."""
-        spec = self.source.read()
-        # tuples may name sensors and motors that are deleted
-        while named := [*spec.tuples, *spec.sensors]:
-            # MuJoCo 4 also deletes the tuples that name it, so list them again
-            spec.delete(named[0])
-        seen = joints_of(self.channels) + list(self.measured)
-        edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
-        return spec
-
-    def __call__(self, n: int) -> mujoco.MjSpec:
-        """Return the model with a motor and two sensors per channel."""
-        spec = self.edited()
-        if self.thrusters:
-            own.add_pose(spec, self.channels[0][0], self.thrusters)
-        else:
-            own.add_motors(spec, self.motors)
-            for joint in (*joints_of(self.channels), *self.measured):
-                own.add_joint_sensors(spec, joint)
-        # dry friction that holds, where the file does not say how softly: MuJoCo's default creeps
-        dry = [part for part in (*spec.joints, *spec.tendons) if part.frictionloss > 0.0]
-        hard = [part for part in dry if np.array_equal(part.solref_friction, SOFT_SOLREF)]
-        for part in hard:
-            part.solref_friction = HARD_SOLREF
-            part.solimp_friction = HARD_SOLIMP
-        all_hard = 0 < len(hard) == len(dry)
-        if all_hard and not (spec.option.noslip_iterations or _touches(spec.copy().compile())):
-            spec.option.noslip_iterations, spec.option.noslip_tolerance = NOSLIP
-        for key in list(spec.keys):
-            if key.name != self.keyframe or self.keyframe is None:
-                spec.delete(key)
-            else:
-                key.name, key.ctrl, key.act = START, [], key.act if self.thrusters else []
-        spec.add_text(name=DIRECT_TEXT, data="disturbances act on the joints")
-        spec.option.disableflags &= ~SENSORS
-        return spec
-
-    @property
-    def argument(self) -> str:
-        """The model as written on the command line, such as arm.xml:shoulder+elbow@home."""
-        if self.source.path:
-            path = os.path.relpath(self.source.path)
-        else:
-            path = "FILE.xml"
-        joints = [own.as_text(joint, channel) for joint, channel in self.channels]
-        text = "+".join(joints + [f"{joint}(measured)" for joint in self.measured])
-        if self.keyframe is not None:
-            text += f"@{self.keyframe}"
-        if self.others:
-            text += f"+{self.others}"
-        return f"{path}:{text}"
-
-    def about(self) -> dict:
-        """Return the arguments with which `restored` makes this plant again, as plain data."""
-        channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
-        data = {
-            "path": self.source.path and self.source.label,  # without the folder, which is a user's
-            "sha256": self.source.sha256,
-            "keyframe": self.keyframe,
-            "channels": channels,
-        }
-        data |= {"tip": self.tip} if self.tip else {}
-        data |= {"others": self.others} if self.others else {}
-        data |= {"measured": list(self.measured)} if self.measured else {}
-        if not self.source.path:
-            assets = {}
-            for name, content in self.source.assets:
-                assets[name] = base64.b64encode(content).decode()
-            data |= {"text": self.source.text, "assets": assets}
-        return data
-
-
-@frozen_data
-class UserFields:
-    """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and
-    gravity.
-    """
-
-    mass: float
-    gravity: float
-
-    def __call__(self, model, p):
-        scale = np.ones(model.nbody)
-        for i in range(model.nbody):
-            if not model.body(i).name.startswith((ROTOR, OWN)):
-                scale[i] = p.m / self.mass
-        yield Field("body_mass", slice(None), model.body_mass * scale)
-        yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
-        if self.gravity:
-            yield Field("opt.gravity", slice(None), model.opt.gravity * (p.grav / self.gravity))
 
 
 @constrained
@@ -247,7 +114,7 @@ def plant_from(
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.read()
     model = source.compiled(spec)
-    if _touches(model):
+    if touches(model):
         check_clear(source, pairs, keyframe)
     read = urdf.read(Path(source.path))
     doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, made)]
@@ -272,78 +139,6 @@ def plant_from(
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return made
-
-
-def soft(label: str, made: Plant) -> list[str]:
-    """Return a sentence on joint limits, contacts and equality constraints that give way to a blow
-    of 1 rad/s (m/s) by more than GIVE, and one on dry friction that creeps.
-
-    A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
-    by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
-    impedance d. Here a is that of the weight at the start. Friction that holds F creeps by R F/b,
-    with MuJoCo's regularisation R and damping b.
-    """
-    model = made.load()
-    model.opt.timestep = STEP
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    parts = []
-
-    def tell(what: str, option: str, solref: Array, solimp: Array, load: float) -> None:
-        first, second = solref.T
-        # a time constant and a damping ratio, or a stiffness and a damping, both negative
-        w = np.where(first > 0.0, 1.0 / np.abs(first * second), np.sqrt(np.abs(first)))
-        z = np.where(first > 0.0, second, -second / (2.0 * w))
-        blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
-        rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
-        if blow > GIVE:
-            parts.append(f"its {what} by {1e3 * blow:.2g} and {1e3 * rest:.1g} ({option})")
-
-    flags = mujoco.mjtDisableBit
-    off = model.opt.disableflags
-    if off & flags.mjDSBL_CONSTRAINT.value:
-        return []
-    gravity = float(np.linalg.norm(model.opt.gravity))
-    limited = np.flatnonzero(model.jnt_limited)
-    if not off & flags.mjDSBL_LIMIT.value:
-        pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
-        limits = model.jnt_solref[limited], model.jnt_solimp[limited]
-        tell("joint limits", "solreflimit", *limits, pushed)
-    if _touches(model):
-        touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
-        tell(
-            "contacts", "solref", model.geom_solref[touching], model.geom_solimp[touching], gravity
-        )
-    if not off & flags.mjDSBL_EQUALITY.value:
-        held = model.eq_active0 > 0
-        tell(
-            "equality constraints", "solref", model.eq_solref[held], model.eq_solimp[held], gravity
-        )
-    sentences = []
-    if parts:
-        sentences.append(
-            f"{label} gives way, in mrad (mm), to a blow of 1 rad/s (m/s) and to its weight: "
-            f"{', '.join(parts)}; a smaller first number of that option in the file makes it harder"
-        )
-    kinds = mujoco.mjtConstraint
-    dry = np.isin(data.efc_type, (kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON))
-    dry &= not (made.smooth or model.opt.noslip_iterations)  # which hold it exactly
-    slack = data.efc_R[dry] / data.efc_KBIP[dry, 1]
-    creep = np.max(slack * data.efc_frictionloss[dry], initial=0.0)
-    if creep > CREEP:
-        # what it holds once the soft constraints have given way
-        model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
-        mujoco.mj_forward(model, data)
-        under = np.max(slack * np.abs(data.efc_force[dry]))
-        sentences.append(
-            f"the dry friction of {label} creeps by {under:.2g} rad/s (m/s) under the weight at "
-            f"the start, and by {creep:.2g} where it holds all that it can: leave out the "
-            "solreffriction in the file if there is one; else nothing creeps without contacts "
-            '(<flag contact="disable"/>)'
-        )
-    return sentences
 
 
 def _plant(
@@ -400,8 +195,7 @@ def _plant(
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
     why_not = missing(model, joints, motors)
-    dry = model.dof_frictionloss > 0.0
-    rubs = bool(np.any(dry) and np.all(model.dof_solref[dry] == SOFT_SOLREF))
+    rubs = default_friction(model)
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -451,39 +245,9 @@ def _places(
     return units, fields
 
 
-@functools.lru_cache(maxsize=32)
-def held_by_noslip(plant: Plant, step: float) -> bool:
-    """Return whether the noslip pass holds all dry friction, no actuator but the channels' motors
-    acts, and RK4 at this step, s, is stable with the joints' damping.
-    """
-    model = compiled(plant.spec())
-    if (model.opt.noslip_iterations, model.opt.noslip_tolerance) != NOSLIP:
-        return False
-    damped = step * (model.dof_damping @ model.dof_invweight0)  # no mode decays faster than the sum
-    return model.nactuator == plant.driven and damped < 1.0 and not model.tendon_damping.any()
-
-
 def without_model(x, v, i, p):
     """Return the f and g of a plant that has no nominal model: NaN."""
     return math.nan, math.nan
-
-
-def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
-    """Return whether the model can have no constraint: no limits, contacts, equalities, or dry
-    friction; of joints it does not count if it `rubs`.
-    """
-    flags = mujoco.mjtDisableBit
-    if model.opt.disableflags & flags.mjDSBL_CONSTRAINT.value:
-        return True
-    touching = np.any((model.geom_contype > 0) | (model.geom_conaffinity > 0)) or model.npair
-    limited = np.any(model.jnt_limited) or np.any(model.tendon_limited)
-    dry = np.any(model.tendon_frictionloss) or (np.any(model.dof_frictionloss) and not rubs)
-    return not (
-        (touching and not model.opt.disableflags & flags.mjDSBL_CONTACT.value)
-        or (limited and not model.opt.disableflags & flags.mjDSBL_LIMIT.value)
-        or dry
-        or model.neq
-    )
 
 
 def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:

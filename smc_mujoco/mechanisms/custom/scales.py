@@ -13,7 +13,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Floats
 from smc_mujoco.common.mjcb import silence
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT
-from smc_mujoco.mechanisms.hardware.part import dof_ids, driven_ids, initial_pose, joint_ids
+from smc_mujoco.mechanisms.layout import dof_ids, driven_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant
 
 # All chosen; the need's terms were each missed by a machine that did not arrive without it.

@@ -12,16 +12,8 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.hardware.part import (
-    HARD_SOLIMP,
-    HARD_SOLREF,
-    PLAY,
-    ROTOR,
-    Actuator,
-    Natural,
-    drive_ids,
-    driven_ids,
-)
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, Actuator, Natural
+from smc_mujoco.mechanisms.layout import PLAY, ROTOR, drive_ids, driven_ids
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)

@@ -22,7 +22,8 @@ import numpy as np
 from smc_mujoco.common.constraints import Finite, Natural, Positive, Probability, Whole
 from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import OnJoints, joint_ids
+from smc_mujoco.mechanisms.hardware.part import OnJoints
+from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.mechanisms.plant import Field, Plant
 
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which

@@ -18,7 +18,6 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
     HARD_SOLREF,
-    PASSIVE,
     Actuator,
     Added,
     Friction,
@@ -26,6 +25,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     Part,
     Positive,
 )
+from smc_mujoco.mechanisms.layout import PASSIVE
 from smc_mujoco.mechanisms.plant import Field
 
 # Where a dcmotor's bristles lie in the compiled model.

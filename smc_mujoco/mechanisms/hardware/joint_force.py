@@ -30,7 +30,8 @@ from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
+from smc_mujoco.mechanisms.layout import joint_names
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
 PerJoint = float | Sequence[float]  # one number for all joints, or one for each

@@ -25,7 +25,8 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, number, show
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import contact
 from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, solref
-from smc_mujoco.mechanisms.hardware.part import OWN, Positive, moving_joints, state_with
+from smc_mujoco.mechanisms.hardware.part import Positive
+from smc_mujoco.mechanisms.layout import OWN, moving_joints, state_with
 from smc_mujoco.mechanisms.plant import Field, Plant
 
 Restitution = Annotated[float, Number(low=0.0, high=contact.MAX_RESTITUTION)]

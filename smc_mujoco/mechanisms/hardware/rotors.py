@@ -39,7 +39,8 @@ from smc_mujoco.common.jit import floats, pointer, record_at
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
-from smc_mujoco.mechanisms.hardware.part import Part, drive_ids
+from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.mechanisms.layout import drive_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 ROTORS_TEXT = "smc:rotors"  # name of a text in models whose actuators are rotors

@@ -21,8 +21,8 @@ import smc_mujoco as smc
 from smc_mujoco.envs import episode, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.mechanisms.custom.scales import needs
+from smc_mujoco.mechanisms.custom.user_model import UserModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import serialise

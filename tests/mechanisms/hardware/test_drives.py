@@ -15,7 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.friction import LuGre
-from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
+from smc_mujoco.mechanisms.layout import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
 
 H = 2.5e-4  # s

@@ -1,0 +1,169 @@
+"""The constraints of a user's model: whether it can have any, whether they give way, and whether
+dry friction holds.
+"""
+
+import functools
+import math
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
+from smc_mujoco.mechanisms.plant import Plant
+
+SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
+GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of constraints that give way by more
+CREEP = 1e-6  # rad/s (m/s), chosen: of dry friction that creeps faster
+STEP = 2.5e-4  # s, of runs with constraints
+# MuJoCo's noslip pass, which keeps stuck joints from creeping: the most iterations, and tolerance
+NOSLIP = 100, 1e-12
+FLAGS = mujoco.mjtDisableBit
+
+
+def touches(model: mujoco.MjModel) -> bool:
+    """Return whether two geoms may meet, by their bodies and masks, or a pair of the file."""
+    if model.npair:
+        return True
+    if model.opt.disableflags & FLAGS.mjDSBL_CONTACT.value:
+        return False
+    first, second = np.triu_indices(model.ngeom, 1)
+    masks = model.geom_contype[first] & model.geom_conaffinity[second]
+    masks |= model.geom_contype[second] & model.geom_conaffinity[first]
+    body = model.body_weldid[model.geom_bodyid]
+    parent = model.body_weldid[model.body_parentid[body]]
+    a, b = body[first], body[second]
+    # the world is no parent here, as MuJoCo does not count it
+    kin = (a == b) | ((parent[first] == b) & (b > 0)) | ((parent[second] == a) & (a > 0))
+    return bool(np.any((masks != 0) & ~kin))
+
+
+def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
+    """Return whether the model can have no constraint: no limits, contacts, equalities, or dry
+    friction; of joints it does not count if it `rubs`.
+    """
+    if model.opt.disableflags & FLAGS.mjDSBL_CONSTRAINT.value:
+        return True
+    touching = np.any((model.geom_contype > 0) | (model.geom_conaffinity > 0)) or model.npair
+    limited = np.any(model.jnt_limited) or np.any(model.tendon_limited)
+    dry = np.any(model.tendon_frictionloss) or (np.any(model.dof_frictionloss) and not rubs)
+    return not (
+        (touching and not model.opt.disableflags & FLAGS.mjDSBL_CONTACT.value)
+        or (limited and not model.opt.disableflags & FLAGS.mjDSBL_LIMIT.value)
+        or dry
+        or model.neq
+    )
+
+
+@functools.lru_cache(maxsize=32)
+def held_by_noslip(plant: Plant, step: float) -> bool:
+    """Return whether the noslip pass holds all dry friction, no actuator but the channels' motors
+    acts, and RK4 at this step, s, is stable with the joints' damping.
+    """
+    model = compiled(plant.spec())
+    if (model.opt.noslip_iterations, model.opt.noslip_tolerance) != NOSLIP:
+        return False
+    damped = step * (model.dof_damping @ model.dof_invweight0)  # no mode decays faster than the sum
+    return model.nactuator == plant.driven and damped < 1.0 and not model.tendon_damping.any()
+
+
+def harden(spec: mujoco.MjSpec) -> None:
+    """Make dry friction hold, where the file does not say how softly: MuJoCo's default creeps."""
+    dry = [part for part in (*spec.joints, *spec.tendons) if part.frictionloss > 0.0]
+    hard = [part for part in dry if np.array_equal(part.solref_friction, SOFT_SOLREF)]
+    for part in hard:
+        part.solref_friction = HARD_SOLREF
+        part.solimp_friction = HARD_SOLIMP
+    all_hard = 0 < len(hard) == len(dry)
+    if all_hard and not (spec.option.noslip_iterations or touches(spec.copy().compile())):
+        spec.option.noslip_iterations, spec.option.noslip_tolerance = NOSLIP
+
+
+def default_friction(model: mujoco.MjModel) -> bool:
+    """Return whether joints have dry friction, and the file does not say how soft it is."""
+    dry = model.dof_frictionloss > 0.0
+    return bool(np.any(dry) and np.all(model.dof_solref[dry] == SOFT_SOLREF))
+
+
+def soft(label: str, made: Plant) -> list[str]:
+    """Return a sentence on joint limits, contacts and equality constraints that give way to a blow
+    of 1 rad/s (m/s) by more than GIVE, and one on dry friction that creeps.
+    """
+    model = made.load()
+    model.opt.timestep = STEP
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    if model.opt.disableflags & FLAGS.mjDSBL_CONSTRAINT.value:
+        return []
+    sentences = []
+    if parts := _giving(model, data):
+        sentences.append(
+            f"{label} gives way, in mrad (mm), to a blow of 1 rad/s (m/s) and to its weight: "
+            f"{', '.join(parts)}; a smaller first number of that option in the file makes it harder"
+        )
+    if not (made.smooth or model.opt.noslip_iterations):  # which hold dry friction exactly
+        sentences += _creeping(label, model, data)
+    return sentences
+
+
+def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
+    """Return what gives way by more than GIVE, and by how much, in mrad (mm).
+
+    A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
+    by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
+    impedance d. Here a is that of the weight at the start.
+    """
+    parts = []
+
+    def tell(what: str, option: str, solref: Array, solimp: Array, load: float | Array) -> None:
+        first, second = solref.T
+        # a time constant and a damping ratio, or a stiffness and a damping, both negative
+        w = np.where(first > 0.0, 1.0 / np.abs(first * second), np.sqrt(np.abs(first)))
+        z = np.where(first > 0.0, second, -second / (2.0 * w))
+        blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
+        rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
+        if blow > GIVE:
+            parts.append(f"its {what} by {1e3 * blow:.2g} and {1e3 * rest:.1g} ({option})")
+
+    off = model.opt.disableflags
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    limited = np.flatnonzero(model.jnt_limited)
+    if not off & FLAGS.mjDSBL_LIMIT.value:
+        pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
+        limits = model.jnt_solref[limited], model.jnt_solimp[limited]
+        tell("joint limits", "solreflimit", *limits, pushed)
+    if touches(model):
+        touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+        geoms = model.geom_solref[touching], model.geom_solimp[touching]
+        tell("contacts", "solref", *geoms, gravity)
+    if not off & FLAGS.mjDSBL_EQUALITY.value:
+        held = model.eq_active0 > 0
+        ties = model.eq_solref[held], model.eq_solimp[held]
+        tell("equality constraints", "solref", *ties, gravity)
+    return parts
+
+
+def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
+    """Return a sentence if dry friction creeps by more than CREEP.
+
+    Friction that holds F creeps by R F/b, with MuJoCo's regularisation R and damping b.
+    """
+    kinds = mujoco.mjtConstraint
+    dry = np.isin(data.efc_type, (kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON))
+    slack = data.efc_R[dry] / data.efc_KBIP[dry, 1]
+    creep = np.max(slack * data.efc_frictionloss[dry], initial=0.0)
+    if not creep > CREEP:
+        return []
+    # what it holds once the soft constraints have given way
+    model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
+    mujoco.mj_forward(model, data)
+    under = np.max(slack * np.abs(data.efc_force[dry]))
+    return [
+        f"the dry friction of {label} creeps by {under:.2g} rad/s (m/s) under the weight at the "
+        f"start, and by {creep:.2g} where it holds all that it can: leave out the "
+        "solreffriction in the file if there is one; else nothing creeps without contacts "
+        '(<flag contact="disable"/>)'
+    ]

@@ -1,0 +1,119 @@
+"""The builder of a user's mechanism, and what its parameters set."""
+
+import base64
+import dataclasses
+import os
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import Names
+from smc_mujoco.common.data import frozen_data
+from smc_mujoco.mechanisms.custom import channels as own
+from smc_mujoco.mechanisms.custom.channels import Motor, Pairs, joints_of
+from smc_mujoco.mechanisms.custom.mjcf import Source
+from smc_mujoco.mechanisms.custom.others import edit
+from smc_mujoco.mechanisms.custom.stiffness import harden
+from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
+
+SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+
+
+@frozen_data
+class UserModel:
+    """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
+
+    source: Source
+    keyframe: str | None
+    channels: Pairs
+    motors: tuple[Motor, ...]
+    tip: str = ""
+    # indices of the actuators of a free joint, which is then the only channel
+    thrusters: tuple[int, ...] = ()
+    others: str = ""  # one of others.OTHERS, or "" if not given
+    measured: Names = ()  # joints that are measured beside the channels
+
+    def edited(self) -> mujoco.MjSpec:
+        """Return the model without sensors, and with its other joints as wanted."""
+        spec = self.source.read()
+        # tuples may name sensors and motors that are deleted
+        while named := [*spec.tuples, *spec.sensors]:
+            # MuJoCo 4 also deletes the tuples that name it, so list them again
+            spec.delete(named[0])
+        seen = joints_of(self.channels) + list(self.measured)
+        edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
+        return spec
+
+    def __call__(self, n: int) -> mujoco.MjSpec:
+        """Return the model with a motor and two sensors per channel."""
+        spec = self.edited()
+        if self.thrusters:
+            own.add_pose(spec, self.channels[0][0], self.thrusters)
+        else:
+            own.add_motors(spec, self.motors)
+            for joint in (*joints_of(self.channels), *self.measured):
+                own.add_joint_sensors(spec, joint)
+        harden(spec)
+        for key in list(spec.keys):
+            if key.name != self.keyframe or self.keyframe is None:
+                spec.delete(key)
+            else:
+                key.name, key.ctrl, key.act = START, [], key.act if self.thrusters else []
+        spec.add_text(name=DIRECT_TEXT, data="disturbances act on the joints")
+        spec.option.disableflags &= ~SENSORS
+        return spec
+
+    @property
+    def argument(self) -> str:
+        """The model as written on the command line, such as arm.xml:shoulder+elbow@home."""
+        if self.source.path:
+            path = os.path.relpath(self.source.path)
+        else:
+            path = "FILE.xml"
+        joints = [own.as_text(joint, channel) for joint, channel in self.channels]
+        text = "+".join(joints + [f"{joint}(measured)" for joint in self.measured])
+        if self.keyframe is not None:
+            text += f"@{self.keyframe}"
+        if self.others:
+            text += f"+{self.others}"
+        return f"{path}:{text}"
+
+    def about(self) -> dict:
+        """Return the arguments with which `restored` makes this plant again, as plain data."""
+        channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
+        data = {
+            "path": self.source.path and self.source.label,  # without the folder, which is a user's
+            "sha256": self.source.sha256,
+            "keyframe": self.keyframe,
+            "channels": channels,
+        }
+        data |= {"tip": self.tip} if self.tip else {}
+        data |= {"others": self.others} if self.others else {}
+        data |= {"measured": list(self.measured)} if self.measured else {}
+        if not self.source.path:
+            assets = {}
+            for name, content in self.source.assets:
+                assets[name] = base64.b64encode(content).decode()
+            data |= {"text": self.source.text, "assets": assets}
+        return data
+
+
+@frozen_data
+class UserFields:
+    """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and
+    gravity.
+    """
+
+    mass: float
+    gravity: float
+
+    def __call__(self, model, p):
+        scale = np.ones(model.nbody)
+        for i in range(model.nbody):
+            if not model.body(i).name.startswith((ROTOR, OWN)):
+                scale[i] = p.m / self.mass
+        yield Field("body_mass", slice(None), model.body_mass * scale)
+        yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
+        if self.gravity:
+            yield Field("opt.gravity", slice(None), model.opt.gravity * (p.grav / self.gravity))
