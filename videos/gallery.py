@@ -1,5 +1,5 @@
 """The clips that README and the pages show: laws side by side, a few seconds, as animated WebP in
-videos/gallery; and of each a picture for phones, upright, as PNG.
+videos/gallery.
 
 make gallery          or          python videos/gallery.py
 
@@ -17,8 +17,6 @@ from smc_mujoco.draw.film.film import Frames, write
 from smc_mujoco.mechanisms.plant import Plant
 
 FOLDER = Path(__file__).parent / "gallery"
-PHONE = (400, 600)  # px
-STILL = 0.4  # of a clip's seconds, of its picture for phones; chosen
 
 
 class Clip(NamedTuple):
@@ -44,10 +42,6 @@ class Clip(NamedTuple):
                 str(self.plant), self.condition, duration=self.seconds, changes=changes
             ).values()
         return smc.film(smc.run(runs), title=self.title, fps=20.0, **options)
-
-    def still(self) -> Frames:
-        """Return the picture for phones."""
-        return self.frames(size=PHONE, at=STILL * self.seconds)
 
 
 BLOW = {
@@ -125,4 +119,3 @@ if __name__ == "__main__":
     for name, clip in CLIPS.items():
         path = write(clip.frames(), FOLDER / f"{name}.webp")
         print(f"{path.relative_to(FOLDER.parents[1])}  {path.stat().st_size / 1e6:.2f} MB")
-        write(clip.still(), FOLDER / f"{name}.png")

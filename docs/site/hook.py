@@ -17,8 +17,6 @@ CATALOGUE = "catalogue.md"  # its tables name all plants and laws
 GROUP = "Catalogue"  # where the contents show their pages
 HEADER = "smc_mujoco/exchange/c/smc_law.h"  # to which pages link
 
-CLIP = r'(?<!\.png">)<img ([^>]*src="([^"]*gallery/)(\w+)\.webp"[^>]*)>'
-
 sys.path.insert(0, str(Path(__file__).parent))
 
 import catalogue  # noqa: E402
@@ -111,13 +109,5 @@ def linked(markdown: str) -> str:
 
 
 def on_page_content(html, page, config, files):
-    """Typeset the equations, and give phones the pictures of clips that are made for them."""
-    return re.sub(CLIP, with_phone, typeset(html))
-
-
-def with_phone(clip: re.Match[str]) -> str:
-    """Return a clip's image with its picture for phones, if it has one."""
-    if not (ROOT / GALLERY / f"{clip[3]}.png").exists():
-        return clip[0]
-    source = f'<source media="(max-width: 30em)" srcset="{clip[2]}{clip[3]}.png">'
-    return f"<picture>{source}{clip[0]}</picture>"
+    """Typeset the equations."""
+    return typeset(html)

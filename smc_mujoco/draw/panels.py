@@ -35,7 +35,6 @@ MAX_DRAWN_CHANNELS = 40
 LASTING_QUANTILE = 0.98
 LEAST_LASTING = 0.02  # of the peaks: an axis that holds these shows smaller lasting values, too
 MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words
-CROWDED_STRIP = 3  # groups of channels, from which on a film has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
 # of a panel's height, below the width of a line: curves no farther apart agree
@@ -266,43 +265,27 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the panels below a film, from left to right: x of each group of channels, the error, u
-    of driven ones; the force of a contact stands in place of the error.
+    """Return the two panels below a film: the motion of the first two groups of channels, or of one
+    group with its u; of arms the tip's, with the force of its contact.
 
-    Of arms: how far the tip is off its path, and the force of its contact, or else the error. Of a
-    network: how far its channels are apart, the error and u. Of two joints of your own model: x and
-    u of each; of more: the error and the largest u of a joint.
+    The motion is x; of several channels it is the largest error.
     """
     plant = traces[0].scenario.plant
-    places = []
-    driven = []
-    errors = []
+    first = over_groups(traces, "tip")
+    if first and any(trace.scenario.contact for trace in traces):
+        first += over_groups(traces, "contact")
+    motions = []
     controls = []
     for each in style.split(traces).items():
         place = Panel("x", *each)
-        places.append(place)
+        many = len(place.group.channels) > 1
         if place.group.driven:
-            driven.append(place)
-            errors.append(place._replace(quantity="settling"))
-            controls.append(place._replace(quantity="u"))
-    forces = []
-    if any(trace.scenario.contact for trace in traces):
-        forces = over_groups(traces, "contact")
-    if of_tip := over_groups(traces, "tip"):
-        return [*of_tip, *(forces or errors)]
-    if max(len(place.group.channels) for place in places) == 1:
-        if forces or len(places) >= CROWDED_STRIP:
-            errors = forces
-        return [*places, *errors, *controls]
-    panels = []
-    for place in driven:
-        if plant.direct and plant.n == plant.driven == 2:
-            for joint in by_channel(place):
-                panels += [joint, joint._replace(quantity="u")]
-        else:
-            for name in ("settling", "largest") if plant.direct else ("spread", "settling", "u"):
-                panels.append(place._replace(quantity=name))
-    return panels
+            controls.append(place._replace(quantity="largest" if many and plant.direct else "u"))
+        if many and plant.direct and plant.n == plant.driven == 2:
+            motions += by_channel(place)
+        elif place.group.driven or not many:
+            motions.append(place._replace(quantity="settling") if many or first else place)
+    return [*first, *motions, *controls][:2]
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
@@ -457,7 +440,7 @@ def over_time(
         if math.floor(last) > math.ceil(first):
             ax.yaxis.set_minor_formatter(NullFormatter())
         else:  # with fewer than two decades, numbers between them
-            ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+            ax.yaxis.set_minor_locator(LogLocator(subs=(3.0,)))
             numbers = FuncFormatter(lambda value, _: style.short(value))
             ax.yaxis.set_major_formatter(numbers)
             ax.yaxis.set_minor_formatter(numbers)

@@ -171,7 +171,6 @@ class Plant:
     ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
-    scenery: str = ""  # what a film shows beside the machine, such as "rail: a mark each 0.5 m"
     # "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size
     jumps: Mapping[str, Numbers] = dataclasses.field(default_factory=dict)
     tip: str = ""  # site that the mechanism moves: where an arm's tool is

@@ -14,6 +14,7 @@ from helpers.sources import loaded
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
+from smc_mujoco.draw import style
 from smc_mujoco.draw.film import film
 from smc_mujoco.studies import scene as scenes
 
@@ -54,7 +55,7 @@ def runs(name):
     title = scene.title
     if len(scene.conditions) > 1:
         title += f", {scene.film}"
-    return smc.run(short), list(shown), title, scene.camera
+    return smc.run(short), [*map(style.label, shown)], title, scene.camera
 
 
 SCENES = []

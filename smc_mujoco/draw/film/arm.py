@@ -24,12 +24,10 @@ WANTED_PATH_WIDTH = 1.6
 WANTED_OPACITY = 0.5
 OUTSIDE = 100  # px beyond the picture up to which a path is followed
 PATH_POINTS = 600  # of a path that is drawn, or a few more
-BAR_WIDTH = 15
-BAR_GAP = 6
-BAR_HEIGHT = 26  # from one limit to the other
-LETTERS = 18
-LABEL_GAP = 3  # from a label to its bars
-BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.25 * LETTERS  # of bars with their numbers
+BAR_WIDTH = 13
+BAR_GAP = 5
+BAR_HEIGHT = 40  # from one limit to the other
+LETTERS = 37
 MAX_TIP_ERROR = 0.015  # m: only a tip farther off has a ghost; a nearer one would hide it
 FORCE_ARROW = 0.6  # m, length of the arrow for the largest force or blow
 SHAFT_WIDTH = 4.0
@@ -42,21 +40,6 @@ def has_bars(trace: Trace) -> bool:
     """Return whether u is a torque with a limit in every joint of an arm."""
     scenario = trace.scenario
     return bool(scenario.plant.tip) and scenario.force_command and max(scenario.limits) < math.inf
-
-
-def key(traces: Sequence[Trace]) -> list[str]:
-    """Return what the film of arms shows, in words."""
-    words = ["line: path of the tip; dark: the wanted path"]
-    if all(map(has_bars, traces)):
-        joints = traces[0].scenario.plant.n
-        words.append(f"bars: torque of joints 1 to {joints}, share of their limits")
-    if any(tip.knows_contacts(trace.scenario) for trace in traces):
-        words.append("violet arrow: mean force of a frame on what the tip touches")
-    if style.pushes(traces):
-        words.append(f"dark arrow: the blow, shown {BLOW_TIME:g} s longer")
-    if any(tip.tip_error(trace).max() > MAX_TIP_ERROR for trace in traces):
-        words.append("translucent: reference")
-    return words
 
 
 class Overlay:
@@ -185,38 +168,29 @@ class Overlay:
         off = 1e3 * self.errors[frame]  # mm
         words = f"{off:.1f} mm" if off < 9.95 else f"{off:.0f} mm"
         bold = style.font(LETTERS * s, bold=True)
-        letters = style.font(LETTERS * s)
-        if self.shares is None:
-            middle = ((left + right) / 2, (top + bottom) / 2)
-            draw.text(middle, f"tip {words}", style.INK, bold, anchor="mm")
-            return
         half = BAR_HEIGHT * s / 2
-        zero = top + LABEL_GAP * s + half
-        x = left + BAR_GAP * s
-        for i, value in enumerate(self.shares[frame], 1):
+        zero = (top + bottom) / 2
+        x = left
+        for value in () if self.shares is None else self.shares[frame]:
             end = x + BAR_WIDTH * s
             draw.rectangle((x, zero - half, end, zero + half), style.PAPER, style.RULE)
             low, high = sorted((zero, zero - value * half))
             colour = style.FAILED if abs(value) > 0.999 else self.stage.track.colour
             draw.rectangle((x + 1, low, end - 1, high), colour)
-            place = ((x + end) / 2, zero + half + 2 * s)
-            draw.text(place, str(i), style.MUTED, letters, anchor="ma")
             x = end + BAR_GAP * s
-        draw.line((left, zero, x, zero), style.INK, max(1, round(s)))
-        if right - x > 1:
-            draw.text((x + 6 * s, zero), "tip", style.MUTED, letters, anchor="lb")
-            draw.text((x + 6 * s, zero + 2 * s), words, style.INK, bold, anchor="lt")
+        if x > left:
+            draw.line((left, zero, x, zero), style.INK, max(1, round(s)))
+        draw.text(((x + right) / 2, zero), words, style.INK, bold, anchor="mm")
 
 
 def room(traces: Sequence[Trace]) -> tuple[float, float]:
     """Return width and height of what is shown below each label, px of a full-size film: the bars,
     and beside them the tip's distance.
     """
-    number = style.width("000 mm", LETTERS, bold=True) + 8
-    if not all(map(has_bars, traces)):
-        return number + style.width("tip ", LETTERS, bold=True), 1.6 * LETTERS
-    bars = traces[0].scenario.plant.n * (BAR_WIDTH + BAR_GAP) + BAR_GAP
-    return bars + number, BARS_HEIGHT
+    wide = style.width("000 mm", LETTERS, bold=True) + BAR_GAP
+    if all(map(has_bars, traces)):
+        wide += traces[0].scenario.plant.n * (BAR_WIDTH + BAR_GAP)
+    return wide, BAR_HEIGHT
 
 
 def overlays(stages: Sequence[Stage], rooms: Array) -> list[Overlay]:

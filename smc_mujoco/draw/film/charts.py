@@ -30,9 +30,8 @@ from smc_mujoco.metrics.conventions import SETTLING_BAND, last_exit, scale
 from smc_mujoco.simulation.trace import Trace
 
 # Numbers of presentation here are chosen.
-DPI = 100
-LETTERS = 13.0  # points of a chart 1280 px wide: 18 px and more
-TITLE_LETTERS = 13.5
+DPI = 120
+LETTERS = 22.2  # points: as high as the other letters of a film
 WINDOW_WIDTH = 0.82  # of a chart's width, of the time until all rest
 TIME_TICKS = 5  # at most, until all rest
 FUTURE_LINE = 0.45  # opacity of what is still to come
@@ -42,9 +41,9 @@ LANE_GAP = 8  # points between a lane, and how far u swings
 LANE_HEIGHT = 0.84  # of a lane's pitch
 END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
-LEFT = 0.062  # of the width, at least: where the charts begin
 RIGHT = 0.985
-CHART_GAP = 0.0664  # of the width, between two charts
+BOTTOM = 0.19  # of the height
+TOP = 0.83
 
 Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, its colours
 
@@ -75,20 +74,23 @@ class Charts:
         self.colours = colours
         strip = panels.strip(traces)
         larger = LETTERS / style.RC["xtick.labelsize"]
-        letters: dict[Any, float] = {"axes.titlesize": TITLE_LETTERS}
+        letters: dict[Any, Any] = {"axes.titlesize": LETTERS, "axes.titleweight": "normal"}
         for name in ("font.size", "xtick.labelsize", "ytick.labelsize"):
             letters[name] = larger * float(style.RC[name])
         with style.page(), rc_context(letters):
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
-            left = max(LEFT, style.width("−00.00", LETTERS * DPI * scale / 72) / size[0])
-            gap = CHART_GAP / ((RIGHT - left + CHART_GAP) / len(strip) - CHART_GAP)
-            figure.subplots_adjust(left=left, right=RIGHT, bottom=0.13, top=0.85, wspace=gap)
+            left = style.width("−00.0", LETTERS * DPI * scale / 72) / size[0]
+            gap = left / (RIGHT / len(strip) - left)
+            figure.subplots_adjust(left=left, right=RIGHT, bottom=BOTTOM, top=TOP, wspace=gap)
             artists: list[Artist] = []
             rows = []
             for ax, panel in zip(axes, strip, strict=True):
-                set_titles(ax, panel, DPI * scale / 72)
+                point = DPI * scale / 72
+                room = ax.get_window_extent().width
+                words, high = fitted(panel.label, room, LETTERS * point)
+                ax.set_title(words, fontsize=high / point)
                 laned = in_lanes(panel)
                 found = lanes(ax, panel, colours) if laned else [(ax, panel, colours)]
                 bands = laned or not panels.crowded(panel)
@@ -250,30 +252,6 @@ def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
     look = {"va": "center", "fontsize": LETTERS, "color": style.INK}
     place = {"xytext": (LANE_GAP, 0.0), "textcoords": "offset points"}
     lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look)
-
-
-def set_titles(ax: Axes, panel: Panel, point: float) -> None:
-    """Set the panel's label at the left and, at the right, as much of what its lines mean as fits;
-    `point` in px.
-    """
-    wide = ax.get_window_extent().width
-    room = wide + (1.0 - RIGHT) * ax.figure.bbox.width
-    words, size = fitted(panel.label, room, TITLE_LETTERS * point)
-    ax.set_title(words, fontsize=size / point)
-    choices = []
-    if panel.quantity == "x":
-        choices = [f"▼ settled to {100 * SETTLING_BAND:g} %", f"▼ {100 * SETTLING_BAND:g} %"]
-    else:
-        meaning = panels.meaning([panel])
-        if panels.crowded(panel, 0):
-            meaning.pop("band", None)
-        said = [f"{name}: {text}" for name, text in meaning.items()]
-        while said:
-            choices.append(", ".join(said))
-            said.pop()
-    room = wide - style.width(words, size, bold=True) - 10 * point
-    fitting = [text for text in choices if style.width(text, LETTERS * point) <= room]
-    panels.note(ax, fitting[0] if fitting else "")
 
 
 def picture(canvas: FigureCanvasAgg) -> Array:

@@ -284,7 +284,7 @@ def pictures(frames: Frames) -> Generator[Array]:
     width, height = _checked_size(frames.size)
     if why := gl.missing():
         raise ScenarioError(why)
-    scale = (width / FULL_SIZE[0]) ** 0.6  # letters shrink less than pictures
+    scale = width / FULL_SIZE[0]
     low = 2 * round(CHARTS_SHARE * height / 2)
     above = (width, height - low)
     traces = list(map(finite, traces))
@@ -293,15 +293,13 @@ def pictures(frames: Frames) -> Generator[Array]:
     tracks = tracks_at(clock.times, traces, colours)
     over = None  # the module that draws over arms and what flies
     below = None
-    words = None
     if scenario.plant.has_path:
         from smc_mujoco.draw.film import arm as over
     if over and scenario.plant.tip:
         below = over.room(traces)
-        words = over.key(traces)
     grid_states = [track.grid_states for track in tracks]
     factor = clock.close.factor if clock.close else 1.0
-    given = (frames.title, above, scale, arrows.scales(traces), grid_states, below, words, factor)
+    given = (frames.title, above, scale, arrows.scales(traces), grid_states, below, factor)
     caption = Caption(traces, names, colours, *given)
     charts = Charts(traces, names, colours, (width, low), scale)
     with contextlib.ExitStack() as opened:

@@ -16,14 +16,14 @@ from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
-POSES = 96  # poses of a trace that must be in the picture
+POSES = 192  # poses of a trace that must be in the picture
 # Chosen, in sizes of what moves: larger fixed things of a user's model may leave the picture, and
 # fixed things must be in it so far beside what moves, and a stand so far below and above.
 MAX_FIXED_SIZE = 4.0
 NEAR_SHARE = 0.3
 STAND_SHARE = 0.8
 FOLLOWED_TRAVEL = 1.0  # sizes of a machine: one that goes farther is followed; chosen
-FOLLOW_TIME = 0.5  # s, over which the followed place is a mean; chosen
+FOLLOW_TIME = 0.25  # s, over which the followed place is a mean; chosen
 
 
 def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | Array) -> list[int]:

@@ -116,7 +116,6 @@ VAN_DER_POL = Plant(
     name="van_der_pol",
     label="Van der Pol oscillator",
     short="Van der Pol",
-    scenery="rail: a mark each 0.5 m, orange for |x| < 1 m, where the plant feeds energy in",
     parameters={"M": 1.0, "mu": 1.0, "k": 1.0},  # kg, N s/m, N/m
     mass="M",
     unit="m",

@@ -115,12 +115,10 @@ def test_bars_are_shares_of_each_joints_limit(trace):
     )
     bars.shares[0] = (0.5, -1.0, 0.0)
     image = bars.beside(paper() // 2, 0)
-    zero = 150.0 + arm.LABEL_GAP + arm.BAR_HEIGHT / 2
+    zero = float(bars.room[[1, 3]].mean())
     middles = []
     for i in range(3):
-        middles.append(
-            round(100.0 + arm.BAR_GAP + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2)
-        )
+        middles.append(round(100.0 + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2))
     quarter = round(arm.BAR_HEIGHT / 8)
     up = round(zero) - quarter
     down = round(zero) + quarter

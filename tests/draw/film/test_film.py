@@ -307,7 +307,7 @@ def test_friction_draws_an_arrow_of_its_own_and_the_key_says_so(stuck):
     *_, violet = arrows(loads(stuck, np.array([0.1, 0.11])), 0, 0, scale, "#0072B2")
     assert violet.rgba[:3] == pytest.approx(np.array(style.rgb(style.REACTION)) / 255)
     assert abs(violet.high) == pytest.approx(0.5 / scale.longest, rel=0.05)  # it slides
-    assert "violet: reaction up to 0.5 N" in key([stuck], scales([stuck]))
+    assert "reaction 0.5 N" in key([stuck], scales([stuck]))
 
 
 @pytest.mark.parametrize(("joint", "channel"), [("slide", 0), ("hinge", 1)])
@@ -322,16 +322,14 @@ def test_the_arrow_of_friction_is_at_the_joint_that_rubs(joint, channel):
     with_arrow = [i for i in range(2) if arrows(acting, 0, i, sizes[i], "#0072B2")]
     assert with_arrow == [channel]
     unit = "N" if joint == "slide" else "N·m"
-    assert f"violet: reaction up to 0.02 {unit}" in key([trace], scales([trace]))
+    assert f"→ reaction 0.02 {unit}" in key([trace], scales([trace]))
 
 
 def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
     found = scales([hit])
     scale = found[driven([hit])]
     assert scale.longest == scale.control < np.abs(hit.reaction).max()
-    assert f"violet: reaction up to {style.short(np.abs(hit.reaction).max())} N" in key(
-        [hit], found
-    )
+    assert f"reaction {style.short(np.abs(hit.reaction).max())} N" in key([hit], found)
 
 
 @pytest.mark.parametrize(
@@ -355,8 +353,8 @@ def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples,
     assert scale.longest == scale.full == longest
     said = key([trace], found)
     assert {
-        f"arrow: control, longest {words}",
-        f"dark arrow: disturbance up to {peak:g} N·m",
+        f"→ u {words}",
+        f"d {peak:g} N·m",
     } <= {*said}
 
 
@@ -371,11 +369,11 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert pale.rgba[3] == 0.45
     assert solid.layer == 0
     assert pale.layer == 1
-    assert "pale: command" in key([slow], found)
+    assert key([slow], found)[0].startswith("→ drive ")
     strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
     for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):
-        assert "pale" not in words
+        assert "drive" not in words
 
 
 def test_touch_is_where_the_stop_pushes_and_there_only(hit):

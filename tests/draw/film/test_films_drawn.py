@@ -71,7 +71,7 @@ def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
     ]
     reported = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
     caption = Caption(
-        traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), reported
+        traces, ["one", "other"], COLOURS, None, SIZE, 0.5, arrows.scales(traces), reported
     )
     tiles = np.array([[0, 60, wide, 300], [wide + 2, 60, 2 * wide + 2, 300]])
     caption.place(tiles)
@@ -90,7 +90,7 @@ def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
     ):
         pen.clear()
         caption.over(paper(), time, (False, gone), (reported[0][0], reported[1][gone]), speed)
-        said.append("\n".join(pen))
+        said.append("\n".join(pen).replace("\\n", " "))
     for picture, clock, pace_words, other, fill, state, changed in zip(
         said,
         ("0.10 s", "0.300 s", "1.70 s", "1.90 s"),
@@ -173,10 +173,6 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
     assert np.ravel(over.errors) == pytest.approx(
         [tip.tip_error(trace)[frame].mean() for frame in within], rel=0.02
     )
-    words = " ".join(arm.key([trace]))
-    assert ("bars" in words) == (limits != math.inf)
-    for part in ("path of the tip", "blow", "touches"):
-        assert part in words
 
 
 def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
@@ -203,9 +199,9 @@ def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
     counts = []
     for each in itertools.product(COLOURS, (0.3, 0.8)):
         counts.append(found.count(each))
-    assert counts == [3, 3, 2, 0]  # where both are in one place the first is on top
+    assert counts == [2, 2, 1, 0]  # where both are in one place the first is on top
     ends = [t[-1] for paths in shown.paths for t, _ in paths]
-    assert ends == pytest.approx([1.0, 0.599] * 3)
+    assert ends == pytest.approx([1.0, 0.599] * 2)
 
 
 HINGES = """
