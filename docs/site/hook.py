@@ -55,7 +55,7 @@ def on_files(files, config):
     files.append(File.generated(config, HEADER, abs_src_path=str(ROOT / HEADER)))
     for page in PAGES:
         files.append(File.generated(config, f"{page.path}.md", content=page.text))
-        BOOST[f"{page.path}.md"] = 0.05 if "/" in page.path else 1.0
+        BOOST[f"{page.path}.md"] = 0.3 if "/" in page.path else 1.0
     for path, content in (notebooks.pages() | known.reference()).items():
         files.append(File.generated(config, path, content=content))
         BOOST.setdefault(path, 0.3)
