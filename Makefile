@@ -90,8 +90,12 @@ bench: ## speed, beside bare MuJoCo and other packages
 	$(BIN)/python benchmarks/agents.py --quick
 
 gpu: ## the fast engine on a CUDA device, beside the processor; "no device" elsewhere
-	@test -x $(BIN)/python || ./setup.sh
-	@! command -v nvidia-smi >/dev/null || $(BIN)/python -c "import numba_cuda" || $(BIN)/python -m pip install --quiet -e ".[gpu]"
+	@$(BIN)/python -c "import numba, mujoco" 2>/dev/null || ./setup.sh
+	@# numba-cuda, where there may be a device; an environment that uv made has no pip
+	@! command -v nvidia-smi >/dev/null || $(BIN)/python -c "import smc_mujoco.analysis.engine.gpu" 2>/dev/null || \
+		$(UV) pip install --quiet --python $(BIN)/python -e ".[gpu]" 2>/dev/null || \
+		$(BIN)/python -m pip install --quiet -e ".[gpu]" || \
+		echo "smc-mujoco: could not install numba-cuda" >&2
 	$(BIN)/python benchmarks/engine.py --cuda
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages

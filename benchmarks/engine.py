@@ -1,7 +1,7 @@
 """Runs a second of the fast engine: on the processor, beside MuJoCo, and on a CUDA device.
 
-    python benchmarks/engine.py          # "no device" where there is none
-    python benchmarks/engine.py --cuda   # the checks of the device alone: make gpu
+    python benchmarks/engine.py
+    python benchmarks/engine.py --cuda   # on a device, or "no device": make gpu
     python benchmarks/engine.py --picture region.png   # 1,000 x 1,000 starts; also with --cuda
 
 Each case is one law on one plant for 10 s, with noise: runs differ in their starts and seeds. The
@@ -135,15 +135,14 @@ def picture(path: str, device: str, side: int = 1000) -> None:
 
 
 def main() -> None:
-    device = _device()
+    cuda = "--cuda" in sys.argv
+    if cuda and not _has_device():
+        return
     if "--picture" in sys.argv:
         path = sys.argv[sys.argv.index("--picture") + 1]
-        picture(path, "cuda" if "--cuda" in sys.argv else "cpu")
+        picture(path, "cuda" if cuda else "cpu")
         return
-    print(f"{device or 'no device'}; {cores(None)} threads; runs of {DURATION:g} s a second")
-    cuda = "--cuda" in sys.argv
-    if cuda and not device:
-        return
+    print(f"{cores(None)} threads; runs of {DURATION:g} s a second")
     if cuda:
         print("case, threads, device, wanted, ratio; fail alike, scores apart: median, largest")
     else:
@@ -153,16 +152,18 @@ def main() -> None:
         print(f"{name:34}{cells}", flush=True)
 
 
-def _device() -> str:
-    """The name of the CUDA device, or ""."""
+def _has_device() -> bool:
+    """Print the name of the CUDA device, or why there is none, and return whether there is one."""
     try:
         from smc_mujoco.analysis.engine import gpu
-    except ImportError:
-        return ""
-    if not gpu.cuda.is_available():
-        return ""
+
+        gpu.check_device()
+    except smc.ScenarioError as error:
+        print(f"no device: {error}")
+        return False
     name = gpu.cuda.get_current_device().name
-    return name.decode() if isinstance(name, bytes) else name
+    print(name.decode() if isinstance(name, bytes) else name)
+    return True
 
 
 if __name__ == "__main__":

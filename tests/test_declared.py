@@ -19,6 +19,7 @@ import pytest
 from helpers.words import recorded
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine import Available
 from smc_mujoco.common import constraints
 from smc_mujoco.common.constraints import Each, FilePath, Flag, Number, OneOf, OrNone, Range, Whole
 from smc_mujoco.common.errors import shown
@@ -111,6 +112,7 @@ BAD = {  # of another kind, and just beyond each end
     Range: bad_ranges,
     FilePath: lambda one: [None, 3, b"x", ["x"]],
 }
+BAD[Available] = BAD[OneOf]
 GOOD = {  # a plain value, and the ends themselves
     OrNone: lambda one: [*good(one.one), None],
     Number: good_numbers,
@@ -120,6 +122,7 @@ GOOD = {  # a plain value, and the ends themselves
     Each: lambda one: [*good(one.one), (good(one.one)[0],) * 2],
     Range: lambda one: [(max(1.0, one.low),) * 2, (max(one.low, beyond(one.above), -9.0), 1e300)],
     FilePath: lambda one: [Path("a"), Path("b/c")],
+    Available: lambda one: ["cpu"],
 }
 TOLD = {
     OrNone: lambda one: f"{reported(one.one)}, or None",
@@ -130,6 +133,7 @@ TOLD = {
     Each: lambda one: f"{reported(one.one)}, or one for each channel",
     Range: lambda one: f"range of {reported(Number(above=one.above, low=one.low))}",
     FilePath: lambda one: "path",
+    Available: lambda one: f"{', '.join(one.names)} if this machine has it",
 }
 
 

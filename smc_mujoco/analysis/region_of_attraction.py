@@ -38,6 +38,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
+from smc_mujoco.analysis.engine.group import Group, why_not
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
@@ -138,8 +139,6 @@ def basin(
       ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, an
         empty grid, or no such device.
     """
-    from smc_mujoco.analysis.engine.group import why_not
-
     plant = jointed(plant, "a region of attraction")
     base = case(plant, law, condition, duration, gains)
     if why_not(base, (), device):
@@ -173,8 +172,6 @@ def basin_of(
     device: str = "cpu",
 ) -> Basin:
     """Map the region of attraction of any scenario as `basin` does."""
-    from smc_mujoco.analysis.engine.group import why_not
-
     if base.plant.mixed:
         raise ScenarioError(
             f"{base.plant.name} has channels in m and rad, which cannot start from the same state: "
@@ -271,7 +268,6 @@ class _Grid:
     def by_engine(self, device: str) -> Callable:
         """Return the same by the fast engine, on a device."""
         from smc_mujoco.analysis.engine.form import SCORES
-        from smc_mujoco.analysis.engine.group import Group
         from smc_mujoco.analysis.engine.outcome import NAME
 
         def run(shortened: Scenario, states: Array, final: bool) -> Array:

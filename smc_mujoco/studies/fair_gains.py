@@ -153,13 +153,7 @@ class Trial(NamedTuple):
         return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=self.starts)
 
     def check(self, laws: Mapping[str, Laws]) -> None:
-        """Refuse, before gains are searched, two things of one name, what moves nothing, and a
-        device that is missing, or its package.
-        """
-        if self.device == "cuda":
-            from smc_mujoco.analysis.engine import gpu
-
-            gpu.check_device()
+        """Refuse, before gains are searched, two things of one name, and what moves nothing."""
         for of_plant in laws.values():
             made = list(map(coerce.law, of_plant))
             check_names(self.plants, made, self.conditions)

@@ -62,32 +62,28 @@ def score(
     names = tuple(items_of("metrics", metrics))
     for name in names:
         find("metric", name, catalogue.CATALOGUE)
-    return _table(runs, names, device, threads)
-
-
-def _table(
-    cases: Iterable[Scenario], metrics: tuple[str, ...], device: str, threads: int | None
-) -> "Table":
     import pyarrow as pa
 
     from smc_mujoco.analysis.engine.runs import Runs
     from smc_mujoco.studies.table import Table
 
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
-    columns |= {"seed": pa.int64()} | dict.fromkeys((*metrics, "diverged_at"), pa.float64())
+    columns |= {"seed": pa.int64()} | dict.fromkeys((*names, "diverged_at"), pa.float64())
     schema = pa.schema(list(columns.items()))
-    runs = Runs({name: getattr(catalogue, name) for name in metrics}, device, threads)
+    scored = Runs({name: getattr(catalogue, name) for name in names}, device, threads)
     tables = []
-    left = iter(cases)
+    left = iter(runs)
     while chunk := list(itertools.islice(left, CHUNK)):
         for case in chunk:
             if not isinstance(case, Scenario):
                 raise ScenarioError(f"cannot score {shown(case)}: give one Trace, or scenarios")
         rows = []
-        for case, (values, failed) in zip(chunk, runs.scored(chunk), strict=True):
+        for case, (values, failed) in zip(chunk, scored.scored(chunk), strict=True):
             numbers = [value if failed is None else None for value in values]
             about = case.plant.name, case.law.name, case.condition, case.seed
             rows.append(dict(zip(columns, (*about, *numbers, failed), strict=True)))
         tables.append(pa.Table.from_pylist(rows, schema))
     data = pa.concat_tables(tables) if tables else schema.empty_table()
-    return Table(data=data.replace_schema_metadata({"checked": runs.checked()}))
+    return Table(
+        data=data.replace_schema_metadata({"checked": scored.checked() or "MuJoCo made all runs"})
+    )

@@ -260,7 +260,6 @@ def sensitivity(
             cure = "give longer runs, another metric or a narrower class"
         raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
     scores[~finite] = scores[finite].max()
-    checked = runs.checked()
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
     shares = design[halves]
     values = scores[halves]
@@ -281,7 +280,7 @@ def sensitivity(
         regions=found,
         improvement=improvement(space, shares, values, failed),
         runs=len(design),
-        checked=checked if runs.drawn else "",
+        checked=runs.checked(),
     )
 
 

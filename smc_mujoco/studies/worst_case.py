@@ -271,7 +271,7 @@ def worst_case(
         metric=metric,
         outside=outside(scenario, within),
         seed=seed,
-        checked=fast.checked() if fast.drawn else "",
+        checked=fast.checked(),
         sets=len(scenarios),
     )
 

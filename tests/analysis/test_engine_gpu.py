@@ -1,20 +1,18 @@
 """The fast engine's code for CUDA, which libnvvm makes without a device."""
 
 import importlib.util
-import sys
 import types
 
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import engine
 from smc_mujoco.analysis.engine import group
 from smc_mujoco.analysis.engine.scores import METRICS
 from smc_mujoco.control.law import catalogue
 
-HERE = importlib.util.find_spec("numba_cuda") is not None
 with_cuda = pytest.mark.skipif(
-    not HERE, reason="numba-cuda is missing: pip install 'smc-mujoco[gpu]'"
+    importlib.util.find_spec("numba_cuda") is None,
+    reason="numba-cuda is missing: pip install 'smc-mujoco[gpu]'",
 )
 PLANTS = [
     ("cart_pole", "hierarchical"),
@@ -38,7 +36,12 @@ FULL = {
     "actuator": smc.Lag(0.01),
     "sensor": smc.Encoder(4096, dropout=0.1),
 }
-ALONE = ("duffing", "inverted_pendulum", "pendulum_network")  # whose joints move alone
+DRY = (smc.Coulomb(0.1), smc.Viscous(0.1))
+FRICTION = {  # of plants whose joints move alone
+    "duffing": smc.hardware.Sigmoid(0.4, 50.0),
+    "inverted_pendulum": DRY,
+    "pendulum_network": DRY,
+}
 
 
 def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
@@ -58,15 +61,8 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
 @pytest.mark.slow
 @pytest.mark.parametrize(("plant", "law"), PLANTS)
 def test_every_plant_compiles_for_a_device_with_all_parts(monkeypatch, plant, law):
-    friction = (smc.Coulomb(0.1), smc.Viscous(0.1)) if plant in ALONE else ()
+    friction = FRICTION.get(plant, ())
     assert ".entry" in code(monkeypatch, plant, law, tuple(METRICS), **FULL, friction=friction)
-
-
-@with_cuda
-@pytest.mark.slow
-def test_friction_by_a_formula_compiles_for_a_device(monkeypatch):
-    friction = smc.hardware.Sigmoid(0.4, 50.0)
-    assert ".entry" in code(monkeypatch, "duffing", "pid", **FULL, friction=friction)
 
 
 @with_cuda
@@ -78,13 +74,19 @@ def test_every_law_compiles_for_a_device(monkeypatch, law):
     assert ".entry" in code(monkeypatch, "duffing", law)
 
 
-def test_without_the_package_a_device_is_refused_in_one_sentence(monkeypatch):
-    monkeypatch.delitem(sys.modules, "smc_mujoco.analysis.engine.gpu", raising=False)
-    monkeypatch.delattr(engine, "gpu", raising=False)
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == "numba_cuda" else find(name)
-    )
-    case = smc.Scenario(plant="duffing", law="pid", duration=0.01)
-    with pytest.raises(smc.ScenarioError, match="needs numba_cuda: pip install 'smc-mujoco"):
-        smc.score([case], device="cuda")
+@with_cuda
+def test_a_device_that_cannot_be_used_is_refused(monkeypatch, refused):
+    from smc_mujoco.analysis.engine import gpu
+
+    def version():
+        raise RuntimeError
+
+    for where, name, fake, told in [
+        (gpu.cuda, "is_available", lambda: False, "no card"),
+        (gpu.cuda, "is_available", lambda: True, ""),
+        (gpu.cuda.cudadrv.driver, "get_version", lambda: (0, 0), "older"),
+        (gpu.cuda.runtime, "get_version", version, "pip install"),
+    ]:
+        monkeypatch.setattr(where, name, fake)
+        if told:
+            refused(lambda: smc.score([], device="cuda"), told)

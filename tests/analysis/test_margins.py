@@ -3,18 +3,16 @@ one.
 """
 
 import dataclasses
-import importlib
 import math
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import margins
 from smc_mujoco.analysis.margins import COARSE, FINE
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Plant
-
-margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
 
 BASE = scenarios.scenario("duffing", "observer_free", duration=4.0)
 
@@ -177,30 +175,24 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
     """None for a plant that is pushed or changed, a law that reads an encoder or the model, or
     another reference.
     """
-    base = smc.grid("duffing", "observer_free", "nominal")[0]
-    others = [
+    base, noisy, *others = (
+        smc.grid("duffing", "observer_free", condition)[0]
+        for condition in ("nominal", "noise", "constant", "heavy", "encoder")
+    )
+    for fields in (
         {"model": "nominal"},
         {"reference": smc.Constant(0.1)},
         {"reference": smc.Sine(0.1, 1.0)},
-    ]
-    others += [{"feedforward": smc.Constant(2.0)}]
-    cases = [(smc.grid("duffing", "observer_free", "noise")[0], True), (base, True)]
-    cases += [
-        (smc.grid("duffing", "observer_free", one)[0], False)
-        for one in ("constant", "heavy", "encoder")
-    ]
-    for case, reported in [
-        *cases,
-        *((dataclasses.replace(base, **fields), False) for fields in others),
-    ]:
-        for kind in ("delay", "disturbance", "friction"):
-            assert (margins.MARGIN_KINDS[kind].expected(case) is not None) == reported
+        {"feedforward": smc.Constant(2.0)},
+    ):
+        others.append(dataclasses.replace(base, **fields))
+    for kind in ("delay", "disturbance", "friction"):
+        expected = margins.MARGIN_KINDS[kind].expected
+        assert None not in map(expected, (base, noisy))
+        assert {*map(expected, others)} == {None}
     estimated = dataclasses.replace(base, velocity="filtered_difference")  # changes nothing at rest
-    reported = [
-        margins.MARGIN_KINDS[kind].expected(estimated) is not None
-        for kind in ("delay", "disturbance")
-    ]
-    assert reported == [False, True]
+    assert margins.MARGIN_KINDS["delay"].expected(estimated) is None
+    assert margins.MARGIN_KINDS["disturbance"].expected(estimated) is not None
 
 
 POLES = """

@@ -1,7 +1,6 @@
 """Regions of attraction: early leaving changes no verdict, and the analytic limits hold."""
 
 import dataclasses
-import importlib
 import math
 from types import SimpleNamespace
 
@@ -10,11 +9,9 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
+from smc_mujoco.analysis import region_of_attraction as maps
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.control.law import Law
-
-# smc.design.basin is the function
-maps = importlib.import_module("smc_mujoco.analysis.region_of_attraction")
 
 PENDULUM = smc.plant("inverted_pendulum")
 WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere
@@ -108,6 +105,7 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
     approaching = 0.03 * math.sqrt(0.9)
     assert [verdict(0.03, q * approaching, False) for q in (0.9999, 1.0001)] == [CONVERGES, None]
     assert [verdict(1e-4, x, False) for x in (0.00399, 0.00401)] == [CONVERGES, None]
+    # it began near
     assert (
         verdict(
             1e-4,
@@ -116,32 +114,14 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
             start=0.003,
         )
         is None
-    )  # it began near
-    assert [verdict(0.5, 0.5 + 2.0 * q, False) for q in (0.99e-6, 1.01e-6)] == [DOES_NOT, None]
-    assert [
-        verdict(
-            0.5,
-            0.5,
-            False,
-            u=(1.0, 1.0 + 6.0 * q),
-        )
-        for q in (0.99e-6, 1.01e-6)
-    ] == [
-        DOES_NOT,
-        None,
-    ]
-    rests = []
-    for q in (0.99e-6, 1.01e-6):
-        rests.append(
-            verdict(
-                0.5,
-                0.5,
-                False,
-                u=(2.0, 2.0 + 2.0 * q),
-                u_max=math.inf,
-            )
-        )
-    assert rests == [DOES_NOT, None]
+    )
+    near = (0.99e-6, 1.01e-6)
+    rests = [verdict(0.5, 0.5 + 2.0 * q, False) for q in near]
+    for q in near:
+        rests.append(verdict(0.5, 0.5, False, u=(1.0, 1.0 + 6.0 * q)))
+    for q in near:
+        rests.append(verdict(0.5, 0.5, False, u=(2.0, 2.0 + 2.0 * q), u_max=math.inf))
+    assert rests == [DOES_NOT, None] * 3
     assert verdict(0.03, 0.03, False) is None  # at rest in the band
     assert (
         verdict(0.0, 0.0, False, failure="raised")

@@ -7,6 +7,7 @@ import inspect
 import itertools
 import json
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from helpers.words import words
 from typer.models import OptionInfo
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import engine
 from smc_mujoco.cli import main
 from smc_mujoco.common.constraints import of_parameters
 
@@ -279,6 +281,19 @@ def test_a_file_of_another_kind_is_refused_before_the_work(line, option, capsys)
         reached(words, CALLS[line])
     assert end.value.code == 2
     assert "'a.gif': end the name in" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("line", [line for line in CALLS if "--device cuda" in line])
+def test_a_device_without_its_package_is_refused_before_the_work(line, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "numba_cuda", None)
+    monkeypatch.delitem(sys.modules, "smc_mujoco.analysis.engine.gpu", raising=False)
+    monkeypatch.delattr(engine, "gpu", raising=False)
+    with pytest.raises(SystemExit) as end:
+        main.main(line.split())
+    assert end.value.code == 2
+    assert "numba_cuda" in (told := capsys.readouterr().err)
+    assert told.endswith("pip install 'smc-mujoco[gpu]'\n")
 
 
 def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:

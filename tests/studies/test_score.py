@@ -44,6 +44,4 @@ def test_what_cannot_be_scored_is_refused():
         smc.score([1.0])
     with pytest.raises(smc.ScenarioError, match="metric"):
         smc.score(cases(), metrics=("nonsense",))
-    with pytest.raises(smc.ScenarioError, match="device"):
-        smc.score(cases(), device="tpu")
     assert len(smc.score([])) == 0

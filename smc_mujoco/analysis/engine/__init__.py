@@ -9,10 +9,25 @@ It finds gains, fills maps, and gives sensitivities and medians of worst-case se
 numbers are shown, MuJoCo repeats CHECKED runs. All others are MuJoCo's.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from smc_mujoco.common.constraints import OneOf
+from smc_mujoco.common.data import named_data
 
 CHECKED = 20  # of its runs, which MuJoCo makes again where their numbers are shown; chosen
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1  # outcomes of a run
-Device = Annotated[str, OneOf(names=("cpu", "cuda"))]
+
+
+@named_data
+class Available(OneOf):
+    """One of some devices, of which this machine has the package and the hardware."""
+
+    def __call__(self, what: str, value: Any) -> str:
+        if super().__call__(what, value) == "cuda":
+            from smc_mujoco.analysis.engine import gpu
+
+            gpu.check_device()
+        return value
+
+
+Device = Annotated[str, Available(names=("cpu", "cuda"))]

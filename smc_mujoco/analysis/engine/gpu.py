@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.extras import MissingPackageError, missing
+from smc_mujoco.common.extras import MissingPackageError, cure, extra
 
-if sentence := missing("gpu", "device 'cuda'", "numba_cuda"):
-    raise MissingPackageError(sentence)
-if not hasattr(np, "row_stack"):  # numba-cuda 0.30 asks for it, and numpy 2.5 has none
-    setattr(np, "row_stack", np.vstack)  # noqa: B010
-    importlib.import_module("numba.cuda.np.arrayobj")
-    delattr(np, "row_stack")
+with extra("gpu", "device 'cuda'"):
+    import numba_cuda  # noqa: F401  without it, numba has a device of its own
 
-from numba import cuda, float64, njit, types
-from numba.extending import intrinsic
+    if not hasattr(np, "row_stack"):  # numba-cuda 0.30 asks for it, and numpy 2.5 has none
+        setattr(np, "row_stack", np.vstack)  # noqa: B010
+        importlib.import_module("numba.cuda.np.arrayobj")
+        delattr(np, "row_stack")
+    from numba import cuda, float64, njit, types
+    from numba.extending import intrinsic
 
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.loop import simulation
@@ -70,15 +70,23 @@ def kernel(form: Form) -> Any:
 
 
 def check_device() -> None:
-    """Raise ScenarioError if this machine has no CUDA device."""
+    """Raise ScenarioError unless this machine has a CUDA device, and all that its code needs."""
     if not cuda.is_available():
-        raise ScenarioError("this machine has no CUDA device: give device 'cpu'")
+        raise ScenarioError("CUDA finds no card on this machine: give device 'cpu'")
+    try:
+        behind = cuda.cudadrv.driver.get_version()[0] < cuda.runtime.get_version()[0]
+    except RuntimeError as error:  # numba-cuda is here without its libraries
+        raise MissingPackageError(f"device 'cuda' needs libnvrtc: {cure('gpu')}") from error
+    if behind:
+        raise ScenarioError(
+            "the NVIDIA driver is older than numba-cuda's libraries: install a newer driver, or "
+            "give device 'cpu'"
+        )
 
 
 @functools.lru_cache(maxsize=64)
 def compiled(form: Form) -> Any:
     """Return the compiled kernel of a form, for the device of this machine."""
-    check_device()
     return cuda.jit(ARGUMENTS)(kernel(form))
 
 
