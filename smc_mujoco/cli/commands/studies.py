@@ -159,10 +159,14 @@ def compare(
     with delay_ctrl_c():
         from smc_mujoco.common import annexes
         from smc_mujoco.common.files import with_ending
-        from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
         from smc_mujoco.studies.leaderboard import METRICS
 
+        pictures = []
+        if figure:  # matplotlib takes 3 % of a short comparison
+            from smc_mujoco.draw.page import files
+
+            pictures = files(figure)
     terminal = Terminal(json)
     shared = {
         "out": out,
@@ -193,7 +197,7 @@ def compare(
         _finish(table, out, terminal)
         return
     latex = latex and with_ending(latex, ".tex")
-    options.check_files(None, latex, *files(figure))
+    options.check_files(None, latex, *pictures)
     machines = options.plants(plants)
     comparison = run(
         options.compared_laws(law, machines, gains),
@@ -214,7 +218,7 @@ def compare(
         terminal.wrote(latex)
     if figure:
         comparison.plot(figure)
-        terminal.wrote(*files(figure))
+        terminal.wrote(*pictures)
     _finish(comparison.table, out, terminal)
 
 
