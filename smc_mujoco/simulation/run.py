@@ -42,7 +42,7 @@ from smc_mujoco.common.aliases import Array
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system
-SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
+SLICE_STEPS = 50_000  # physics steps times channels in a slice, about .2 s of a core
 # physics steps in a slice of a user's model, which with contacts takes 0.1 s and more a step once
 # it
 # has diverged
@@ -420,7 +420,7 @@ class ScenarioBatch:
         if self.packed[0].python:
             slice_steps = min(slice_steps, PYTHON_STEPS)
         if first.plant.is_user_model:
-            slice_steps = USER_MODEL_STEPS
+            slice_steps = min(slice_steps, USER_MODEL_STEPS)
         while steps:
             count = min(steps, slice_steps)
             step = functools.partial(self.batch.step, nstep=count)

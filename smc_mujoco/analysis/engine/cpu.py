@@ -17,8 +17,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import Key, compile_for, jit, pointer
 from smc_mujoco.simulation.state import address
 
-# in a call of compiled code, which Ctrl-C waits for: .1 s, or .2 with dry friction
-PIECE_STEPS = 1_000_000
+# in a call of compiled code, which Ctrl-C waits for: .05 s of a core, or .15 with dry friction
+PIECE_STEPS = 500_000
 
 
 @functools.lru_cache(maxsize=64)
