@@ -120,7 +120,15 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
     for q in near:
         rests.append(verdict(0.5, 0.5, False, u=(1.0, 1.0 + 6.0 * q)))
     for q in near:
-        rests.append(verdict(0.5, 0.5, False, u=(2.0, 2.0 + 2.0 * q), u_max=math.inf))
+        rests.append(
+            verdict(
+                0.5,
+                0.5,
+                False,
+                u=(2.0, 2.0 + 2.0 * q),
+                u_max=math.inf,
+            )
+        )
     assert rests == [DOES_NOT, None] * 3
     assert verdict(0.03, 0.03, False) is None  # at rest in the band
     assert (
