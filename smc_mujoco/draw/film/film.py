@@ -362,18 +362,20 @@ def staged(
 ) -> Iterator[Stage]:
     """Yield the stages of machines, whose tiles the caption learns."""
     turn = scene.turn(tracks[0].trace.scenario, chosen)
-    puppets = [Puppet(track.trace.scenario, turn[:, 2]) for track in tracks]
-    for track, puppet in zip(tracks, puppets, strict=True):
-        puppet.watch(track)
-    followed = any(puppet.travels for puppet in puppets)
+    puppets = [Puppet.of(track.trace.scenario, turn[:, 2]) for track in tracks]
+    courses = [puppet.course(track) for track, puppet in zip(tracks, puppets, strict=True)]
+    followed = any(map(Puppet.travels, puppets, courses))
     reaches = []
-    for track, puppet in zip(tracks, puppets, strict=True):
-        reaches.append(puppet.reach(track, followed))
+    for i, track in enumerate(tracks):
+        reach, puppets[i] = puppets[i].placed(track, courses[i], followed)
+        reaches.append(reach)
     points = np.concatenate(reaches)
     tiles, view = camera.tiles(len(tracks), caption.size, caption.top, caption.strip, points, turn)
     caption.place(tiles)
-    for track, puppet in zip(tracks, puppets, strict=True):
-        path = puppet.path(times) if followed else None
+    for track, puppet, course in zip(tracks, puppets, courses, strict=True):
+        path = None
+        if followed:
+            path = course.path(times) + np.array([0.0, 0.0, puppet.height])
         yield Stage(track, puppet, view, points, caption.scale, len(tracks) == 1, path)
 
 

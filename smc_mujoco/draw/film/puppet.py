@@ -2,7 +2,9 @@
 mechanism.
 """
 
+import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -11,7 +13,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.draw.film.track import MachineTrack
-from smc_mujoco.draw.states import shapes
+from smc_mujoco.draw.states import Shape, shapes
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
@@ -35,39 +37,93 @@ def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | Array) -> list[i
     return sorted(moved)
 
 
-class Puppet:
-    """The machine of one scenario, with the channels that a film shows, before a camera whose
-    picture's normal is `front`, (3,).
+class Course(NamedTuple):
+    """Where a trace takes a machine, its reference and what else moves: the corners of their boxes,
+    m, at some times.
     """
 
-    def __init__(self, scenario: Scenario, front: Array):
-        self.scenario = scene.first_channels(scenario)
-        plant = self.scenario.plant
-        self.shown = plant.n
-        self.shapes = shapes(self.scenario)  # at the start of the run, and after its jump
-        self.model = model = self.shapes[0].model
-        self.ids = joint_ids(model)
-        self.slides = model.jnt_type[self.ids] == mujoco.mjtJoint.mjJNT_SLIDE
-        self.rail = np.inf  # m, length along x of what does not move, on which a cart stays
-        self.start = model.qpos0
+    times: list[float]  # s
+    places: list[Array]
+    goals: list[Array]
+    others: list[Array]
+
+    @property
+    def way(self) -> Array:
+        """The middle of the machine at all times, (times, 3) m."""
+        return np.array([points.mean(axis=0) for points in self.places])
+
+    def path(self, times: Array) -> Array:
+        """Return the places to which the camera follows the machine, (times, 3) m, at times in
+        s.
+        """
+        times = np.clip(times, self.times[0], self.times[-1])
+        half = np.minimum(times - self.times[0], self.times[-1] - times)
+        half = half.clip(0.0, 0.5 * FOLLOW_TIME)[:, None]
+        at = times[:, None] + half * np.linspace(-1.0, 1.0, 9)
+        means = [np.interp(at, self.times, part).mean(axis=1) for part in self.way.T]
+        return np.stack(means, axis=1)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Puppet:
+    """The machine of one scenario, with the channels that a film shows."""
+
+    scenario: Scenario
+    shapes: Sequence[Shape]  # at the start of the run, and after its jump
+    data: Sequence[mujoco.MjData]  # of the shapes
+    ids: Array  # of the channels' joints
+    slides: Array  # which of these are slides
+    rail: float  # m, length along x of what does not move, on which a cart stays
+    start: Array  # the pose of joints without a channel, (nq,)
+    rotors: Sequence[tuple[int, int]]  # channel, and place in the pose
+    mounts: Sequence[arrows.Mount]
+    height: float = 0.0  # m, of the machine over the film's floor
+
+    @classmethod
+    def of(cls, scenario: Scenario, front: Array) -> "Puppet":
+        """Return the machine before a camera whose picture's normal is `front`, (3,)."""
+        scenario = scene.first_channels(scenario)
+        plant = scenario.plant
+        found = shapes(scenario)
+        model = found[0].model
+        ids = joint_ids(model)
+        slides = model.jnt_type[ids] == mujoco.mjtJoint.mjJNT_SLIDE
+        rail = np.inf
+        start = model.qpos0
         if plant.on_stage:
-            for shape in self.shapes:
+            for shape in found:
                 scene.restyle(shape.model)
             if plant.unit != "rad" and not plant.pose:
-                self.rail = float(2 * np.abs(scene.fixed_boxes(model)[..., 0]).max())
+                rail = float(2 * np.abs(scene.fixed_boxes(model)[..., 0]).max())
         else:
-            self.start = models.initial_state(model, self.scenario)[0]
-        self.rotors = []  # channel, and place in the pose
-        for k, joint in enumerate(self.ids):
+            start = models.initial_state(model, scenario)[0]
+        rotors = []
+        for k, joint in enumerate(ids):
             name = ROTOR + model.joint(joint).name
             rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
             if rotor >= 0:
-                self.rotors.append((k, model.jnt_qposadr[rotor]))
-        self.links = moved_bodies(model, self.ids)
-        self.free = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
-        ids = self.ids.tolist()
-        self.mounts = arrows.mounts(self.scenario, ids, self.slides, self.rail, front)
-        self.height = 0.0  # m, of the machine over the film's floor
+                rotors.append((k, model.jnt_qposadr[rotor]))
+        return cls(
+            scenario,
+            found,
+            [mujoco.MjData(shape.model) for shape in found],
+            ids,
+            slides,
+            rail,
+            start,
+            rotors,
+            arrows.mounts(scenario, ids.tolist(), slides, rail, front),
+        )
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The machine's model at the start."""
+        return self.shapes[0].model
+
+    @property
+    def shown(self) -> int:
+        """The number of channels."""
+        return self.scenario.plant.n
 
     def qpos(self, x: Array, ahead: Array | float = 0.0, rest: Array | None = None) -> Array:
         """Return the pose, (nq,), with the channels at x, (shown,) rad or m; a cart stays on its
@@ -76,20 +132,22 @@ class Puppet:
         `ahead` is the lead of the rotors over their joints, (shown,) rad or m. Joints without a
         channel are taken from the pose `rest`, (nq,), by default that of the start.
         """
+        model = self.model
         x = np.where(self.slides, np.clip(x, -self.rail / 2, self.rail / 2), x)
         if self.scenario.plant.pose or self.scenario.plant.base >= 0:
-            pose = models.state_with(self.model, self.ids, x, 0.0)[0]
+            pose = models.state_with(model, self.ids, x, 0.0)[0]
         else:
             pose = (self.start if rest is None else rest).copy()
-            pose[self.model.jnt_qposadr[self.ids]] = x
+            pose[model.jnt_qposadr[self.ids]] = x
         leads = x + ahead
         for k, place in self.rotors:
             pose[place] = leads[k]
-        pose[self.free + 2] += self.height
+        free = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+        pose[free + 2] += self.height
         return pose
 
     def posed(
-        self, track: MachineTrack, data: Sequence[mujoco.MjData], x: Array, time: float
+        self, track: MachineTrack, x: Array, time: float
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Return the shape of the machine at a time, s, and its data with the channels at x."""
         now = self.shape(time)
@@ -97,19 +155,17 @@ class Puppet:
             rest = None
         else:
             rest = track.motion.at(time)
-        data[now].qpos[:] = self.qpos(x, rest=rest)
-        scene.forward(self.shapes[now].model, data[now])
-        return self.shapes[now].model, data[now]
+        model, data = self.shapes[now].model, self.data[now]
+        data.qpos[:] = self.qpos(x, rest=rest)
+        scene.forward(model, data)
+        return model, data
 
-    def watch(self, track: MachineTrack) -> None:
-        """Find where a trace takes the machine, its reference and what else moves: the corners of
-        their boxes at POSES times, m.
-        """
+    def course(self, track: MachineTrack) -> Course:
+        """Return where a trace takes the machine, at POSES times."""
         trace = track.trace
         model = self.model
-        self.data = data = [mujoco.MjData(shape.model) for shape in self.shapes]
         plane = model.geom_type == scene.PLANE
-        links = np.isin(model.geom_bodyid, self.links) & ~plane
+        links = np.isin(model.geom_bodyid, moved_bodies(model, self.ids)) & ~plane
         if not links.any():
             raise ScenarioError(
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
@@ -119,63 +175,61 @@ class Puppet:
         loose = ~links & ~plane & ~scene.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
         body = links | (loose & np.isin(roots, roots[links]))
-        self.times = []
-        self.places = []
-        self.goals = []
-        self.others = []
+        course = Course([], [], [], [])
         for share in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             sample = round(share * (len(trace.t) - 1))
             time = float(trace.t[sample])
             goal = trace.r[sample, : self.shown]
             if np.isfinite(goal).all():
-                world = scene.boxes(*self.posed(track, data, goal, time))
-                self.goals.append(world[links].reshape(-1, 3))
-            world = scene.boxes(*self.posed(track, data, trace.x[sample, : self.shown], time))
-            self.times.append(time)
-            self.places.append(world[body].reshape(-1, 3))
-            self.others.append(world[loose])
+                world = scene.boxes(*self.posed(track, goal, time))
+                course.goals.append(world[links].reshape(-1, 3))
+            world = scene.boxes(*self.posed(track, trace.x[sample, : self.shown], time))
+            course.times.append(time)
+            course.places.append(world[body].reshape(-1, 3))
+            course.others.append(world[loose])
+        return course
 
-    @property
-    def travels(self) -> bool:
-        """Whether a machine that nothing holds in place goes so far that the camera follows it."""
+    def travels(self, course: Course) -> bool:
+        """Return whether a machine that nothing holds in place goes so far that the camera follows
+        it.
+        """
         plant = self.scenario.plant
         if plant.on_stage and not plant.pose:
             return False
-        own = max(float(np.ptp(points, axis=0).max()) for points in self.places)
-        way = np.array([points.mean(axis=0) for points in self.places])
-        return float(np.ptp(way, axis=0).max()) > FOLLOWED_TRAVEL * own
+        own = max(float(np.ptp(points, axis=0).max()) for points in course.places)
+        return float(np.ptp(course.way, axis=0).max()) > FOLLOWED_TRAVEL * own
 
-    def path(self, times: Array) -> Array:
-        """Return the places to which the camera follows the machine, (times, 3) m, at times in
-        s.
-        """
-        way = np.array([points.mean(axis=0) for points in self.places])
-        times = np.clip(times, self.times[0], self.times[-1])
-        half = np.minimum(times - self.times[0], self.times[-1] - times)
-        half = half.clip(0.0, 0.5 * FOLLOW_TIME)[:, None]
-        at = times[:, None] + half * np.linspace(-1.0, 1.0, 9)
-        means = [np.interp(at, self.times, part).mean(axis=1) for part in way.T]
-        return np.stack(means, axis=1) + np.array([0.0, 0.0, self.height])
-
-    def reach(self, track: MachineTrack, followed: bool) -> Array:
-        """Return what must be in the picture, (points, 3) m over the film's floor, and find the
-        machine's height over it.
+    def placed(self, track: MachineTrack, course: Course, followed: bool) -> tuple[Array, "Puppet"]:
+        """Return what must be in the picture, (points, 3) m over the film's floor, and the machine
+        at its height over it, with bent arrows that suit the size of what moves.
 
         These are the corners of the boxes of all that the channels move, over the poses of its
-        trace and its reference, and its arrows. Of other things only the part close to these
-        counts, such as the upper half of a stand; rails and columns end there. Of a machine that
-        the camera follows, the machine alone counts.
+        trace and its reference, and its arrows. Of a machine that the camera follows, the machine
+        alone counts.
         """
-        sides = np.ptp(np.concatenate(self.places), axis=0)
-        lines = self.lines(track, sides)
+        sides = np.ptp(np.concatenate(course.places), axis=0)
+        radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
+        mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
+        lines = self.lines(track, mounts)
         if followed:
-            way = self.path(np.array([*self.times, *(time for time, _ in lines)]))
-            seen = [*self.places, *(line for _, line in lines)]
+            way = course.path(np.array([*course.times, *(time for time, _ in lines)]))
+            seen = [*course.places, *(line for _, line in lines)]
             points = np.concatenate([part - at for part, at in zip(seen, way, strict=True)])
-            self.height = max(0.0, -float(np.concatenate(self.places)[:, 2].min()))
-            return points
+            height = max(0.0, -float(np.concatenate(course.places)[:, 2].min()))
+        else:
+            arrow_lines = (line for _, line in lines)
+            moving = np.concatenate([*course.places, *course.goals, *arrow_lines])
+            points, height = self.surrounded(moving, np.concatenate(course.others))
+        return points, dataclasses.replace(self, mounts=mounts, height=height)
+
+    def surrounded(self, points: Array, around: Array) -> tuple[Array, float]:
+        """Return points that move, (m, 3) m, and those around them that must be in the picture
+        too, over the film's floor, and the machine's height.
+
+        Of other things, `around` and what stands still, only the part close to these counts, such
+        as the upper half of a stand; rails and columns end there.
+        """
         model = self.model
-        points = np.concatenate([*self.places, *self.goals, *(line for _, line in lines)])
         on_stage = self.scenario.plant.on_stage
         axes = self.data[0].xaxis[self.ids[self.slides]]
         machines = [shape.model for shape in self.shapes]
@@ -186,7 +240,6 @@ class Puppet:
         low = points.min(axis=0)
         high = points.max(axis=0)
         size = (high - low).max()
-        around = np.concatenate(self.others)
         if not on_stage:
             far = MAX_FIXED_SIZE * size
 
@@ -201,28 +254,25 @@ class Puppet:
         stand = STAND_SHARE * size
         standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
-        self.height = -raised
+        height = -raised
         if not on_stage:  # it stands on the floor, or hangs close above it
-            self.height = -float(points[:, 2].min())
-        points = points + np.array([0.0, 0.0, self.height])
+            height = -float(points[:, 2].min())
+        points = points + np.array([0.0, 0.0, height])
         if self.scenario.plant.tip:
             points[:, 2] = points[:, 2].clip(0.0)
-        return points
+        return points, height
 
-    def lines(self, track: MachineTrack, sides: Array) -> list[tuple[float, Array]]:
-        """Return the lines of arrows on a machine, (m, 3) m each, with their times, s; bent ones
-        suit the `sides` of what moves, m.
-        """
-        radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
-        self.mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
+    def lines(
+        self, track: MachineTrack, mounts: Sequence[arrows.Mount]
+    ) -> list[tuple[float, Array]]:
+        """Return the lines of arrows on a machine, (m, 3) m each, with their times, s."""
         lines = []
         for drawn in track.framing:
             t = track.trace.t
             sample = min(int(np.searchsorted(t, drawn.time - 1e-9)), len(t) - 1)
-            x = track.trace.x[sample, : self.shown]
-            at = self.posed(track, self.data, x, drawn.time)
+            at = self.posed(track, track.trace.x[sample, : self.shown], drawn.time)
             for i, arrow in drawn.arrows:
-                found = arrows.path(*at, self.mounts[i], arrow)
+                found = arrows.path(*at, mounts[i], arrow)
                 if found:
                     lines.append((drawn.time, found[0]))
         return lines

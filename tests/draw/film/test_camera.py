@@ -82,14 +82,14 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
     assert arm == pytest.approx(np.interp(times, trace.t, trace.x[:, 0]), abs=1e-9)
     assert motion.poses[:, 3] == pytest.approx(2.0 - 9.81 * times**2 / 2, abs=1e-2)
     assert motion.at(0.2)[3] == motion.poses[1, 3]
-    shown = puppet.Puppet(trace.scenario, np.array([0.0, -1.0, 0.0]))
+    shown = puppet.Puppet.of(trace.scenario, np.array([0.0, -1.0, 0.0]))
     assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx(
         [1.0, motion.poses[2, 3]]
     )
     (run,) = tracks([trace], ["#0072B2"])
     run.motion = motion
-    shown.watch(run)
-    low = shown.reach(run, False)[:, 2].min() - shown.height
+    points, placed = shown.placed(run, shown.course(run), False)
+    low = points[:, 2].min() - placed.height
     # the ball is in the picture
     assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)
 
@@ -123,10 +123,9 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
             x0=0.0,
         )
     )
-    shown = puppet.Puppet(trace.scenario, np.array([0.0, -1.0, 0.0]))
+    shown = puppet.Puppet.of(trace.scenario, np.array([0.0, -1.0, 0.0]))
     (run,) = tracks([trace], ["#0072B2"])
-    shown.watch(run)
-    reach = shown.reach(run, False)
+    reach, _ = shown.placed(run, shown.course(run), False)
     assert bool(np.ptp(reach[:, 0]) > 1.01) is seen
 
 
