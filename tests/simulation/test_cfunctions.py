@@ -278,12 +278,18 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
         found = []
         for module in modules:
             for one in vars(module).values():
-                if hasattr(one, "targetoptions"):
-                    found.append((module, one))
-        own = [one for module, one in found if one.py_func.__module__ == module.__name__]
-        return [one.targetoptions.get("error_model", "python") for one in own]
+                if hasattr(one, "targetoptions") and one.py_func.__module__ == module.__name__:
+                    found.append(one.targetoptions.get("error_model", "python"))
+        return found
 
-    callbacks = models(controller, exogenous, parts, philox, signals, time_series)
+    callbacks = models(
+        controller,
+        exogenous,
+        parts,
+        philox,
+        signals,
+        time_series,
+    )
     assert len(callbacks) > 20
     assert set(callbacks) == {"numpy"}
     assert set(models(law)) == {"python"}
