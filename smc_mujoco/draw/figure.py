@@ -146,7 +146,8 @@ def _composed_page(
         right += _controls(left, early)
     for name, quantity in TIME_PANELS.items():
         if name in chosen:
-            left += _by_joint(drawing.over_groups(early, quantity))
+            panels = drawing.over_groups(early, quantity)
+            left += panels if name == "d" else _by_joint(panels)
     groups = [Panel("x", *each) for each in style.split(traces).items()]
     portraits = _by_joint(groups)
     beside = []
@@ -238,11 +239,10 @@ def _height(panel: Panel) -> float:
 def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
     several = any(len(group.channels) > 1 for group in style.split(traces))
+    names = ["d"] if any(np.nan_to_num(trace.d).any() for trace in traces) else []
     if several and traces[0].scenario.plant.direct:
-        return ["channels", "tip", "contact", "settling"]
-    names = ["x", "spread", "u", "delivered", "reaction"]
-    if any(np.nan_to_num(trace.d).any() for trace in traces):
-        names.insert(3, "d")
+        return [*names, "channels", "tip", "contact", "settling"]
+    names += ["x", "spread", "u", "delivered", "reaction"]
     if several:
         return [*names, "settling"]
     if np.nan_to_num(np.concatenate([trace.s for trace in traces])).any():
