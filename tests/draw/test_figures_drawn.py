@@ -296,6 +296,11 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
         ["lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"],
         ["mean"],
     ),
+    "a pushed arm": (
+        {"plant": arms.arm(), "law": "none", "disturbance": smc.Constant(1.0)},
+        ["lift e (rad)", "disturbance d (N·m)"],
+        ["mean"],
+    ),
     "volts": (
         {
             "plant": "furuta",
