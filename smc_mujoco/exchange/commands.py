@@ -63,7 +63,7 @@ def export(
     """Write a law as C or as an FMU, by OUT's ending.
 
     LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or
-    gains.json that `smc-mujoco tune --out` wrote; left out, it is the name of OUT, as
+    gains.json that `smc-mujoco tune --out` wrote. If you leave it out, it is the name of OUT, as in
     observer_free.c. A law of many joints may have one value of a gain for each joint, as in --gains
     "k=8 20 15,c=5".
 

@@ -47,14 +47,15 @@ def tune(
     ] = "balanced",
     searches: Annotated[int, typer.Option(min=1, help="Independent searches.")] = 12,
     budget: Annotated[
-        int, typer.Option(min=1, help="The most sets of gains that a search tries, per gain.")
+        int,
+        typer.Option(min=1, help="How many sets a search may try, for each gain it finds."),
     ] = 64,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches and of the noise.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.json",
-            help="Also write gains, history and provenance to a file, and each search.",
+            help="Also write gains, history and provenance to a file, and each search beside it.",
         ),
     ] = None,
     condition: Annotated[
@@ -120,7 +121,7 @@ def margins(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Shorter runs, coarser results; default 2 plants, 4 laws, 2 kinds."
+            "--quick", help="Shorter runs, coarser results; by default 2 plants, 4 laws, 2 kinds."
         ),
     ] = False,
     condition: options.Condition = "nominal",
@@ -129,8 +130,8 @@ def margins(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Find how much a law tolerates: the largest level at which the error still ends below 5 % of
-    its start.
+    """Find how much a law tolerates: the most delay, friction and the like with which the error
+    still ends below 5 % of its start.
 
     A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one,
     noise is the standard deviation of the position (that of the velocity is 5/s times as large),
@@ -217,15 +218,15 @@ def worst(
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of
     random seeds.
 
-    Only what you bound is uncertain; all else is as in the condition. By default that is what the
-    plant declares, as an arm's payload, or else a disturbance up to a sixth of what the weakest
-    drive gives. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
-    search is the same for all laws; there may be worse than it finds.
+    Only what you bound is uncertain; all else is as in the condition. If you bound nothing, what
+    the plant declares is uncertain, such as an arm's payload, or else a disturbance up to a sixth
+    of what the weakest drive gives. On a rig, such as qube_servo, the adversary also chooses a
+    parameter set. The search is the same for all laws; there may be worse than it finds.
 
-    The column "worst found" has the error of the worst run, the column "median" that of as many
-    random runs within the bounds. Laws are ordered by the worst. A line below the table says where
-    the bounds go beyond the theorem of a law. The law of your file has its default gains: tune it
-    first (`smc-mujoco tune`).
+    The column "worst found" has the error of the worst run, and "median" the median error of as
+    many random runs within the bounds. Laws are ordered by the worst. A line below the table says
+    where the bounds go beyond the theorem of a law. A law from your own file has its default gains,
+    so tune it first (`smc-mujoco tune`).
 
     Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2
     --bound mass=0.7:1.3
@@ -280,13 +281,13 @@ def sensitivity(
     """Find what breaks a law: how much of a score each uncertainty explains, and where runs fail.
 
     Mass, friction, delay, noise and the like vary together within bounds. The column "alone" has
-    the share of the score's variance that an axis explains by itself, "with others" also what it
-    does together with others. Below the table stand the axis that explains most, where runs fail,
-    and which axis to narrow first.
+    the share of the score's variance that an axis explains by itself, and "with others" also has
+    what it does together with others. Below the table stand the axis that explains most, where runs
+    fail, and which axis to narrow first.
 
-    Without bounds: mass x 0.7 to 1.3, delay up to 20 control periods, friction up to a twentieth of
-    what the weakest drive gives, noise up to 1 mrad or 1 mm, encoders of 2^11 to 2^15 counts, half
-    to all of u_max, and a control period up to 4 times as long.
+    If you give no bounds, they are: mass x 0.7 to 1.3, delay up to 20 control periods, friction up
+    to a twentieth of what the weakest drive gives, noise up to 1 mrad or 1 mm, encoders of 2^11 to
+    2^15 counts, half to all of u_max, and a control period up to 4 times as long.
 
     Example: smc-mujoco sensitivity duffing --law super_twisting --bound delay=0:0.02,mass=0.7:1.3
     --out breaks.png
@@ -381,13 +382,13 @@ def chatter(
 ) -> None:
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
-    If a law switches and the actuator lags, the loop oscillates without end, where the law's
-    describing function N and the response L of the linearised mechanism have N L = 1. The column
-    "±" is how far the prediction may be off. A star marks a run that changes by more than 5 % from
-    a start that differs by 1e-9 of itself, or at half the physics step (2.5 % without RK4). Column
-    "third" is the third harmonic over the first. With several driven channels, "coupling" is how
-    far this channel's command moves another one, over how far it moves this one: if large, the
-    prediction fails.
+    If a law switches and the actuator lags, the loop oscillates without end. Amplitude and
+    frequency are those at which N L = 1: N is the law's describing function, L the response of the
+    linearised mechanism. The column "±" is how far the prediction may be off. A star marks a run
+    that changes by more than 5 % if its start changes by 1e-9 of itself, or at half the physics
+    step (2.5 % without RK4). The column "third" is the third harmonic over the first. With several
+    driven channels, "coupling" is how far this channel's command moves another channel, over how
+    far it moves its own. If that is large, the prediction fails.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out
     chatter

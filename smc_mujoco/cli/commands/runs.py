@@ -41,9 +41,10 @@ def run(
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
-    Each run is repeated at half the physics step and from a start that differs by 1e-9 of itself;
-    also at a quarter of the step if u chatters, and under RK4 if there are contacts. A score that
-    changes by more than 5 % is marked (2.5 % at half the step without RK4).
+    Each run is repeated at half the physics step, and from a start that differs by 1e-9 of itself.
+    If u chatters, it is also repeated at a quarter of the step, and if there are contacts, under
+    RK4. A score has a mark if a repetition changes it by more than 5 % (without RK4, half the step
+    by more than 2.5 %).
 
     Exported traces keep every number to the last bit, with its unit.
 
@@ -135,17 +136,18 @@ def view(
     ],
     law: options.Laws = None,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Of the page; 0: the first free one from 8080 on.")
+        int,
+        typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one from 8080 on."),
     ] = 0,
     browser: Annotated[bool, typer.Option(help="Whether to open the browser's tab.")] = True,
 ) -> None:
     """Watch a machine under one law or two in a browser tab, in MuJoCo's Studio; change, push and
     save what you see.
 
-    The panel "Laws" has the laws, their gains, mass, delay, noise and friction, each of which
-    starts the runs again; u, s and e; the model's keyframes; and "save as scene", which writes
-    view.py: `smc-mujoco run view.py` repeats the runs to the bit. The second law's machine is the
-    transparent one.
+    In the panel "Laws" you change the laws, their gains, mass, delay, noise and friction, and the
+    runs start again. It also shows u, s and e, and has the model's keyframes. Its button "save as
+    scene" writes view.py: `smc-mujoco run view.py` repeats the runs to the bit. The second law's
+    machine is the transparent one.
 
     Push a body: double-click it, hold Ctrl, drag with the right mouse button, and let go.
 

@@ -51,8 +51,7 @@ def which(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Recommend a law for a plant: which to use, with which gains, the second best, and how sure
-    that is.
+    """Recommend a law for a plant, with its gains, the second best, and how sure the answer is.
 
     All laws that suit the plant are compared by the rules of `compare`, with the package's gains
     or with gains that are tuned now. On a model of your own, tuning takes minutes for each law.
@@ -93,7 +92,7 @@ def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
     condition: Annotated[
-        list[str] | None, options.conditions_by_default("those of a study; of --quick, three")
+        list[str] | None, options.conditions_by_default("a study's; with --quick, three")
     ] = None,
     seeds: Annotated[
         int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")
@@ -106,7 +105,7 @@ def compare(
         typer.Option(
             min=1,
             help="How many searches tune a law; default 12. With --rig, laws are tuned only if "
-            "it is given.",
+            "you give this.",
         ),
     ] = None,
     worst: Annotated[
@@ -115,14 +114,14 @@ def compare(
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
     duration: Annotated[
-        float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")
+        float | None, typer.Option(help="Duration of a run, s; default 10, with --quick 3.")
     ] = None,
     x0: options.X0 = None,
     metrics: Annotated[
         str | None,
         typer.Option(
             help="What to compare, as a,b: scores that `smc-mujoco show` lists, or settles; "
-            "default settles,settling_time,ultimate_bound,itae,tv_rate."
+            "default settles, settling_time, ultimate_bound, itae and tv_rate."
         ),
     ] = None,
     relevant: options.Relevant = RELEVANT,
@@ -141,14 +140,16 @@ def compare(
     device: options.Device = "cpu",
 ) -> None:
     """Compare laws on plants in conditions: tune the laws that have no gains, run all of them, and
-    say which is better and how sure that is.
+    say which is best and how sure that is.
 
     A law with gains in brackets keeps them. Any other law, including one from your own file, uses
     the package's gains for the plant or, if there are none, is tuned by the same rule, which takes
     seconds to minutes for each law on each plant. If you stop the command, it continues when you
-    start it again. --law all compares every general law. With --rig, laws use the machine's gains,
-    or those that --searches finds on its parameter sets; a line for each metric says whether one
-    law wins on every set.
+    start it again. --law all compares every general law.
+
+    With --rig, the machine's parameter sets replace plants and conditions. Laws use the machine's
+    gains, or with --searches those found on its sets. For each metric a line says whether one law
+    wins on every set.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder

@@ -45,8 +45,8 @@ def certify(
     The plant is its equation, integrated exactly, and the law acts at every instant. The command
     prints each theorem with its conditions and their margins, also where they fail. No theorem is
     about sampling, delay, noise or dry friction. A separate checker proves
-    it in ball arithmetic before it is shown; --check runs that checker again, with exit code 2 if a
-    statement is not proven.
+    each statement in ball arithmetic before it is shown; --check runs that checker again, with exit
+    code 2 if a statement is not proven.
 
     Example: smc-mujoco certify duffing --law observer_free --disturbance 2 --out duffing.json
 

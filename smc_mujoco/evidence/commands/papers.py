@@ -50,13 +50,13 @@ def claims(
     """Audit a paper's claims: measure each against the threshold that was fixed for it before any
     run.
 
-    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function
-    for each claim.
+    A paper is a folder. Its paper.toml has the claims and their thresholds, and its claims.py has a
+    function for each claim.
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and
     partly supported otherwise. One counter-example refutes a universal claim. A claim about some
-    gains is "not shown" if a search finds no example. Claims that you name are shown in full. All
-    of Gaber's, the default, take minutes.
+    gains is "not shown" if a search finds no example. Claims that you name are shown in full. By
+    default all of Gaber's are measured, which takes minutes.
 
     A second audit with the same versions writes the same file of --evidence, to the last bit.
 

@@ -77,7 +77,7 @@ def rig(
     seed: Annotated[int, typer.Option(min=0, help="Fit: seed of these starts.")] = 0,
     json: options.Json = None,
 ) -> None:
-    """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to
+    """Show a record of a real machine beside the run of its twin, or fit the twin's quantities to
     records.
 
     The twin starts from the measured state. If the machine's controller is known, the loop is
