@@ -168,7 +168,7 @@ def set_head(
     """Draw the title with the legend below it, in as few rows as fit, and a note at the right of
     the title.
 
-    A long title has smaller letters, no smaller than the legend's.
+    A long title has smaller letters, no smaller than the legend's, and then a second line.
     """
     size = style.points(TEXT_SIZE)
     big = style.points(TITLE_SIZE)
@@ -187,7 +187,7 @@ def set_head(
     legend = page.legend(
         handles=handles or [Line2D([], [], lw=0)],
         labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _
-        title=style.cropped(title, room, big, bold=True),
+        title=style.wrapped(title, room, big, lines=2, bold=True),
         title_fontproperties={"size": big, "weight": "bold"},
         alignment="left",
         loc="outside upper left",

@@ -504,7 +504,7 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
     return f"{text.rstrip()}…"
 
 
-def wrapped(text: str, room: float, size: float, lines: int) -> str:
+def wrapped(text: str, room: float, size: float, lines: int, bold: bool = False) -> str:
     """Return the text on at most `lines` lines, broken between words, with an ellipsis at its end
     if it is too long.
 
@@ -514,12 +514,12 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
     words = re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
     while words and len(broken) < lines - 1:
         count = len(words)
-        while count > 1 and width(" ".join(words[:count]), size) > room:
+        while count > 1 and width(" ".join(words[:count]), size, bold) > room:
             count -= 1
-        broken.append(cropped(" ".join(words[:count]), room, size))
+        broken.append(cropped(" ".join(words[:count]), room, size, bold))
         words = words[count:]
     if words:
-        broken.append(cropped(" ".join(words), room, size))
+        broken.append(cropped(" ".join(words), room, size, bold))
     return "\n".join(broken)
 
 

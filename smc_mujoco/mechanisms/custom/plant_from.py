@@ -46,7 +46,6 @@ from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
-UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 WITHOUT_MODEL = "give model='none' and a law that reads no model"
 # dynamics of an actuator whose state changes even at ctrl = 0
 DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
@@ -72,8 +71,8 @@ def plant_from(
       channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of
         joints' names. The plant's channels have the same order. A free joint without a name has
         that of its body.
-      name: name of the plant, and title of its pictures; default: the file's, with the model's own
-        name as the title.
+      name: name of the plant, in tables and pictures; default: the file's. Pictures write it as the
+        model does where that is the same name.
       keyframe: name of the model's keyframe with the initial positions, which is the default goal;
         default: the model's qpos0. Runs start at rest, unless the scenario has a v0, and those of
         `grid`, `tune`, `compare` and `which` beside the goal, see `starts`.
@@ -215,7 +214,8 @@ def _plant(
         limits=limits if any(limit < math.inf for limit in limits) else (),
         tip=tip or "",
         suggested=scenarios,
-        label=title if plant_name == file and title != UNNAMED else "",
+        # which pictures show: a name other than the tables' would be taken for another machine
+        label=title if title.lower().replace(" ", "_") == plant_name.lower() else "",
         **special,
     )
 
