@@ -16,7 +16,7 @@ from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.tabular import Tables, Tabular
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.layout import joint_names
@@ -325,12 +325,12 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
 
 
 def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[str, str]]:
-    """Return the name of every entry, with the first line of its docstring, and its package."""
+    """Return the name of every entry, with what its docstring begins with, and its package."""
     rows = []
     for name, entry in known.items():
-        line = (doc(entry) or "").strip().partition("\n")[0]
-        # some lines end with a colon, because a formula follows
-        rows.append((name, with_package(line.rstrip(":"), known.package(name))))
+        # some end with a colon, because a formula follows
+        about = first_paragraph(doc(entry)).rstrip(":")
+        rows.append((name, with_package(about, known.package(name))))
     return rows
 
 

@@ -39,6 +39,11 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def first_paragraph(text: str | None) -> str:
+    """Return the first paragraph of a docstring, on one line; "" without one."""
+    return " ".join((text or "").strip().partition("\n\n")[0].split())
+
+
 def every(count: int) -> str:
     """Return "both" of two things, "all 3" of three."""
     return "both" if count == 2 else f"all {count}"

@@ -62,7 +62,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, has, shown
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 
 if TYPE_CHECKING:
@@ -269,7 +269,7 @@ def metric(
         entry = CATALOGUE[name] = Metric(
             name=name,
             unit=unit,
-            summary=(inspect.getdoc(formula) or "").partition("\n")[0],
+            summary=first_paragraph(inspect.getdoc(formula)),
             formula=formula,
             label=label or name.replace("_", " "),
             need=need,

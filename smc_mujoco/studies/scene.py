@@ -30,7 +30,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
 from smc_mujoco.common.scripts import execute
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.metrics.catalogue import CATALOGUE, arrived, settling_time
 from smc_mujoco.simulation.scenario import Scenario
@@ -414,5 +414,5 @@ def read(path: Path) -> Scene:
 
 
 def question(path: Path) -> str:
-    """Return the first line of a scene file's docstring."""
-    return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
+    """Return the first paragraph of a scene file's docstring."""
+    return first_paragraph(ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))))
