@@ -49,6 +49,8 @@ def test_the_ten_scenes_of_the_study_are_there_and_are_found_by_name():
     assert set(scenes.scenes()) == {path.stem for path in FILES}
     for name in TEN:
         assert scenes.find(name).samefile(FOLDER / f"{name}.py")
+    for path in FILES:
+        assert scenes.question(path).endswith("?")
 
 
 def declared_shortly(path: Path) -> smc.Scene:
