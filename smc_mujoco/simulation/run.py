@@ -472,8 +472,9 @@ class ScenarioBatch:
         """Apply an action in a thread, so that Ctrl-C is heard while a law computes for ever.
 
         That thread cannot be stopped: it computes until the process ends, in the memory of this
-        batch, which is never freed.
+        batch, which is then never freed.
         """
+        batch = ctypes.py_object(self)
         raised = []
         done = threading.Event()
 
@@ -484,13 +485,13 @@ class ScenarioBatch:
                 raised.append(error)
             done.set()
 
-        threading.Thread(target=apply, daemon=True).start()
+        ctypes.pythonapi.Py_IncRef(batch)
         try:
+            threading.Thread(target=apply, daemon=True).start()
             done.wait()
-        except BaseException:
-            if not done.wait(PATIENCE):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))
-            raise
+        finally:
+            if done.wait(PATIENCE):
+                ctypes.pythonapi.Py_DecRef(batch)
         for error in raised:
             raise error
 
