@@ -23,10 +23,10 @@ from smc_mujoco.simulation.trace import Trace
 # Sizes are px of a film of full size, and chosen: all letters have one size, which a phone shows.
 LETTERS = 37  # height
 EDGE = 24  # from the picture's edge to text
-LINE = 46  # from line to line of title and key
+LINE = 44  # from line to line of title and key
 PITCH = 1.1 * LETTERS  # the same in a box
-PAD = 12  # in a box, on each side of its words
-GAP = 8  # around boxes
+PAD = 8  # in a box, on each side of its words
+GAP = 5  # around boxes
 SAMPLE = 10  # height of a label's line, below its name
 SAMPLE_WIDTH = 6
 LINES = 3  # of a label or badge, at most

@@ -81,7 +81,7 @@ class Charts:
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
-            left = style.width("−00.0", LETTERS * DPI * scale / 72) / size[0]
+            left = style.width("−00.00", LETTERS * DPI * scale / 72) / size[0]
             gap = left / (RIGHT / len(strip) - left)
             figure.subplots_adjust(left=left, right=RIGHT, bottom=BOTTOM, top=TOP, wspace=gap)
             artists: list[Artist] = []
@@ -152,8 +152,9 @@ class Charts:
         ticks = ticks[(self.share(ticks) < last) & (ticks < stop)].tolist()
         last_words = f"{self.end:.3g} s"
         ax.set_xticks([*ticks, self.end], [*(f"{tick:g}" for tick in ticks), last_words])
-        for label in ax.get_xticklabels()[-1:]:
-            label.set_horizontalalignment("right")
+        labels = ax.get_xticklabels()
+        for label, side in zip(labels[:1] + labels[-1:], ("left", "right"), strict=False):
+            label.set_horizontalalignment(side)
         if self.window < self.end:
             ax.axvspan(self.window, self.end, color=style.BAND, lw=0, zorder=0.5)
 
