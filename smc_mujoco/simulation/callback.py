@@ -25,7 +25,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco.introspect import ast_nodes, structs
-from numba import types
+from numba import njit, types
 
 from smc_mujoco.common import fingerprint, mjcb
 from smc_mujoco.common.errors import ScenarioError
@@ -128,6 +128,12 @@ def offsets() -> Offsets:
     return checked_offsets(model, data)
 
 
+@njit(error_model="numpy", inline="always")
+def array_at(address):
+    """Return the array whose address is at an address, as a pointer."""
+    return pointer(integers(address)[0])
+
+
 @functools.cache
 def callback():
     """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it
@@ -138,30 +144,30 @@ def callback():
     def control(model, data):
         if integers(model + at.nuserdata)[0] < USERDATA:
             return
-        userdata = pointer(integers(data + at.userdata)[0])
+        userdata = array_at(data + at.userdata)
         if userdata[0] != MAGIC:
             return
         address = int(userdata[1])
         arrays = Arrays(
-            pointer(integers(data + at.qpos)[0]),
-            pointer(integers(data + at.qvel)[0]),
-            pointer(integers(data + at.ctrl)[0]),
-            pointer(integers(data + at.xfrc_applied)[0]),
-            pointer(integers(data + at.qfrc_applied)[0]),
-            pointer(integers(data + at.sensordata)[0]),
-            pointer(integers(data + at.xipos)[0]),
-            pointer(integers(data + at.xanchor)[0]),
-            pointer(integers(data + at.xaxis)[0]),
-            pointer(integers(data + at.actuator_force)[0]),
-            pointer(integers(data + at.qfrc_constraint)[0]),
-            pointer(integers(data + at.qfrc_bias)[0]),
-            pointer(integers(data + at.qfrc_spring)[0]),
-            pointer(integers(data + at.qfrc_passive)[0]),
-            pointer(integers(data + at.qfrc_actuator)[0]),
-            pointer(integers(data + at.qLDiagInv)[0]),
-            pointer(integers(data + at.efc_frictionloss)[0]),
-            pointer(integers(data + at.efc_aref)[0]),
-            pointer(integers(model + at.dof_frictionloss)[0]),
+            array_at(data + at.qpos),
+            array_at(data + at.qvel),
+            array_at(data + at.ctrl),
+            array_at(data + at.xfrc_applied),
+            array_at(data + at.qfrc_applied),
+            array_at(data + at.sensordata),
+            array_at(data + at.xipos),
+            array_at(data + at.xanchor),
+            array_at(data + at.xaxis),
+            array_at(data + at.actuator_force),
+            array_at(data + at.qfrc_constraint),
+            array_at(data + at.qfrc_bias),
+            array_at(data + at.qfrc_spring),
+            array_at(data + at.qfrc_passive),
+            array_at(data + at.qfrc_actuator),
+            array_at(data + at.qLDiagInv),
+            array_at(data + at.efc_frictionloss),
+            array_at(data + at.efc_aref),
+            array_at(model + at.dof_frictionloss),
             integers(model + at.actuator_user)[0],
             integers(model + at.body_user)[0],
         )

@@ -142,11 +142,10 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 
     def native(y, p, m, out):
         now = instant_at(y, 0)
+        state = carray(pointer(m), (memory,))
         if random:
-            state = carray(pointer(m), (memory,))
             return attempt(body, (now.t, values(p), state, now.seed, now.channel, now.stream), out)
         if sees:
-            state = carray(pointer(m), (memory,))
             return attempt(body, (now.t, values(p), state, now.e, now.de, now.s), out)
         if series:
             data = series_at(p + parameter_bytes, 0)

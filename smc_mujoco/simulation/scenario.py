@@ -793,16 +793,13 @@ def check_clock(s: Resolved) -> None:
             f"and {s.samples * s.steps:.3g} physics steps: give a shorter duration or longer "
             f"periods (at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
         )
-    if s.jump is not None and s.jump.time >= s.duration:
-        raise ScenarioError(
-            f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s: give "
-            "an earlier time"
-        )
-    if s.fault is not None and s.fault.at >= s.duration:
-        raise ScenarioError(
-            f"fault at {s.fault.at:g} s comes after the end of the run at {s.duration:g} s: give "
-            "an earlier time"
-        )
+    times = {"jump": s.jump and s.jump.time, "fault": s.fault and s.fault.at}
+    for name, time in times.items():
+        if time is not None and time >= s.duration:
+            raise ScenarioError(
+                f"{name} at {time:g} s comes after the end of the run at {s.duration:g} s: give an "
+                "earlier time"
+            )
     s.failing()  # refuses an unknown one
     for sensor in s.sensors:
         sensor.check(s.physics_step)

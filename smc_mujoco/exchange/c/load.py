@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
@@ -142,7 +141,7 @@ def _trampoline(address: int) -> Function:
     """Return a function of the callback's type that calls a C function which returns an int."""
 
     def native(y: Any, g: Any, m: Any, out: Any):
-        output = carray(pointer(out), (2,))
+        output = pointer(out)
         output[0] = math.nan  # a result that the law does not set ends its run
         output[1] = math.nan
         return call_int(address, y, g, m, out)

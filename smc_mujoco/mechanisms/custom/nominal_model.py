@@ -333,11 +333,11 @@ def native_dynamics() -> Function:
         v = pointer(read.v)
         kept = pointer(int(at.v))
         places = int(at.places)
-        qpos = carray(pointer(int(at.qpos)), (1 << 40,))
-        qvel = carray(pointer(int(at.qvel)), (nv,))
-        bias = carray(pointer(int(at.bias)), (nv,))
-        passive = carray(pointer(int(at.passive)), (nv,))
-        actuator = carray(pointer(int(at.actuator)), (nv,))
+        qpos = pointer(int(at.qpos))
+        qvel = pointer(int(at.qvel))
+        bias = pointer(int(at.bias))
+        passive = pointer(int(at.passive))
+        actuator = pointer(int(at.actuator))
         dense = carray(pointer(int(at.dense)), (nv, nv))
         M = carray(pointer(out), (n, n))
         h = pointer(out + 8 * n * n)
@@ -393,14 +393,13 @@ def native_coriolis() -> Function:
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
         n = int(at.n)
-        nv = int(at.nv)
         model = int(at.model)
         data = int(at.data)
-        w = carray(pointer(y), (n,))
-        output = carray(pointer(out), (n,))
+        w = pointer(y)
+        output = pointer(out)
         v = pointer(int(at.v))
-        qvel = carray(pointer(int(at.qvel)), (nv,))
-        bias = carray(pointer(int(at.bias)), (nv,))
+        qvel = pointer(int(at.qvel))
+        bias = pointer(int(at.bias))
         places = int(at.places)
         for j in range(n):
             output[j] = 0.0
@@ -468,14 +467,14 @@ def native() -> Function:
         model = int(at.model)
         data = int(at.data)
         places = int(at.places)
-        qpos = carray(pointer(int(at.qpos)), (1 << 40,))
-        qvel = carray(pointer(int(at.qvel)), (1 << 40,))
-        ctrl = carray(pointer(int(at.ctrl)), (1 << 40,))
-        qacc = carray(pointer(int(at.acceleration)), (nv,))
-        last_x = carray(pointer(int(at.x)), (n,))
-        last_v = carray(pointer(int(at.v)), (n,))
-        unit = carray(pointer(int(at.unit)), (nv,))
-        moved = carray(pointer(int(at.moved)), (nv,))
+        qpos = pointer(int(at.qpos))
+        qvel = pointer(int(at.qvel))
+        ctrl = pointer(int(at.ctrl))
+        qacc = pointer(int(at.acceleration))
+        last_x = pointer(int(at.x))
+        last_v = pointer(int(at.v))
+        unit = pointer(int(at.unit))
+        moved = pointer(int(at.moved))
         fresh = False
         for j in range(n):
             if (
@@ -501,7 +500,7 @@ def native() -> Function:
             unit[j] = 0.0
         unit[place_at(places, i % driven).qvel] = 1.0
         solve(model, data, int(at.moved), int(at.unit), 1)
-        output = carray(pointer(out), (2,))
+        output = pointer(out)
         dof = place_at(places, i).qvel
         output[0] = qacc[dof]
         output[1] = moved[dof]
