@@ -43,9 +43,8 @@ from smc_mujoco.common.aliases import Array
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system
 SLICE_STEPS = 50_000  # physics steps times channels in a slice, about .2 s of a core
-# physics steps in a slice of a user's model, which with contacts takes 0.1 s and more a step once
-# it
-# has diverged
+# physics steps in a slice of a user's model, which takes 0.1 s and more a step with contacts once
+# it has diverged
 USER_MODEL_STEPS = 200
 PYTHON_STEPS = 20_000  # in a slice where a function is called in Python
 PATIENCE = 5.0  # s that a slice may still take after Ctrl-C; chosen: it lasts about a second

@@ -46,9 +46,9 @@ FILE = (
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """One run at control samples t_k = k * control_period, k = 0 ..
+    """One run at control samples t_k = k * control_period, k = 0 .. K.
 
-    K. The arrays are read-only; NaN from a failure on.
+    The arrays are read-only; NaN from a failure on.
 
     Attributes:
       t: times, (K + 1,), s.
