@@ -32,12 +32,11 @@ CHATTERS = 10.0  # 1/s: variation of a command a second over its bound, from whi
 NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
 # at half the step, see `analysis.differ`
 APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"
-NUDGED = (
-    f"changes by more than {APART} at half the physics step, or by more than "
-    f"{100.0 * MAX_CHANGE:g} % "
-    f"from a start moved by {NUDGE:g} of itself, at a quarter of the step or under RK4"
+SCORE_NOTE = (
+    f"{MARK}: the score changes by more than {APART} at half the physics step, or by more than "
+    f"{100.0 * MAX_CHANGE:g} % at a quarter of it, under RK4, or from a start moved by 1e-9 of "
+    f"itself. Brackets hold its smallest or largest value; {RANGE}"
 )
-SCORE_NOTE = f"{MARK} {NUDGED}: the smallest and the largest value; {RANGE}"
 NOTE = (
     f"{MARK} half the physics step changes it by more than {APART}, or a nudged start, a quarter "
     f"of the step or RK4 by {100.0 * MAX_CHANGE:g} %"

@@ -257,7 +257,7 @@ def from_file(path: Path) -> list[Condition]:
 
     Empty lines and lines that begin with # are skipped.
     """
-    with reading(path, "file of conditions", "give a text file, a condition a line") as file:
+    with reading(path, "file of conditions", "give a text file, one condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
     conditions = []
     for count, line in enumerate(lines, 1):

@@ -57,9 +57,9 @@ MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 # Fields that no scenario of a free body sets, with their words
 NOT_OF_FREE_BODIES = {
-    "friction": "friction but on a joint by name, as its pose has none that rubs",
+    "friction": "friction except on a joint that you name",
     "actuator": "actuator, as its thrusters are its drives",
-    "sensor": "sensor, which is of a joint",
+    "sensor": "sensor, as sensors measure joints",
     "feedforward": "feedforward",
     "clock": "clock with late or missed samples",
     "velocity": "estimated velocity",

@@ -70,7 +70,7 @@ DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
 KEY = (
     "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 "
-    "% intervals. A run fails, too, if it ends beyond 5 % of its scale."
+    "% intervals. A run also fails if it ends beyond 5 % of its scale."
 )
 HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 
@@ -104,8 +104,8 @@ class Sensitivity(Tables, SobolResult):
         low, high = np.quantile(self.values, [0.05, 0.95])
         n = len(self.failed)
         lines = [
-            f"Of {n} runs 90 % have a {self.label} of {self.text(low)} to {self.text(high)}; "
-            f"{self.unscored} have none and count as the worst.",
+            f"The {self.label} of 90 % of {n} runs is {self.text(low)} to {self.text(high)}; "
+            f"{self.unscored} runs have none, and count as the worst.",
             f"First: {self._first}.",
             f"Failed: {_rate(share_interval(float(self.failed.mean()), n))}.",
         ]
@@ -113,13 +113,13 @@ class Sensitivity(Tables, SobolResult):
             rates = f"{_rate(region.rate)}, elsewhere {_rate(region.outside)}"
             lines.append(f"Failed where {_words(self.space, region.cuts)}: {rates}.")
         if self.failed.any() and not self.regions:
-            lines.append("No bounds on one or two axes tell where.")
+            lines.append("No bounds on one or two axes tell where runs fail.")
         if half := self.improvement:
             change = f"the median is {self.text(half.median)} in place of {self.text(half.before)}"
             if half.failed_before:
                 share, before = 100 * half.failed, 100 * half.failed_before
                 change += f", and {share:.0f} % fail in place of {before:.0f} %"
-            lines.append(f"Narrow first: to {_words(self.space, [half.half])}; {change}.")
+            lines.append(f"Narrow first: {_words(self.space, [half.half])}; then {change}.")
         if self.checked:
             lines.append(f"{self.checked}.")
         return lines

@@ -141,7 +141,7 @@ class WorstCases(Tables, list[WorstCase]):
         metric = CATALOGUE[first.metric].label
         if first.unit:
             metric += f" in {first.unit}"
-        within = f"worst of {first.tried} runs within {first.class_words}"
+        within = f"worst of {first.tried} runs, bounds: {first.class_words}"
         return f"{first.nominal.plant.name}: {metric}, {within}"
 
     @property

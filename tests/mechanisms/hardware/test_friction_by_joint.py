@@ -312,5 +312,7 @@ def test_a_joint_that_a_free_body_carries_rubs_by_name():
         runs.append(smc.run(smc.Scenario(plant=plant, law=hovering(), **fields)))
     free, named, of_file = (trace.x for trace in runs)
     assert np.abs(named - of_file).max() < 1e-3 * np.abs(named - free).max()
-    with pytest.raises(smc.ScenarioError, match="takes no friction but on a joint by name"):
+    with pytest.raises(
+        smc.ScenarioError, match="takes no friction except on a joint that you name"
+    ):
         dataclasses.replace(runs[0].scenario, friction=smc.Coulomb(1e-4))
