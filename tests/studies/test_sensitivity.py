@@ -392,7 +392,7 @@ def test_runs_without_a_score_are_counted_and_too_many_are_not_explained():
         dataclasses.replace(base, duration=4.0), over, "settling_time", points=16
     )
     assert 0 < found.unscored < 16
-    assert f"{found.unscored} have none and count as the worst" in found.sentences[0]
+    assert f"{found.unscored} runs have none, and count as the worst" in found.sentences[0]
     many = dataclasses.replace(found, unscored=20)
     assert many.sentences[1].startswith("First: no axis")
 
