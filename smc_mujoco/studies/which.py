@@ -227,9 +227,7 @@ def which(
     candidates = trial.gains({machine.name: chosen})
     table = trial.run(candidates, seeds)
     settles, boards = judged(table)
-    found = {}
-    for candidate in candidates[machine.name]:
-        found[candidate.law.name] = candidate.law
+    found = {law.name: law for law, _, _ in candidates[machine.name]}
     ordered = tuple(found[name] for name in _order(boards))
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles, left_out=left_out)
 
