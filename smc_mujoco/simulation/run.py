@@ -47,7 +47,7 @@ SLICE_STEPS = 50_000  # physics steps times channels in a slice, about .2 s of a
 # it has diverged
 USER_MODEL_STEPS = 200
 PYTHON_STEPS = 20_000  # in a slice where a function is called in Python
-PATIENCE = 5.0  # s that a slice may still take after Ctrl-C; chosen: it lasts about a second
+PATIENCE = 5.0  # s that a slice may still take after Ctrl-C; chosen: it lasts about .2 s of a core
 FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 DRY_FRICTION = "dof_frictionloss", "tendon_frictionloss"  # fields of a model
 LOST_CONTACTS = (

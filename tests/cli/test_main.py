@@ -436,6 +436,18 @@ def test_a_warning_that_parts_of_a_command_repeat_is_printed_once(call, monkeypa
 # the process around it
 
 
+GARBAGE = """
+import smc_mujoco.cli.main
+class Garbage:
+    def __del__(self): print("collected")
+Garbage.one = Garbage()
+"""
+
+
+def test_a_command_does_not_wait_for_a_last_collection():
+    assert python("-c", GARBAGE).stdout == ""
+
+
 HELP = """
 import contextlib, io, sys
 from smc_mujoco.cli.main import main
