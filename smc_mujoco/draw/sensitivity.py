@@ -50,6 +50,9 @@ def draw(
         ]
         if found.failed.any():
             handles.append(pages.entry("a run that fails", style.INK, lw=0, marker="x"))
+        if found.regions:
+            border = pages.entry("region of failures", style.INK, ls="--", lw=style.points(1.2))
+            handles.append(border)
         tall = style.points(max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes)))
         rows, columns = (2, 1) if width < pages.NARROW else (1, 2)
         tall = pages.head_height(width, handles) + rows * tall
