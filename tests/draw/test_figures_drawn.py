@@ -12,6 +12,7 @@ from helpers.sketch import failed, made
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
@@ -187,24 +188,10 @@ def places(line: Line2D) -> np.ndarray:
 
 def every(page) -> list[Axes]:
     """All axes that show data, also those within others."""
-    return list(
-        dict.fromkeys(
-            ax
-            for each in page.axes
-            for ax in [each, *each.child_axes]
-            if ax.lines or ax.collections
-        )
-    )
-
-
-def legends(page) -> list:
-    parts = [page, *page.axes]
-    return [
-        one
-        for part in parts
-        for one in getattr(part, "legends", [getattr(part, "legend_", None)])
-        if one
-    ]
+    found = list(page.axes)
+    for ax in page.axes:
+        found += ax.child_axes
+    return [ax for ax in found if ax.lines or ax.collections]
 
 
 @pytest.mark.parametrize("kind", PAGES)
@@ -227,12 +214,12 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
             if isinstance(text, Text):  # also a title
                 box = text.get_window_extent()
                 assert 0.0 <= box.x0 <= box.x1 <= page.bbox.x1
-    handles = [one for legend in legends(page) for one in legend.legend_handles]
-    assert all(text.get_text() for legend in legends(page) for text in legend.get_texts())
-    entries = {
-        to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor())
-        for one in handles
-    }
+    entries = set()
+    legends: list = page.findobj(Legend)
+    for legend in legends:
+        assert all(text.get_text() for text in legend.get_texts())
+        for one in legend.legend_handles:
+            entries.add(to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor()))
     drawn = {to_hex(line.get_color()) for ax in every(page) for line in ax.lines} - NEUTRAL
     assert drawn <= entries
 
