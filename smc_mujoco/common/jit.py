@@ -377,7 +377,10 @@ class Cache:
         result = content[SEAL_SIZE:]
         if _seal(path, result) != content[:SEAL_SIZE]:
             return None
-        return internals.CompileResult._rebuild(target, *pickle.loads(result))
+        try:
+            return internals.CompileResult._rebuild(target, *pickle.loads(result))
+        except ModuleNotFoundError:  # of the law that another process compiled
+            return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Write numba's result for a signature, unless no other process could load it."""
