@@ -218,7 +218,7 @@ class Caption:
         corner = 5 * s if radius is None else radius
         draw.rounded_rectangle((left, top, right, bottom), corner, fill, rim, max(1, round(s)))
         middle = ((left + right) / 2, (top + bottom) / 2)
-        lines = int((bottom - top) / (PITCH * s))
+        lines = round((bottom - top) / (PITCH * s))
         words, size = fitted(words, right - left - 2 * PAD * s, LETTERS * s, lines)
         look = {"font": style.font(size), "anchor": "mm", "spacing": 0, "align": "center"}
         draw.text(middle, words, style.letters_on(fill), **look)

@@ -369,6 +369,11 @@ def staged(
     for i, track in enumerate(tracks):
         reach, puppets[i] = puppets[i].placed(track, courses[i], followed)
         reaches.append(reach)
+    if not (followed or tracks[0].trace.scenario.plant.on_stage):  # they stand on one floor
+        highest = max(puppet.height for puppet in puppets)
+        for i, puppet in enumerate(puppets):
+            reaches[i] = reaches[i] + np.array([0.0, 0.0, highest - puppet.height])
+            puppets[i] = dataclasses.replace(puppet, height=highest)
     points = np.concatenate(reaches)
     tiles, view = camera.tiles(len(tracks), caption.size, caption.top, caption.strip, points, turn)
     caption.place(tiles)

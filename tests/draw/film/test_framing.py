@@ -133,6 +133,7 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
     for law in ("super_twisting", "pid"):
         traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3, x0=0.1)))
     with filmed(traces, monkeypatch) as (stages, _):
+        assert len({shown.puppet.height for shown in stages}) == 1  # they stand on one floor
         for shown, mount in itertools.product(stages, stages[0].mounts):
             for part in (-1.0, 1.0):
                 whole = arrows.Arrow(0.0, part, (0.0,) * 4)
