@@ -497,28 +497,28 @@ class ScenarioBatch:
     def trace(self, i: int) -> Trace:
         """Return the Trace of simulation i."""
         code = int(self.records["failure"][i])
-        step = int(self.records["failed_step"][i])
-        if code != state.FINE:
-            failure = self.failure(i, code)
+        if code == state.FINE:
+            step, failure = self.spoiled(i)
         else:
-            failure = self.spoiled(i)
-            step = self.step if failure == TIPPED_OVER else 0
+            step, failure = int(self.records["failed_step"][i]), self.failure(i, code)
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
 
-    def spoiled(self, i: int) -> str | None:
-        """Return why simulation i counts as failed though it came to its end, or None."""
+    def spoiled(self, i: int) -> tuple[int, str | None]:
+        """Return why simulation i counts as failed though it came to its end, or None, and from
+        which physics step on.
+        """
         plant = self.scenarios[i].plant
         if not (self.model.npair or plant.is_user_model):
-            return None
+            return 0, None
         data = self.batch.get_data(i, self.scratch)
         if any(data.warning[kind].number for kind in FULL_WARNINGS):
-            return LOST_CONTACTS
+            return 0, LOST_CONTACTS
         if plant.is_user_model and not plant.pose:
             from smc_mujoco.mechanisms.custom import scales
 
             if scales.tips_over(self.model, data):
-                return TIPPED_OVER
-        return None
+                return self.step, TIPPED_OVER
+        return 0, None
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""

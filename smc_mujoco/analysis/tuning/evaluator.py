@@ -26,7 +26,6 @@ from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import (
     BATCH_BYTES,
-    LOST_CONTACTS,
     PlainLoopWarning,
     ScenarioBatch,
     cores,
@@ -230,9 +229,12 @@ class _Again(ScenarioBatch):
 
     def failed_at(self, i: int) -> float | None:
         """Return the time at which a run failed, s, or None."""
+        step = int(self.records["failed_step"][i])
         if self.records["failure"][i] == state.FINE:
-            return 0.0 if self.spoiled(i) == LOST_CONTACTS else None
-        return int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
+            step, failure = self.spoiled(i)
+            if failure is None:
+                return None
+        return step * self.scenarios[i].physics_step
 
 
 def sums(log: np.ndarray, period: float) -> Pair:

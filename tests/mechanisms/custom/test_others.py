@@ -11,6 +11,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.evaluator import Evaluator
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.mechanisms.custom import others, scales
 from smc_mujoco.mechanisms.named import as_plant
@@ -348,8 +350,9 @@ TALL = """<mujoco><worldbody><geom type="plane" size="9 9 1"/><body pos="0 0 .2"
 def test_a_run_whose_base_ends_on_its_side_has_failed(x0, tips):
     tall = smc.plant_from(TALL, {"j": {"motor": True}})
     assert not scales.falls(tall)  # it stands at the goal
-    trace = smc.run(smc.Scenario(plant=tall, law=PID, x0=x0, u_max=9.0, duration=2.0))
-    assert ("tipped over" in str(trace.failure)) == tips
+    scenario = smc.Scenario(plant=tall, law=PID, x0=x0, u_max=9.0, duration=2.0)
+    assert ("tipped over" in str(smc.run(scenario).failure)) == tips
+    assert Evaluator(Objective(), [scenario], ("kp",))([(PID.gains["kp"],)])[0].failed == tips
 
 
 BLOCK = """<mujoco model="block"><worldbody>
