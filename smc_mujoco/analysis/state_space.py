@@ -10,7 +10,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.design import DIFFERENCE_STEP
-from smc_mujoco.mechanisms.layout import dof_ids, drive_ids, joint_names
+from smc_mujoco.mechanisms.layout import channel_names, dof_ids, drive_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
@@ -64,7 +64,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     n = len(order)
     a = block[:n, :n][np.ix_(order, order)]
     b = block[:n, n:][np.ix_(order, driven)]
-    names = joint_names(plant)
+    names = channel_names(plant)
     if plant.pose:
         labels = names
     else:

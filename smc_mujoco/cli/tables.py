@@ -19,7 +19,7 @@ from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
-from smc_mujoco.mechanisms.layout import joint_names
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.conventions import CATALOGUE, Group, Metric, groups
@@ -175,7 +175,7 @@ def headings(scenario: Scenario) -> dict[Group, str]:
     of_plant = groups(scenario)
     if len(of_plant) == 1:
         return {of_plant[0]: ""}
-    names = joint_names(scenario.plant)
+    names = channel_names(scenario.plant)
     titles = {}
     for group in of_plant:
         n = len(group.channels)

@@ -113,7 +113,7 @@ def measurement_at(address):
 
 
 @njit
-def begun(address, t, dt, model, dynamics, n, driven):
+def begin_measurement(address, t, dt, model, dynamics, n, driven):
     """Store what is before the arrays of a measurement at an address, and return the
     measurement.
     """
@@ -129,7 +129,7 @@ def begun(address, t, dt, model, dynamics, n, driven):
 
 @njit
 def put_channel(y, i, x, v, a, limit, r, dr, ddr):
-    """Store what is measured of channel i, and its reference, in a measurement."""
+    """Store what is measured of channel i, its bound on |u| and its reference in a measurement."""
     y.x[i] = x
     y.v[i] = v
     y.e[i] = x - r

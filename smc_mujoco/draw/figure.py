@@ -18,7 +18,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
-from smc_mujoco.mechanisms.layout import joint_names
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.simulation.trace import Trace
 
 TIME_PANELS = {  # panel -> quantity, from top to bottom
@@ -379,7 +379,7 @@ def _draw_beside(
             plant = panel.traces[0].scenario.plant
             letter = "control u"
             if plant.driven > 1 or plant.direct:
-                letter = f"{joint_names(plant)[0]} u"
+                letter = f"{channel_names(plant)[0]} u"
             ax.set(xlabel="time before the end (ms)", ylabel=letter + panel.scale[1])
         elif name == "phase":
             drawing.phase(ax, next(portraits), runs.colours)

@@ -22,7 +22,7 @@ from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
-from smc_mujoco.mechanisms.layout import joint_names
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
 from smc_mujoco.simulation.trace import Trace
 
@@ -166,7 +166,7 @@ class Panel(NamedTuple):
         if single and plant.pose and name == "u" and group.unit == "m":  # of an actuator
             return f"actuator {group.channels[0] + 1} {letter}{unit}"
         if single and (plant.direct or self.channel is not None):
-            return f"{joint_names(plant)[group.channels[0]]} {letter}{unit}"
+            return f"{channel_names(plant)[group.channels[0]]} {letter}{unit}"
         if name in WORDS or (name == "s" and plant.mixed):  # mixed plants have low panels
             return letter + ("" if group.driven else " on q") + unit
         kind = "position" if group.unit == "m" else "angle"

@@ -20,7 +20,7 @@ from smc_mujoco.common.aliases import ArrayPair
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.envs.gymnasium_env import PlantEnv, action_space
 from smc_mujoco.mechanisms import rotation
-from smc_mujoco.mechanisms.layout import drive_ids, exerted, free_joint
+from smc_mujoco.mechanisms.layout import drive_ids, free_joint, unit_wrenches
 from smc_mujoco.mechanisms.plant import Plant
 
 
@@ -48,7 +48,7 @@ class FlightEnv(PlantEnv):
             raise ScenarioError(
                 f"an actuator of {scenario.plant.name} has no ctrlrange: give each one"
             )
-        self.wrenches = model.actuator_gainprm[drives, :1] * exerted(
+        self.wrenches = model.actuator_gainprm[drives, :1] * unit_wrenches(
             model, free_joint(model), drives.tolist()
         )
         self.least, self.most = model.actuator_ctrlrange[drives].T

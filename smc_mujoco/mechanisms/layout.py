@@ -21,7 +21,7 @@ ROTOR = "rotor:"
 PLAY = "play:"  # a tendon of length rotor - joint
 POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
 OWN = "smc:"  # begins the names of bodies that obstacles add
-BASE = "smc:base"  # the same of a free body whose pose is measured, beside driven joints
+BASE = "smc:base"  # such a site where the pose is only measured, beside driven joints
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
 # A pose: the position in the axes of the world, m, and the rotation vector of the attitude, rad,
@@ -29,7 +29,7 @@ START = "smc:start"  # keyframe with the initial positions of joints without a c
 PLACES = "x", "y", "z", "rx", "ry", "rz"
 
 
-def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
+def drive_actuators(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
     """Return the actuators that take commands, one for each driven channel."""
     return [actuator for actuator in spec.actuators if not actuator.name.startswith(PASSIVE)]
 
@@ -38,7 +38,7 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     """Return the channels' joints: first the driven ones, then those that are only measured."""
     if (site := spec.site(POSE)) is not None:
         return [site.parent.joints[0]] * len(PLACES)
-    found = [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
+    found = [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drive_actuators(spec)]
     names = [joint.name for joint in found]
     for sensor in spec.sensors:
         if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS and sensor.objname not in names:
@@ -77,7 +77,7 @@ def _moved_by(model: mujoco.MjModel, site: str) -> int:
     return int(model.body_jntadr[model.site_bodyid[index]])
 
 
-def exerted(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndarray:
+def unit_wrenches(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndarray:
     """Return force and torque on a free joint, in the body's axes, for each actuator's unit of
     force, (drives, 6).
     """
@@ -119,12 +119,14 @@ def joint_ids(model: mujoco.MjModel) -> np.ndarray:
 
 def driven_names(plant: Plant) -> tuple[str, ...]:
     """Return the names of the joints that have an actuator, (driven,)."""
-    return joint_names(plant)[: plant.driven]
+    return channel_names(plant)[: plant.driven]
 
 
 @functools.lru_cache(maxsize=32)
-def joint_names(plant: Plant) -> tuple[str, ...]:
-    """Return the name of each channel's joint, (n,)."""
+def channel_names(plant: Plant) -> tuple[str, ...]:
+    """Return a name for each channel, (n,): that of its joint, or for a pose such as body_x or
+    base_rz.
+    """
     model = compiled(plant.spec())
     names = [model.joint(int(joint)).name for joint in joint_ids(model)]
     if plant.pose:
@@ -142,7 +144,7 @@ def all_joints(plant: Plant) -> tuple[str, ...]:
     for joint in range(model.njnt):
         if model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE.value:  # or a hinge
             names.append(model.joint(joint).name)
-    first = [name for name in joint_names(plant) if name in names]
+    first = [name for name in channel_names(plant) if name in names]
     return tuple(filter(None, dict.fromkeys((*first, *names))))
 
 
@@ -176,7 +178,7 @@ def column_ends(plant: Plant) -> tuple[str, ...]:
     if plant.n == 1:
         return ("",)
     if plant.direct:
-        return tuple(f"_{name}" for name in joint_names(plant))
+        return tuple(f"_{name}" for name in channel_names(plant))
     return tuple(map(str, range(plant.n)))
 
 

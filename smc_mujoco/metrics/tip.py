@@ -24,10 +24,10 @@ from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.layout import (
     OWN,
+    channel_names,
     drive_ids,
     initial_pose,
     joint_ids,
-    joint_names,
 )
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
@@ -249,7 +249,7 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     """
     conventions.refuse(trace)
     values = {}
-    names = joint_names(trace.scenario.plant)
+    names = channel_names(trace.scenario.plant)
     for group in groups(trace.scenario):
         for i in group.channels:
             joint = dataclasses.replace(group, channels=(i,))

@@ -130,7 +130,7 @@ def offsets() -> Offsets:
 
 @njit(error_model="numpy", inline="always")
 def array_at(address):
-    """Return the array whose address is at an address, as a pointer."""
+    """Follow the pointer at an address: return the numbers to which it points."""
     return pointer(integers(address)[0])
 
 

@@ -24,7 +24,7 @@ from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, OnJoints, chains
-from smc_mujoco.mechanisms.layout import all_joints, driven_names, joint_names
+from smc_mujoco.mechanisms.layout import all_joints, channel_names, driven_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
@@ -307,7 +307,7 @@ def _split(value: Any, plant: Plant) -> tuple[Any, list[Any]]:
         if plant.measured and len(value) == plant.n:
             return value[: plant.driven], list(value[plant.driven :])
         return value, []
-    names = joint_names(plant)[plant.driven :] if plant.measured else ()
+    names = channel_names(plant)[plant.driven :] if plant.measured else ()
     if not any(name in value for name in names):
         return value, []
     driven = {joint: signal for joint, signal in value.items() if joint not in names}
@@ -374,7 +374,7 @@ def _placed(name: str, part: P, plant: Plant, joints: Sequence[str]) -> P:
     if isinstance(part, Friction) and not on:
         for value in stated(part).values():  # a number for each channel is one by name
             if isinstance(value, tuple) and len(value) == plant.n > plant.driven:
-                on = joint_names(plant)
+                on = channel_names(plant)
     for joint in on:
         if joint not in joints:
             raise unknown(f"joint of {plant.name} in {name}", joint, joints)
@@ -408,7 +408,7 @@ def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder,
     """Return the encoder of all channels, or those of some joints."""
     if value is None:
         return None
-    joints = joint_names(s.plant)
+    joints = channel_names(s.plant)
     items = _by_joint(name, value, s, Encoder, "smc.Encoder(counts=...)", joints)
     for joint, taken in zip(joints, chains(items, joints), strict=True):
         if len(taken) > 1:

@@ -54,7 +54,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.hardware.stepper import of_rig
-from smc_mujoco.mechanisms.layout import joint_names
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
@@ -458,7 +458,7 @@ def _each_joint(name: str, make: Callable[[float, Plant], Any]) -> Recipe:
         parts = [make(limit, plant) for limit in limits]
         if plant.pose or len(set(parts)) == 1:
             return {name: parts[0]}
-        return {name: dict(zip(joint_names(plant), parts, strict=False))}
+        return {name: dict(zip(channel_names(plant), parts, strict=False))}
 
     return fields
 

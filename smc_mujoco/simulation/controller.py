@@ -28,14 +28,14 @@ from numba import njit
 
 from smc_mujoco.common.jit import integers, pointer
 from smc_mujoco.common.mjcb import slots
-from smc_mujoco.control.joint_law import begun, put_channel
+from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import (
     channel_at,
     drive_at,
+    evaluate,
     function_at,
     generalised_disturbance,
-    raises,
     reader_at,
     state_at,
 )
@@ -178,7 +178,7 @@ def _interfered(sim):
 
 
 @njit(error_model="numpy", inline="always")
-def _sensor_raises(address, sim, i, k, t, hinge):
+def _read_sensor(address, sim, i, k, t, hinge):
     """Give the reading of channel i at sample k, at t s, its noise, and what the sensor makes of
     it. Return whether that raised.
     """
@@ -201,7 +201,7 @@ def _sensor_raises(address, sim, i, k, t, hinge):
     sight.j = j
     sight.hinge = hinge
     sight.chance = philox.uniform(sim.seed, i, philox.DROPOUT, j)
-    if raises(function, 0, address + record.AT.sight, address + record.AT.raw):
+    if evaluate(function, 0, address + record.AT.sight, address + record.AT.raw):
         return True
     reading.x = sim.raw.x
     reading.v = sim.raw.v
@@ -242,9 +242,9 @@ def _measure(address, sim, data, k, t):
         reading.x = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
         reading.v = data.sensordata[channel.v_sensor] + v_error
         sim.seen.i = i
-        if _sensor_raises(address, sim, i, k, t, channel.hinge_body >= 0):
+        if _read_sensor(address, sim, i, k, t, channel.hinge_body >= 0):
             return record.RAISED
-        if raises(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate):
+        if evaluate(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate):
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
         if sim.other_forces != 0:
@@ -255,10 +255,10 @@ def _measure(address, sim, data, k, t):
 
 
 @njit(error_model="numpy", inline="always")
-def _model_raises(address, sim, i):
+def _evaluate_model(address, sim, i):
     """Write nominal f and g of channel i into the record. Return whether the model raised."""
     sim.seen.i = i
-    return raises(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
+    return evaluate(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
 
 
 @njit(error_model="numpy")
@@ -283,7 +283,7 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
         # what the model takes for the force on each joint
         last_u[i] += pointer(sim.other_forces)[i]
     if sim.feedforward.address != 0:
-        if exogenous.signal_raises(address, sim.feedforward, 0):
+        if exogenous.evaluate_signal(address, sim.feedforward, 0):
             return record.RAISED
         feedforward = sim.motion.value
     for first in range(0, sim.driven, width):
@@ -297,7 +297,7 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
             law = sim.law
         else:
             law = function_at(sim.laws, first)
-        if raises(law, first, y, sim.commands):
+        if evaluate(law, first, y, sim.commands):
             return record.LAW_RAISED
         for j in range(min(width, sim.driven)):
             i = first + j
@@ -325,7 +325,7 @@ def update_law(address, sim, k, t):  # noqa: PLR0912
         buffer[i], sample.u, sample.s = 0.0, 0.0, 0.0
         if sim.referenced <= i:
             sample.r = 0.0
-        elif not joint and exogenous.reference_raises(address, sim, k, i):
+        elif not joint and exogenous.write_reference(address, sim, k, i):
             return record.RAISED
     for i in range(n if sim.other_forces != 0 else 0):
         drive = drive_at(sim.drives, i)
@@ -356,7 +356,7 @@ def _measure_channel(address, sim, k, t, i):
 
     The force in its nominal model is that of the drive, gain u - drag v.
     """
-    if exogenous.reference_raises(address, sim, k, i):
+    if exogenous.write_reference(address, sim, k, i):
         return record.RAISED
     y = sim.y
     x = pointer(sim.seen.x)
@@ -376,13 +376,13 @@ def _measure_channel(address, sim, k, t, i):
     y.gq = 0.0
     if sim.partners != 0:  # a joint without actuator moves with channel i
         partner = i + sim.driven
-        if _model_raises(address, sim, partner):
+        if _evaluate_model(address, sim, partner):
             return record.RAISED
         y.q = x[partner]
         y.dq = v[partner]
         y.fq = model.f - drive.drag * v[i] * model.g
         y.gq = drive.gain * model.g
-    if _model_raises(address, sim, i):
+    if _evaluate_model(address, sim, i):
         return record.RAISED
     y.f = model.f - drive.drag * v[i] * model.g
     y.g = drive.gain * model.g
@@ -404,7 +404,7 @@ def _measure_channel(address, sim, k, t, i):
     y.s = 0.0
     y.v_eq = 0.0
     if sim.surface.address != 0:
-        if raises(sim.surface, i, address + record.AT.y, address + record.AT.sliding):
+        if evaluate(sim.surface, i, address + record.AT.y, address + record.AT.sliding):
             return record.RAISED
         y.has_surface = 1.0
         y.s = sim.sliding.s
@@ -420,9 +420,9 @@ def _measure_joints(address, sim, k, t):
     dynamics = 0
     if sim.handle.coriolis != 0.0:
         dynamics = address + record.AT.handle
-    y = begun(sim.joint, t, sim.period, sim.uses_model, dynamics, sim.n, sim.driven)
+    y = begin_measurement(sim.joint, t, sim.period, sim.uses_model, dynamics, sim.n, sim.driven)
     for i in range(sim.n):
-        if exogenous.reference_raises(address, sim, k, i):
+        if exogenous.write_reference(address, sim, k, i):
             return record.RAISED
         put_channel(
             y,
@@ -454,7 +454,7 @@ def _measure_dynamics(address, sim, y):
         return failure
     if sim.dynamics.address == 0:
         failure = _separate_equations(address, sim, y)
-    elif raises(sim.dynamics, 0, address + record.AT.seen, y.M.ctypes.data):
+    elif evaluate(sim.dynamics, 0, address + record.AT.seen, y.M.ctypes.data):
         failure = record.RAISED
     v = pointer(sim.seen.v)
     for i in range(n):
@@ -479,7 +479,7 @@ def _separate_equations(address, sim, y):
         for i in range(n):
             v[i] = y.v[i] if moving else 0.0
         for i in range(n):
-            if _model_raises(address, sim, i):
+            if _evaluate_model(address, sim, i):
                 return record.RAISED
             y.M[i, i] = 1.0 / sim.model.g
             if moving:

@@ -1,8 +1,8 @@
 """The signals of a run, as the control callback evaluates them: references, measurement errors, and
 disturbances, of which each kind acts in its own way.
 
-Functions take what those of the controller take, and return a failure code of state.py, unless they
-say otherwise.
+`address`, `sim` and `data` are those of the controller. Functions that evaluate or apply signals
+return whether one raised, unless they say otherwise.
 """
 
 # pyright: reportCallIssue=false
@@ -12,18 +12,17 @@ import math
 from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
-from smc_mujoco.mechanisms.hardware.moments import channel_at, function_at, raises
+from smc_mujoco.mechanisms.hardware.moments import channel_at, evaluate, function_at
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.state import disturbance_at, log_at
 
 
 @njit(error_model="numpy", inline="always")
-def signal_raises(address, signal, i):
-    """Write the value of a signal in channel i, at the record's instant, into its motion.
-
+def evaluate_signal(address, signal, i):
+    """Write the value of a signal in channel i, at the record's instant, into the record's motion.
     Return whether the signal raised.
     """
-    return raises(signal, i, address + record.AT.instant, address + record.AT.motion)
+    return evaluate(signal, i, address + record.AT.instant, address + record.AT.motion)
 
 
 @njit(error_model="numpy", inline="always")
@@ -35,18 +34,18 @@ def measurement_error(address, sim, signal, t):
     if signal.address == 0:
         return -0.0
     sim.instant.t = t
-    if signal_raises(address, signal, 0):
+    if evaluate_signal(address, signal, 0):
         return math.nan
     return sim.motion.value
 
 
 @njit(error_model="numpy", inline="always")
-def reference_raises(address, sim, k, i):
+def write_reference(address, sim, k, i):
     """Write the reference of channel i into the record and the log. Return whether it raised."""
     if sim.references != 0:
-        if signal_raises(address, function_at(sim.references, i), 0):
+        if evaluate_signal(address, function_at(sim.references, i), 0):
             return True
-    elif i == 0 and signal_raises(address, sim.reference, 0):
+    elif i == 0 and evaluate_signal(address, sim.reference, 0):
         return True
     log_at(sim.log, k * sim.n + i).r = sim.motion.value
     return False
@@ -55,7 +54,7 @@ def reference_raises(address, sim, k, i):
 @njit(error_model="numpy")
 def disturb(address, sim, data, t, k):
     """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at
-    all others.
+    all others. Return a failure code of state.py.
     """
     sim.instant.t = t
     sim.instant.seed = sim.seed
@@ -99,7 +98,7 @@ def _push_bodies(address, sim, data):
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         if signal.body >= 0:
-            if signal_raises(address, signal.function, 0):
+            if evaluate_signal(address, signal.function, 0):
                 return True
             for axis in range(3):
                 data.xfrc_applied[signal.body + axis] += sim.motion.value * signal.peak[axis]
@@ -119,7 +118,7 @@ def _blow(address, sim):
         sim.instant.stream = signal.stream
         for axis in range(3 if signal.air != 0 else 0):
             sim.instant.channel = axis
-            if signal_raises(address, signal.function, axis):
+            if evaluate_signal(address, signal.function, axis):
                 return True
             sim.wind[axis] += sim.motion.value * signal.peak[axis]
     call(sim.push.function.address, address, address + record.AT.push, 0, 0)
@@ -128,17 +127,19 @@ def _blow(address, sim):
 
 @njit(error_model="numpy")
 def _load(address, sim, data, signal, k):
-    """Apply a disturbance that is a force on every channel. Return whether it raised."""
+    """Apply a disturbance of every channel: a force on its joint, or a horizontal one on its body.
+    Return whether it raised.
+    """
     instant = sim.instant
     instant.stream = signal.stream
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         if signal.sees != 0:
-            if _feedback_raises(address, sim, data, signal.function, i, k):
+            if _evaluate_feedback(address, sim, data, signal.function, i, k):
                 return True
         elif signal.stream != 0.0 or i == 0:  # without random numbers all channels have the same
             instant.channel = i
-            if signal_raises(address, signal.function, i):
+            if evaluate_signal(address, signal.function, i):
                 return True
         force = sim.motion.value
         if signal.cartesian != 0:
@@ -151,8 +152,9 @@ def _load(address, sim, data, signal, k):
 
 
 @njit(error_model="numpy")
-def _feedback_raises(address, sim, data, function, i, k):
-    """Write the force of a disturbance that sees the loop: the last one again if k < 0.
+def _evaluate_feedback(address, sim, data, function, i, k):
+    """Write the force of a disturbance that sees the loop into the record's motion. It is evaluated
+    once a sample, in channel 0, and repeated in the other channels and at other stages.
 
     Return whether it raised.
     """
@@ -169,4 +171,4 @@ def _feedback_raises(address, sim, data, function, i, k):
     instant.e = data.qpos[channel.qpos] - sample.r
     instant.de = data.qvel[channel.qvel] - (sample.r - before) / sim.period
     instant.s = sample.s
-    return signal_raises(address, function, 0)
+    return evaluate_signal(address, function, 0)

@@ -30,11 +30,11 @@ from smc_mujoco.mechanisms.layout import (
     POSE,
     base_joint,
     drive_ids,
-    exerted,
     free_joint,
     joint_ids,
     moving_joints,
     state_with,
+    unit_wrenches,
 )
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
@@ -262,7 +262,9 @@ def mixer(plant: Plant) -> np.ndarray:
         return np.zeros((0, 8))
     model = plant.load()
     drives = drive_ids(model)
-    forces = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
+    forces = model.actuator_gainprm[drives, :1] * unit_wrenches(
+        model, free_joint(model), drives.tolist()
+    )
     limited = model.actuator_ctrllimited[drives].astype(bool)[:, None]
     bounds = np.where(limited, model.actuator_ctrlrange[drives], (-np.inf, np.inf))
     return np.hstack([np.linalg.pinv(forces.T, rcond=1e-9), bounds])

@@ -1,6 +1,6 @@
 """The parts of a run, as the control callback lets them act on the joints.
 
-Functions take what those of the controller take.
+`address`, `sim` and `data` are those of the controller.
 """
 
 # pyright: reportCallIssue=false
@@ -12,9 +12,9 @@ from smc_mujoco.mechanisms.hardware.moments import (
     PART,
     channel_at,
     drive_at,
+    evaluate,
     generalised_disturbance,
     part_at,
-    raises,
     state_at,
     torque,
 )
@@ -61,7 +61,11 @@ def act(address, sim, data):
 
 @njit(error_model="numpy")
 def _exert(address, sim, data, part):
-    """Give a joint the force of a part. Return whether that raised or is no number."""
+    """Evaluate a part on one joint. Its force goes to ctrl, or is added to those of other parts. A
+    brake also sets the joint's dry friction.
+
+    Return whether the part raised, or gave what is NaN or too large.
+    """
     i = part.channel
     channel = channel_at(sim.channels, i)
     state = state_at(sim.states, i)
@@ -98,7 +102,7 @@ def _exert(address, sim, data, part):
         y.motor = data.actuator_force[channel.force]
     sim.seen.i = i
     out = sim.exerted
-    if raises(part.function, 0, address + record.AT.joint_state, address + record.AT.exerted):
+    if evaluate(part.function, 0, address + record.AT.joint_state, address + record.AT.exerted):
         return True
     if sim.stage == 0 and not abs(out.force) < MAX_CONTROL:
         return True

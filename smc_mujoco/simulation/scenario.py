@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.hardware.friction import DryFriction, LuGre
 from smc_mujoco.mechanisms.hardware.moments import Torque
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, Part, chains
 from smc_mujoco.mechanisms.hardware.rotors import Rotors, flies
-from smc_mujoco.mechanisms.layout import drive_ids, driven_names, joint_names, moves_alone
+from smc_mujoco.mechanisms.layout import channel_names, drive_ids, driven_names, moves_alone
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
@@ -380,14 +380,15 @@ class Scenario:
 
     @property
     def held_by_noslip(self) -> bool:
-        """Whether, without contact or other friction, MuJoCo's noslip pass holds a user's dry
-        friction under RK4.
+        """Whether MuJoCo's noslip pass holds a user's dry friction under RK4.
+
+        It is False with contact or other friction, and where damping makes RK4 unstable.
         """
         if self.contact or not all(part.exact == DryFriction() for part in self.friction):
             return False
         if not self.plant.is_user_model or not all(part.drives for part in self.actuator):
             return False
-        from smc_mujoco.mechanisms.custom.stiffness import held_by_noslip
+        from smc_mujoco.mechanisms.custom.constraints import held_by_noslip
 
         return held_by_noslip(self.plant, REALISTIC_STEP)
 
@@ -1148,7 +1149,7 @@ def _assumed_bound(plant: Plant, limits: tuple[float, ...]) -> str:
     free = [i for i, limit in enumerate(own) if limit == math.inf and suggested[i] is None]
     if not free:
         return ""
-    joints = joined(repr(joint_names(plant)[i]) for i in free)
+    joints = joined(repr(channel_names(plant)[i]) for i in free)
     bounds = joined(dict.fromkeys(f"{limits[i]:g} {plant.efforts[i]}" for i in free))
     what = "joint" if len(free) == 1 else "joints"
     example = f"u_max={limits[free[0]]:g}"

@@ -24,7 +24,7 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
-from smc_mujoco.mechanisms.layout import column_ends, joint_names
+from smc_mujoco.mechanisms.layout import channel_names, column_ends
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.scenario import Scenario
@@ -288,7 +288,7 @@ class Trace:
         variables = {}
         for n in ARRAYS[1:]:
             variables[n] = (("t", "channel"), getattr(self, n), {"units": self._unit(n)})
-        joints = "channel", list(joint_names(self.scenario.plant))
+        joints = "channel", list(channel_names(self.scenario.plant))
         coords = {
             "t": ("t", self.t, {"units": "s"}),
             "channel": np.arange(self.x.shape[1]),

@@ -317,7 +317,7 @@ def compare(
     for plant in machines:
         chosen[plant.name] = of_all or [law_or_template(law) for law in _usual(plant)]
     trial.check(chosen)
-    candidates = trial.gains(chosen)
+    candidates = trial.candidates(chosen)
     table = trial.run(candidates, seeds)
     found = {}
     if worst:

@@ -153,7 +153,9 @@ class Trial(NamedTuple):
         return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=self.starts)
 
     def check(self, laws: Mapping[str, Laws]) -> None:
-        """Refuse, before gains are searched, two things of one name, and what moves nothing."""
+        """Refuse, before gains are searched, two things of one name, and conditions in which
+        nothing moves.
+        """
         for of_plant in laws.values():
             made = list(map(coerce.law, of_plant))
             check_names(self.plants, made, self.conditions)
@@ -166,7 +168,7 @@ class Trial(NamedTuple):
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
 
-    def gains(self, laws: Mapping[str, Laws]) -> dict[str, list[Candidate]]:
+    def candidates(self, laws: Mapping[str, Laws]) -> dict[str, list[Candidate]]:
         """Return plant -> its laws with gains: given, shipped, tuned or default ones, in this order
         of preference.
 
@@ -208,12 +210,14 @@ class Trial(NamedTuple):
                     begun += 1
                     if self.progress:
                         print(f"gains of law {begun} of {count}", file=sys.stderr)
-                    candidate = self.tuned(plant, law, starts[plant.name])
+                    candidate = self.search_gains(plant, law, starts[plant.name])
                 made[plant.name].append(candidate)
         return made
 
     def expected(self, plant: Plant, laws: Laws, starts: Starts | None) -> tuple[float, int]:
-        """Return what `search.expected_of` does with the objective of this trial."""
+        """Return how long an evaluation takes, s, and how many one search of each law makes at
+        most, in all.
+        """
         from smc_mujoco.analysis.tuning import search
 
         goal = self._goal(plant, starts)
@@ -257,9 +261,11 @@ class Trial(NamedTuple):
         conditions = tuple(c for c in usual.conditions if c.name in fit)
         return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
-    def tuned(self, plant: Plant, law: Component | Template, starts: Starts | None) -> Candidate:
-        """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if
-        it cannot.
+    def search_gains(
+        self, plant: Plant, law: Component | Template, starts: Starts | None
+    ) -> Candidate:
+        """Return a law with gains that searches find, or found in an earlier call, or with its
+        defaults if it cannot be tuned.
         """
         from smc_mujoco.analysis.tuning import result, search
 

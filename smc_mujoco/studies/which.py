@@ -219,12 +219,12 @@ def which(
         _tell_time(trial, machine, chosen, seeds)
     left_out: list[str] = []
     if brief and len(chosen) > FINALISTS:
-        first = trial._replace(searches=1).gains({machine.name: chosen})
+        first = trial._replace(searches=1).candidates({machine.name: chosen})
         _, boards = judged(trial.run(first, min(FEW, seeds), half_steps=False))
         best = _order(boards)[:FINALISTS]
         left_out = [law.name for law in chosen if law.name not in best]
         chosen = [law for law in chosen if law.name in best]
-    candidates = trial.gains({machine.name: chosen})
+    candidates = trial.candidates({machine.name: chosen})
     table = trial.run(candidates, seeds)
     settles, boards = judged(table)
     found = {law.name: law for law, _, _ in candidates[machine.name]}

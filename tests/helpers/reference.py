@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, drive_ste
 from smc_mujoco.mechanisms.hardware.friction import dry_step
 from smc_mujoco.mechanisms.hardware.moments import torque
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
-from smc_mujoco.mechanisms.layout import joint_names
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
@@ -140,7 +140,7 @@ class Loop:
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         # the mean force in a step of RK4, and its rise to the last stage
         self.middle, self.rise = np.zeros((2, n))
-        names = joint_names(scenario.plant)
+        names = channel_names(scenario.plant)
         self.formulas: list[Sliding | None] = [None] * n
         self.numbers: list[tuple] = [()] * n
         for formula in self.scenario.friction:

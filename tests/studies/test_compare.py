@@ -285,7 +285,7 @@ REFUSED = [
 def test_what_cannot_run_is_refused_before_any_gains_are_searched(
     arguments, named, said, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(fair_gains.Trial, "tuned", None)
+    monkeypatch.setattr(fair_gains.Trial, "search_gains", None)
     with pytest.raises(smc.ScenarioError, match=said):
         smc.compare(
             *arguments,

@@ -28,15 +28,15 @@ def trial(folder, plants=(), starts=None, **search) -> Trial:
 def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
     asked = []
 
-    def tuned(self, plant, law, starts):
+    def search_gains(self, plant, law, starts):
         asked.append(starts)
 
-    monkeypatch.setattr(Trial, "tuned", tuned)
+    monkeypatch.setattr(Trial, "search_gains", search_gains)
     other = smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
-        trial(Path("gains"), [plant], other, defaults=True).gains({"duffing": laws})
+        trial(Path("gains"), [plant], other, defaults=True).candidates({"duffing": laws})
     assert asked == [None, other, other]
 
 
@@ -60,7 +60,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
     heavy = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
     for _ in range(2):
         searched = trial(tmp_path, [heavy], searches=2, budget=8)
-        (found,) = searched.gains({"mine": [my_pd]})["mine"]
+        (found,) = searched.candidates({"mine": [my_pd]})["mine"]
         assert found.law.function is my_pd.function
         assert found.law.gains == tuned[0].law.gains != my_pd.defaults
         assert [dict(law.gains) for law in found.sets] == [
@@ -97,7 +97,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         (DUFFING, held),
         (other, held),
     ):
-        trial(tmp_path).tuned(plant, law, None)
+        trial(tmp_path).search_gains(plant, law, None)
     assert asked[0] == asked[1]
     assert len(set(asked)) == 3
 
@@ -118,12 +118,12 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     )
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
     default = smc.law("observer_free")
-    own = trial(tmp_path).tuned(DUFFING, default, None)
+    own = trial(tmp_path).search_gains(DUFFING, default, None)
     assert own.law == default
     assert own.remark == "its defaults, better than those tried"
     assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
-    found = trial(tmp_path).tuned(DUFFING, default, None)
+    found = trial(tmp_path).search_gains(DUFFING, default, None)
     assert found.law == FAST
     assert found.remark == ""
     # also with another seed of the comparison run i has the gains of search i

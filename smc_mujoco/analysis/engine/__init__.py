@@ -23,6 +23,7 @@ class Available(OneOf):
     """One of some devices, of which this machine has the package and the hardware."""
 
     def __call__(self, what: str, value: Any) -> str:
+        """Return the device, or raise ScenarioError. To check "cuda" it opens the GPU."""
         if super().__call__(what, value) == "cuda":
             from smc_mujoco.analysis.engine import gpu
 

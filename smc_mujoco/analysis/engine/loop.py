@@ -35,7 +35,7 @@ from smc_mujoco.analysis.engine.scores import own, tallying
 from smc_mujoco.common.jit import call, named, place
 from smc_mujoco.common.numba_internals import arrayobj, cgutils
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import begun, put_channel
+from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.drives import kept_at
 from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
@@ -460,7 +460,7 @@ def _asking_all(form: Form, refer: Any, compile_user: Compiler) -> Any:
         for i in range(size):
             work[MEASURED + i] = 0.0
         address = place(work) + 8 * MEASURED
-        y = begun(address, t, row[PERIOD], row[USES_MODEL], 0, n, driven)
+        y = begin_measurement(address, t, row[PERIOD], row[USES_MODEL], 0, n, driven)
         known = values(row, KNOWN)
         xs = view(work, SEEN_X, n)
         vs = view(work, SEEN_V, n)

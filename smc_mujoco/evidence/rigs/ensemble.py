@@ -142,8 +142,8 @@ def compare(
     threads: int | None,
     **options: Any,
 ) -> tuple[Table, Boards, list[Candidate]]:
-    """Return the runs of laws on all parameter sets, their boards, and those that were tuned: all
-    if `searches` is given, otherwise none.
+    """Return the runs of laws on all parameter sets, their boards, and the laws with the gains that
+    searches found: none unless `searches` is given.
 
     Arguments are as in `smc.compare`; `options` are those of `leaderboard`.
     """

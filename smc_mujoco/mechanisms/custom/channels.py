@@ -26,7 +26,7 @@ from smc_mujoco.common.errors import (
     users_stacklevel,
 )
 from smc_mujoco.mechanisms.custom.mjcf import pick
-from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, exerted
+from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, unit_wrenches
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
 from smc_mujoco.mechanisms.rotation import rotation_vector
 
@@ -341,7 +341,7 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
         model.actuator_forcelimited[drives] == 1
     ]
     largest = np.abs(ends).max(axis=1)
-    forces = exerted(model, model.joint(joint).id, drives)
+    forces = unit_wrenches(model, model.joint(joint).id, drives)
     sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
     reached = [float(np.sum(largest[column > 0.0] * column[column > 0.0])) for column in sizes.T]
     return (reached[0],) * 3 + tuple(reached[1:])
@@ -351,7 +351,7 @@ def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "
     """Return what of its pose a free body can hold, as a Plant has it; warn if that is less than
     its heading.
     """
-    forces = exerted(model, model.joint(joint).id, thrusters(model, joint))
+    forces = unit_wrenches(model, model.joint(joint).id, thrusters(model, joint))
     rank = np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max())
     if rank < FLIES:
         text = (

@@ -36,10 +36,15 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
+from smc_mujoco.mechanisms.custom.constraints import (
+    default_friction,
+    smooth,
+    softness_warnings,
+    touches,
+)
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.custom.others import OTHERS, check_clear, limp, ties
-from smc_mujoco.mechanisms.custom.stiffness import default_friction, smooth, soft, touches
 from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
 from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges
 
@@ -116,7 +121,7 @@ def plant_from(
     if touches(model):
         check_clear(source, pairs, keyframe)
     read = urdf.read(Path(source.path))
-    doubts = [*(read.notes(source.label) if read else ()), *soft(source.label, made)]
+    doubts = [*(read.notes(source.label) if read else ()), *softness_warnings(source.label, made)]
     _, outside = ((), []) if made.pose else own.goals(model, joints_of(pairs), keyframe)
     for joint in outside:
         doubts.append(

@@ -11,9 +11,9 @@ from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom.channels import Motor, Pairs, joints_of
+from smc_mujoco.mechanisms.custom.constraints import harden
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.others import edit
-from smc_mujoco.mechanisms.custom.stiffness import harden
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
 
@@ -29,7 +29,7 @@ class UserModel:
     channels: Pairs
     motors: tuple[Motor, ...]
     tip: str = ""
-    # indices of the actuators of a free joint, which is then the only channel
+    # indices of the actuators of a free joint, which then has the six channels
     thrusters: tuple[int, ...] = ()
     others: str = ""  # one of others.OTHERS, or "" if not given
     measured: Names = ()  # joints that are measured beside the channels
@@ -46,7 +46,9 @@ class UserModel:
         return spec
 
     def __call__(self, n: int) -> mujoco.MjSpec:
-        """Return the model with a motor and two sensors per channel."""
+        """Return the model with the sensors of each channel, and a motor for each driven one. A
+        free joint keeps its thrusters instead of motors.
+        """
         spec = self.edited()
         if self.thrusters:
             own.add_pose(spec, self.channels[0][0], self.thrusters)

@@ -31,7 +31,7 @@ from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
-from smc_mujoco.mechanisms.layout import joint_names
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
 PerJoint = float | Sequence[float]  # one number for all joints, or one for each
@@ -95,7 +95,7 @@ class JointForce(JointPart, Friction):
         """
         joints = self.joint_names(plant)
         for joint in joints:
-            if joint not in (known := joint_names(plant)):
+            if joint not in (known := channel_names(plant)):
                 raise unknown(f"joint of {type(self).__name__} on {plant.name}", joint, known)
         self.check_lengths(plant, len(joints))
 

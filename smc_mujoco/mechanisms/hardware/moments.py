@@ -153,7 +153,7 @@ channel_at, state_at, drive_at, reader_at, function_at, part_at = map(
 
 
 @njit(error_model="numpy", inline="always")
-def raises(function, i, inputs, outputs):
+def evaluate(function, i, inputs, outputs):
     """Call a FUNCTION for channel i, with the addresses of its inputs and outputs. Return whether
     it raised.
     """

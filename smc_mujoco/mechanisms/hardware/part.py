@@ -20,12 +20,12 @@ from smc_mujoco.common.text import stated
 from smc_mujoco.mechanisms.hardware.moments import Run, Torque
 from smc_mujoco.mechanisms.layout import (
     ROTOR,
+    channel_names,
     dof_ids,
+    drive_actuators,
     drive_ids,
     driven_ids,
     driven_names,
-    drives,
-    joint_names,
     joints,
 )
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
@@ -128,7 +128,7 @@ class OnJoints(Part):
     def channels(self, plant: Plant) -> Sequence[int]:
         if not self.on:
             return range(plant.driven)
-        return [joint_names(plant).index(name) for name in self.on]
+        return [channel_names(plant).index(name) for name in self.on]
 
     def joint_names(self, plant: Plant) -> tuple[str, ...]:
         """Return the names of the plant's joints that it acts on."""
@@ -156,7 +156,7 @@ class Friction(OnJoints):
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""
         named = [spec.joint(name) for name in self.on]
-        return named or joints(spec)[: len(drives(spec))]
+        return named or joints(spec)[: len(drive_actuators(spec))]
 
     def dofs(self, model: mujoco.MjModel) -> np.ndarray:
         """Return the degrees of freedom that it acts on."""
@@ -221,8 +221,10 @@ class Actuator(OnJoints):
     def drives_of(self, spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
         """Return the actuators that it changes."""
         if not self.on:
-            return drives(spec)
-        return [drive for drive in drives(spec) if drive.target.removeprefix(ROTOR) in self.on]
+            return drive_actuators(spec)
+        return [
+            drive for drive in drive_actuators(spec) if drive.target.removeprefix(ROTOR) in self.on
+        ]
 
     def drive_ids(self, model: mujoco.MjModel) -> np.ndarray:
         """Return their indices in the compiled model."""

@@ -14,9 +14,9 @@ from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
 from smc_mujoco.mechanisms.plant import Plant
 
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
-GIVE = 2e-3  # rad (m) for 1 rad/s (m/s), chosen: of constraints that give way by more
-CREEP = 1e-6  # rad/s (m/s), chosen: of dry friction that creeps faster
-STEP = 2.5e-4  # s, of runs with constraints
+MAX_GIVE = 2e-3  # rad (m) for a blow of 1 rad/s (m/s): a warning tells of more; chosen
+MAX_CREEP = 1e-6  # rad/s (m/s) of dry friction: a warning tells of more; chosen
+TEST_STEP = 2.5e-4  # s, at which softness is measured: that of runs with constraints
 # MuJoCo's noslip pass, which keeps stuck joints from creeping: the most iterations, and tolerance
 NOSLIP = 100, 1e-12
 FLAGS = mujoco.mjtDisableBit
@@ -40,8 +40,8 @@ def touches(model: mujoco.MjModel) -> bool:
 
 
 def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
-    """Return whether the model can have no constraint: no limits, contacts, equalities, or dry
-    friction; of joints it does not count if it `rubs`.
+    """Return whether no constraint is possible: no limits, contacts, equalities, or dry friction.
+    With `rubs`, dry friction of joints does not count.
     """
     if model.opt.disableflags & FLAGS.mjDSBL_CONSTRAINT.value:
         return True
@@ -58,8 +58,8 @@ def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
 
 @functools.lru_cache(maxsize=32)
 def held_by_noslip(plant: Plant, step: float) -> bool:
-    """Return whether the noslip pass holds all dry friction, no actuator but the channels' motors
-    acts, and RK4 at this step, s, is stable with the joints' damping.
+    """Return whether a plant can run under RK4 at this step, s, with its dry friction left to the
+    noslip pass. Damping so strong that RK4 would be unstable rules it out, as other actuators do.
     """
     model = compiled(plant.spec())
     if (model.opt.noslip_iterations, model.opt.noslip_tolerance) != NOSLIP:
@@ -86,12 +86,12 @@ def default_friction(model: mujoco.MjModel) -> bool:
     return bool(np.any(dry) and np.all(model.dof_solref[dry] == SOFT_SOLREF))
 
 
-def soft(label: str, made: Plant) -> list[str]:
-    """Return a sentence on joint limits, contacts and equality constraints that give way to a blow
-    of 1 rad/s (m/s) by more than GIVE, and one on dry friction that creeps.
+def softness_warnings(label: str, made: Plant) -> list[str]:
+    """Return warnings: a sentence on joint limits, contacts and equality constraints that give way
+    to a blow of 1 rad/s (m/s) by more than MAX_GIVE, and one on dry friction that creeps.
     """
     model = made.load()
-    model.opt.timestep = STEP
+    model.opt.timestep = TEST_STEP
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -110,7 +110,7 @@ def soft(label: str, made: Plant) -> list[str]:
 
 
 def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
-    """Return what gives way by more than GIVE, and by how much, in mrad (mm).
+    """Return what gives way by more than MAX_GIVE, and by how much, in mrad (mm).
 
     A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
     by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
@@ -125,7 +125,7 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
         z = np.where(first > 0.0, second, -second / (2.0 * w))
         blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
         rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
-        if blow > GIVE:
+        if blow > MAX_GIVE:
             parts.append(f"its {what} by {1e3 * blow:.2g} and {1e3 * rest:.1g} ({option})")
 
     off = model.opt.disableflags
@@ -147,7 +147,7 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
 
 
 def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
-    """Return a sentence if dry friction creeps by more than CREEP.
+    """Return a sentence if dry friction creeps by more than MAX_CREEP.
 
     Friction that holds F creeps by R F/b, with MuJoCo's regularisation R and damping b.
     """
@@ -155,7 +155,7 @@ def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[st
     dry = np.isin(data.efc_type, (kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON))
     slack = data.efc_R[dry] / data.efc_KBIP[dry, 1]
     creep = np.max(slack * data.efc_frictionloss[dry], initial=0.0)
-    if not creep > CREEP:
+    if not creep > MAX_CREEP:
         return []
     # what it holds once the soft constraints have given way
     model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
