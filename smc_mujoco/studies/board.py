@@ -27,31 +27,39 @@ LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
 FEW = (
-    f"With fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, which covers "
-    "less."
+    f"With fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, covering under "
+    f"{100 * LEVEL:g} %."
 )
 MEDIANS = (
-    f"Medians with {100 * LEVEL:g} % intervals over runs or, where runs share gains, over sets of "
-    f"gains. {FEW}"
+    f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains if runs share "
+    f"them. {FEW}"
 )
-MARKS = (
-    "A mark: no law is better, every run has arrived, and there are enough samples to see a lead. "
-    "Arrived: in the last fifth of the run the error stays within 10 % of the start, or within 5 "
-    "times the sensor's resolution. "
-    "'detects a 24 % lead': a lead of 24 % between the law and the one in front would have been "
-    f"seen in {100 * POWER:g} % of such comparisons; 'detects no lead': no lead, however large, "
-    "would have been seen. 'never', 'fails' and 'not arrived' rank behind every value. 'below 0.01 "
-    "rad': below the floor, the least that the problem can show (half a count of the encoder, the "
-    f"noise, 1e-4 of the start, or {100 * MIN_COMMAND_SHARE:g} % of the bound on u); such values "
-    "count as equal. "
-    "'by the step': the medians at the physics step and at half of it, where they differ by more "
-    f"than {APART}; {RANGE}."
-)
+# A word in tables -> what their key says about it.
+MARKS = {
+    "J (": "J: error plus weighted variation of u, which tuning minimised; here on unseen runs, "
+    "which no search used.",
+    "ITAE": "ITAE: the integral of time times the error's magnitude.",
+    "TV rate": "TV rate: the total variation of u per second.",
+    "": "A mark: no law is better, every run has arrived, and there are enough samples to see a "
+    "lead. Arrived: in the last fifth of the run the error stays within 10 % of its initial value, "
+    "or within 5 times the sensor's resolution.",
+    "detects": f"'detects a 24 % lead': {100 * POWER:g} % of such comparisons would show a lead of "
+    "24 % between this law and the leader; in the leader's cell, between it and its closest rival.",
+    "no lead": "'detects no lead': too few runs to see any lead.",
+    "never": "'never' ranks behind every value.",
+    "fails": "'fails' ranks behind every value.",
+    "not arrived": "'not arrived' ranks behind every value.",
+    "below": "'below 0.01 rad': below the floor, the least that the problem can show: for an error "
+    "1e-4 of the start, and late in the run at least half an encoder count and the noise; for u "
+    f"{100 * MIN_COMMAND_SHARE:g} % of its bound. Such values count as equal.",
+    "by the step": "'by the step': the medians at the physics step and at half of it, where they "
+    f"differ by more than {APART}; {RANGE}.",
+}
 
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval]; bold: no law is better.",
-    "detects": f"Detects a 24 % lead: it would be seen in {100 * POWER:g} % of such tests.",
+    "detects": f"Detects a 24 % lead: {100 * POWER:g} % of such comparisons would show it.",
     "no lead": "Detects no lead: too few runs to see any lead.",
     "below": "Below 0.01 rad: below the least that the problem can show; such laws are not ranked.",
     "by the step": "By the step: the median at the physics step, and at half of it.",
@@ -85,7 +93,7 @@ class Lead(NamedTuple):
     def words(self) -> str:
         """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), ahead in 24 of
         24 runs"; "there in every run, while pid has none in 5 of 24, ahead in 24 of 24 runs";
-        "below the floor of 0.01 rad, and pid's is at least 1.3 times that".
+        "below the floor of 0.01 rad, and pid's is at least 1.3 times the floor".
         """
         ratio, low, high = map(number, self.effect[:3])
         if self.floor:
@@ -93,7 +101,7 @@ class Lead(NamedTuple):
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
             text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
-            return f"{text} {number(least)} times that"
+            return f"{text} {number(least)} times the floor"
         if self.effect.sets:
             samples = "sets of gains"
         else:
@@ -384,7 +392,7 @@ class Boards(Tables, list[Board]):
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
         made = [_table(name, boards) for name, boards in groups.items()]
-        notes = *made[-1].notes, *self.failures, key(self)
+        notes = *made[-1].notes, *self.failures, key(self, repr(made))
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 
 
@@ -488,16 +496,20 @@ def _detects(lead: float, silent: int) -> str:
     return f"detects a {100 * lead:.2g} % lead"
 
 
-def key(boards: Sequence[Board]) -> str:
-    """Return what the cells of a table show."""
+def key(boards: Sequence[Board], tables: str) -> str:
+    """Return what the cells of these tables show."""
     family = max(board.family for board in boards)
     winner = (
         "A winner is better than every other law in a paired test, corrected for "
         f"{counted(family, 'comparison')} per metric. The rival that a verdict names is the one "
         "hardest to tell from the winner. A lead is measured on pairs of runs, not on medians. "
-        f"Ahead means by more than {100 * boards[0].relevant:g} % of the larger value."
+        f"Ahead: better by over {100 * boards[0].relevant:g} % of the larger value."
     )
-    parts = [MEDIANS, MARKS, winner]
+    parts = [MEDIANS]
+    for word, text in MARKS.items():
+        if word in tables:
+            parts.append(text)
+    parts.append(winner)
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")
     if gains := in_words(sources(boards)):

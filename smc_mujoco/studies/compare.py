@@ -51,7 +51,7 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Time that the compiled laws take per sample, on this machine"
 TIME_HEADINGS = "plant", "law", "relative to pid", "median (s)", "99 % quantile (s)"
 GAINS = "plant", "law", "gains", "sets", "best set"
-BEST_SET = "Run i uses set i, and after the last set the first again; the best set has the least J."
+BEST_SET = "Run i uses set i, starting over after the last; the best set has the least J."
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
