@@ -127,7 +127,9 @@ class Caption:
         (wide, high), (badge, below) = (sizes.max(axis=0) for sizes in self.boxes(width))
         if max(wide, badge) > width - 2 * gap:
             return math.inf
-        return float(high + below + (1.5 + (below > 0.0)) * gap)
+        if wide + badge + 3 * gap <= width:  # side by side
+            return float(max(high, below) + 1.5 * gap)
+        return float(high + below + 2.5 * gap)
 
     def place(self, tiles: Array) -> None:
         """Place labels and badges at the feet of tiles, (machines, 4) px."""
@@ -136,9 +138,17 @@ class Caption:
         room = float(tiles[0, 2] - tiles[0, 0])
         labels, badges = self.boxes(room)
         middle = (tiles[:, 0] + tiles[:, 2]) / 2
+        beside = middle
         foot = tiles[:, 3] - gap
-        self.badges = around(middle, foot - badges[:, 1] / 2, *badges.T)
-        foot = foot - badges[:, 1].max() - gap * badges[:, 1].any()
+        below = foot - badges[:, 1] / 2
+        if labels[:, 0].max() + badges[:, 0].max() + 3 * gap <= room:
+            apart = gap * (badges[:, 0] > 0.0)
+            beside = middle + (labels[:, 0] + apart) / 2
+            middle = middle - (badges[:, 0] + apart) / 2
+            below = foot - labels[:, 1] + badges[:, 1] / 2
+        else:
+            foot = foot - badges[:, 1].max() - gap
+        self.badges = around(beside, below, *badges.T)
         labels = labels.clip(0.0, room - 2 * gap)
         self.pills = around(middle, foot - labels[:, 1] / 2, *labels.T)
 

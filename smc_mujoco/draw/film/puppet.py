@@ -252,6 +252,9 @@ class Puppet:
             beside = NEAR_SHARE * size
             standing[..., :2] = standing[..., :2].clip(low[:2] - beside, high[:2] + beside)
         stand = STAND_SHARE * size
+        if on_stage and self.slides.all():  # of a cart the rail, not its feet nor what is behind it
+            stand = scene.CUT_MARGIN * size
+            standing[..., 1:] = standing[..., 1:].clip(low[1:] - (0.0, stand), high[1:])
         standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
         height = -raised
