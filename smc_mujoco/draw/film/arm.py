@@ -14,6 +14,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.film.caption import LETTERS
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
@@ -27,7 +28,6 @@ PATH_POINTS = 600  # of a path that is drawn, or a few more
 BAR_WIDTH = 13
 BAR_GAP = 5
 BAR_HEIGHT = 32  # from one limit to the other
-LETTERS = 37
 MAX_TIP_ERROR = 0.015  # m: only a tip farther off has a ghost; a nearer one would hide it
 FORCE_ARROW = 0.6  # m, length of the arrow for the largest force or blow
 SHAFT_WIDTH = 4.0

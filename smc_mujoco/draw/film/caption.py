@@ -23,13 +23,13 @@ from smc_mujoco.simulation.trace import Trace
 # Sizes are px of a film of full size, and chosen: all letters have one size, which a phone shows.
 LETTERS = 37  # height
 EDGE = 24  # from the picture's edge to text
-LINE = 44  # from line to line of title and key
-PITCH = 1.1 * LETTERS  # the same in a box
+LINE_PITCH = 44  # from line to line of title and key
+BOX_PITCH = 1.1 * LETTERS  # from line to line in a box
 PAD = 8  # in a box, on each side of its words
 GAP = 5  # around boxes
-SAMPLE = 10  # height of a label's line, below its name
-SAMPLE_WIDTH = 6
-LINES = 3  # of a label or badge, at most
+SAMPLE_HEIGHT = 10  # room below a label's name, for a sample of its line in the charts
+SAMPLE_WIDTH = 6  # of that line
+MAX_LINES = 3  # of a label or badge
 LEAST_LETTERS = 0.9  # of their size: words in smaller ones are cut
 LOOKS = {  # mood -> colours of a badge and of its rim
     CALM: (style.PAPER, style.MUTED),
@@ -71,18 +71,18 @@ class Caption:
         self.title, self.title_size = fitted(title, inside, LETTERS * s, bold=True)
         self.close = f"last periods, deflections × {factor:g}"
         clock = style.width("00.000 s", LETTERS * s, bold=True)
-        self.room = inside - clock - self.wide("8× slower") - (4 * PAD + EDGE) * s
+        self.room = inside - clock - self.text_width("8× slower") - (4 * PAD + EDGE) * s
         sources = [trace.scenario.law.source.words for trace in traces]
         self.source = by_words(dict(zip(names, sources, strict=True)))
         said = [*key(traces, scales), self.source]
-        while said and self.wide(" · ".join(said)) > self.room:
+        while said and self.text_width(" · ".join(said)) > self.room:
             said.pop()
         self.key = " · ".join(said)
         self.states = [{state.words for state in one if state} for one in states]
-        self.top = (2 * LINE + GAP) * s
+        self.top = (2 * LINE_PITCH + GAP) * s
 
-    def wide(self, text: str) -> float:
-        """Return the width of letters, px."""
+    def text_width(self, text: str) -> float:
+        """Return the width of a text, px."""
         return style.width(text, LETTERS * self.scale)
 
     def text(self, k: int, failed: bool = True) -> str:
@@ -102,7 +102,7 @@ class Caption:
         badges = []
         for k in range(len(self.names)):
             wide, high = self.box([self.text(k)], room)
-            labels.append((wide, high + SAMPLE * s))
+            labels.append((wide, high + SAMPLE_HEIGHT * s))
             if self.below is not None:
                 badges.append((self.below[0] * s, self.below[1] * s))
             else:
@@ -114,9 +114,9 @@ class Caption:
         s = self.scale
         wide, high = 0.0, 0.0
         for text in texts:
-            words, size = fitted(text, room - 2 * PAD * s, LETTERS * s, LINES)
+            words, size = fitted(text, room - 2 * PAD * s, LETTERS * s, MAX_LINES)
             wide = max(wide, math.inf if "…" in words else longest(words, size) + 2 * PAD * s)
-            high = max(high, (PITCH * (1 + words.count("\n")) + PAD) * s)
+            high = max(high, (BOX_PITCH * (1 + words.count("\n")) + PAD) * s)
         return wide, high
 
     def strip(self, width: float) -> float:
@@ -182,19 +182,19 @@ class Caption:
         s = self.scale
         left = EDGE * s
         bold = style.font(self.title_size, bold=True)
-        draw.text((left, 0.6 * LINE * s), self.title, style.INK, bold, anchor="lm")
-        y = 1.55 * LINE * s
-        half = 0.46 * LINE * s
+        draw.text((left, 0.6 * LINE_PITCH * s), self.title, style.INK, bold, anchor="lm")
+        y = 1.55 * LINE_PITCH * s
+        half = 0.46 * LINE_PITCH * s
         change = max((at for at in self.changes if at <= time), default=None)
         words = ""
         if factor > 1.0:
             words = self.close
         elif change is not None:
             words = f"{self.changes[change]} since {change:g} s"
-            if LEAST_LETTERS * self.wide(words) > self.room - 2 * PAD * s:
+            if LEAST_LETTERS * self.text_width(words) > self.room - 2 * PAD * s:
                 words = f"changed since {change:g} s"  # the machines' names say how
         if words:
-            end = left + min(self.room, self.wide(words) + 2 * PAD * s)
+            end = left + min(self.room, self.text_width(words) + 2 * PAD * s)
             self.write(draw, (left, y - half, end, y + half), words, style.INK, None)
         else:
             letters = style.font(LETTERS * s)
@@ -210,7 +210,7 @@ class Caption:
                 pace = f"{1.0 / speed:.3g}× slower"
                 look = (style.INK, style.INK)
             end = right - style.width("00.000 s", LETTERS * s, bold=True) - PAD * s
-            start = end - self.wide(pace) - 2 * PAD * s
+            start = end - self.text_width(pace) - 2 * PAD * s
             self.write(draw, (start, y - half, end, y + half), pace, *look, radius=half)
 
     def write(
@@ -228,7 +228,7 @@ class Caption:
         corner = 5 * s if radius is None else radius
         draw.rounded_rectangle((left, top, right, bottom), corner, fill, rim, max(1, round(s)))
         middle = ((left + right) / 2, (top + bottom) / 2)
-        lines = round((bottom - top) / (PITCH * s))
+        lines = round((bottom - top) / (BOX_PITCH * s))
         words, size = fitted(words, right - left - 2 * PAD * s, LETTERS * s, lines)
         look = {"font": style.font(size), "anchor": "mm", "spacing": 0, "align": "center"}
         draw.text(middle, words, style.letters_on(fill), **look)
@@ -237,7 +237,7 @@ class Caption:
         """Draw a machine's label in its box, over its line in the charts."""
         s = self.scale
         left, top, right, bottom = self.pills[k].tolist()
-        y = bottom - SAMPLE * s
+        y = bottom - SAMPLE_HEIGHT * s
         draw.rounded_rectangle((left, top, right, bottom), 5 * s, style.PAPER)
         self.write(draw, (left, top, right, y), text, style.PAPER, None)
         start = left + PAD * s

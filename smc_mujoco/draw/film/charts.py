@@ -31,7 +31,7 @@ from smc_mujoco.simulation.trace import Trace
 
 # Numbers of presentation here are chosen.
 DPI = 120
-LETTERS = 22.2  # points: as high as the other letters of a film
+LETTER_POINTS = 22.2  # height in points: that of the captions' letters
 WINDOW_WIDTH = 0.82  # of a chart's width, of the time until all rest
 TIME_TICKS = 5  # at most, until all rest
 FUTURE_LINE = 0.45  # opacity of what is still to come
@@ -73,15 +73,15 @@ class Charts:
         self.dot = max(2, round(4.5 * scale))
         self.colours = colours
         strip = panels.strip(traces)
-        larger = LETTERS / style.RC["xtick.labelsize"]
-        letters: dict[Any, Any] = {"axes.titlesize": LETTERS, "axes.titleweight": "normal"}
+        larger = LETTER_POINTS / style.RC["xtick.labelsize"]
+        letters: dict[Any, Any] = {"axes.titlesize": LETTER_POINTS, "axes.titleweight": "normal"}
         for name in ("font.size", "xtick.labelsize", "ytick.labelsize"):
             letters[name] = larger * float(style.RC[name])
         with style.page(), rc_context(letters):
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
-            left = style.width("−00.00", LETTERS * DPI * scale / 72) / size[0]
+            left = style.width("−00.00", LETTER_POINTS * DPI * scale / 72) / size[0]
             gap = left / (RIGHT / len(strip) - left)
             figure.subplots_adjust(left=left, right=RIGHT, bottom=BOTTOM, top=TOP, wspace=gap)
             artists: list[Artist] = []
@@ -89,7 +89,7 @@ class Charts:
             for ax, panel in zip(axes, strip, strict=True):
                 point = DPI * scale / 72
                 room = ax.get_window_extent().width
-                words, high = fitted(panel.label, room, LETTERS * point)
+                words, high = fitted(panel.label, room, LETTER_POINTS * point)
                 ax.set_title(words, fontsize=high / point)
                 laned = in_lanes(panel)
                 found = lanes(ax, panel, colours) if laned else [(ax, panel, colours)]
@@ -145,9 +145,11 @@ class Charts:
         ax.set_xlim(0.0, self.end)
         wide = ax.get_window_extent().width  # px
         point = ax.figure.dpi / 72
-        last = 1.0 - style.width(f"000{self.end:.3g} s", LETTERS * point) / wide
+        last = 1.0 - style.width(f"000{self.end:.3g} s", LETTER_POINTS * point) / wide
         stop = min(1.01 * self.window, self.end)
-        count = min(TIME_TICKS, int(wide * self.shares[1] / style.width("0.0000", LETTERS * point)))
+        count = min(
+            TIME_TICKS, int(wide * self.shares[1] / style.width("0.0000", LETTER_POINTS * point))
+        )
         ticks = np.asarray(MaxNLocator(max(count, 1)).tick_values(0.0, self.window))
         ticks = ticks[(self.share(ticks) < last) & (ticks < stop)].tolist()
         last_words = f"{self.end:.3g} s"
@@ -219,7 +221,7 @@ def lanes(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Row]:
     ax.set_axis_off()
     pitch = 1.0 / len(panel.traces)
     point = ax.figure.dpi / 72  # px
-    beside = style.width("smooth", LETTERS * point) + LANE_GAP * point
+    beside = style.width("smooth", LETTER_POINTS * point) + LANE_GAP * point
     wide = 1.0 - beside / ax.get_window_extent().width
     rows = list[Row]()
     for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True), 1):
@@ -250,7 +252,7 @@ def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
         lane.plot([1.012, 1.012], ends, transform=lane.transAxes, **look)
     else:
         words = "smooth"
-    look = {"va": "center", "fontsize": LETTERS, "color": style.INK}
+    look = {"va": "center", "fontsize": LETTER_POINTS, "color": style.INK}
     place = {"xytext": (LANE_GAP, 0.0), "textcoords": "offset points"}
     lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look)
 

@@ -380,7 +380,7 @@ def staged(
     for track, puppet, course in zip(tracks, puppets, courses, strict=True):
         path = None
         if followed:
-            path = course.path(times) + np.array([0.0, 0.0, puppet.height])
+            path = course.followed(times) + np.array([0.0, 0.0, puppet.height])
         yield Stage(track, puppet, view, points, caption.scale, len(tracks) == 1, path)
 
 

@@ -18,7 +18,7 @@ from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
-POSES = 192  # poses of a trace that must be in the picture
+POSES = 192  # of a trace, at which what must be in the picture is found
 # Chosen, in sizes of what moves: larger fixed things of a user's model may leave the picture, and
 # fixed things must be in it so far beside what moves, and a stand so far below and above.
 MAX_FIXED_SIZE = 4.0
@@ -48,11 +48,11 @@ class Course(NamedTuple):
     others: list[Array]
 
     @property
-    def way(self) -> Array:
+    def middle(self) -> Array:
         """The middle of the machine at all times, (times, 3) m."""
         return np.array([points.mean(axis=0) for points in self.places])
 
-    def path(self, times: Array) -> Array:
+    def followed(self, times: Array) -> Array:
         """Return the places to which the camera follows the machine, (times, 3) m, at times in
         s.
         """
@@ -60,7 +60,7 @@ class Course(NamedTuple):
         half = np.minimum(times - self.times[0], self.times[-1] - times)
         half = half.clip(0.0, 0.5 * FOLLOW_TIME)[:, None]
         at = times[:, None] + half * np.linspace(-1.0, 1.0, 9)
-        means = [np.interp(at, self.times, part).mean(axis=1) for part in self.way.T]
+        means = [np.interp(at, self.times, part).mean(axis=1) for part in self.middle.T]
         return np.stack(means, axis=1)
 
 
@@ -73,7 +73,7 @@ class Puppet:
     data: Sequence[mujoco.MjData]  # of the shapes
     ids: Array  # of the channels' joints
     slides: Array  # which of these are slides
-    rail: float  # m, length along x of what does not move, on which a cart stays
+    rail: float  # m, length along x of a cart's rail, on which it stays; inf without a cart
     start: Array  # the pose of joints without a channel, (nq,)
     rotors: Sequence[tuple[int, int]]  # channel, and place in the pose
     mounts: Sequence[arrows.Mount]
@@ -197,7 +197,7 @@ class Puppet:
         if plant.on_stage and not plant.pose:
             return False
         own = max(float(np.ptp(points, axis=0).max()) for points in course.places)
-        return float(np.ptp(course.way, axis=0).max()) > FOLLOWED_TRAVEL * own
+        return float(np.ptp(course.middle, axis=0).max()) > FOLLOWED_TRAVEL * own
 
     def placed(self, track: MachineTrack, course: Course, followed: bool) -> tuple[Array, "Puppet"]:
         """Return what must be in the picture, (points, 3) m over the film's floor, and the machine
@@ -212,9 +212,9 @@ class Puppet:
         mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
         lines = self.lines(track, mounts)
         if followed:
-            way = course.path(np.array([*course.times, *(time for time, _ in lines)]))
+            places = course.followed(np.array([*course.times, *(time for time, _ in lines)]))
             seen = [*course.places, *(line for _, line in lines)]
-            points = np.concatenate([part - at for part, at in zip(seen, way, strict=True)])
+            points = np.concatenate([part - at for part, at in zip(seen, places, strict=True)])
             height = max(0.0, -float(np.concatenate(course.places)[:, 2].min()))
         else:
             arrow_lines = (line for _, line in lines)
