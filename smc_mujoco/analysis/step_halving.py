@@ -34,8 +34,8 @@ NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
 APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"
 SCORE_NOTE = (
     f"{MARK}: the score changes by more than {APART} at half the physics step, or by more than "
-    f"{100.0 * MAX_CHANGE:g} % at a quarter of it, under RK4, or from a start moved by 1e-9 of "
-    f"itself. Brackets hold its smallest or largest value; {RANGE}"
+    f"{100.0 * MAX_CHANGE:g} % at a quarter of it, under RK4, or from a start changed by a "
+    f"relative 1e-9. Brackets hold its smallest or largest value; {RANGE}"
 )
 NOTE = (
     f"{MARK} half the physics step changes it by more than {APART}, or a nudged start, a quarter "

@@ -134,10 +134,10 @@ def margins(
     still ends below 5 % of its start.
 
     A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one,
-    noise is the standard deviation of the position (that of the velocity is 5/s times as large),
-    and the delay of the command is in s. The column "theory" has the limit of the loop linearised
-    at rest, such as the delay at which rest becomes unstable, if the law can be linearised. A law
-    may tolerate more, with a small steady oscillation.
+    and the delay of the command is in s. Noise is the standard deviation of the position sensor;
+    the velocity sensor has 5/s times that. For laws that can be linearised, the column "theory" has
+    the linear loop's limit, such as the delay that makes rest unstable. A law may tolerate more,
+    with a small steady oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
@@ -385,7 +385,7 @@ def chatter(
     If a law switches and the actuator lags, the loop oscillates without end. Amplitude and
     frequency are those at which N L = 1: N is the law's describing function, L the response of the
     linearised mechanism. The column "±" is how far the prediction may be off. A star marks a run
-    that changes by more than 5 % if its start changes by 1e-9 of itself, or at half the physics
+    that changes by more than 5 % if its start changes by a relative 1e-9, or at half the physics
     step (2.5 % without RK4). The column "third" is the third harmonic over the first. With several
     driven channels, "coupling" is how far this channel's command moves another channel, over how
     far it moves its own. If that is large, the prediction fails.

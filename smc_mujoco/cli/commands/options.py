@@ -29,7 +29,7 @@ def picture(contents: str) -> Any:
     """Return an option for the file of a figure that shows `contents`."""
     return typer.Option(
         metavar="PICTURE",
-        help=f"Also draw {contents}, as PICTURE.svg and PICTURE.png, or PICTURE.pdf.",
+        help=f"Also draw {contents}, as PICTURE.pdf if so named, else as .svg and .png.",
     )
 
 
@@ -99,7 +99,13 @@ GainValues = Annotated[
     str,
     typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults."),
 ]
-Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
+Gains = Annotated[
+    str,
+    typer.Option(
+        help="Gains: tuned for error and variation of u, tracking (tuned for error alone), "
+        "study (the paper's) or default (the law's)."
+    ),
+]
 Joints = Annotated[
     int | None,
     typer.Option(
@@ -133,8 +139,9 @@ Plants = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint; default the "
-        "paper's five.",
+        help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint. Default: "
+        "inverted_pendulum, van_der_pol, duffing and the two networks of pendulums; fewer with "
+        "--quick.",
         show_default=False,
     ),
 ]
@@ -144,20 +151,23 @@ PlantName = Annotated[
         metavar="PLANT",
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or your own .xml or .urdf: "
-        "FILE.xml:joint+joint@keyframe+held (or +locked). A joint may be written "
-        '"joint(motor,partner=pole,u_max=9,x0=0.2)" or "joint(measured)".',
+        "FILE.xml:joint+joint@keyframe+held, with other joints held by servos, or welded: +locked. "
+        'A joint may be written "joint(motor,partner=pole,u_max=9,x0=0.2)": with a motor that the '
+        'file lacks, and a passive partner; or "joint(measured)": read, not driven.',
     ),
 ]
 Quick = Annotated[
     bool,
     typer.Option(
         "--quick",
-        help="Less of everything: a first answer in minutes, longer if laws must be tuned first.",
+        help="Less of everything: a first answer in minutes, plus any tuning.",
     ),
 ]
 Relevant = Annotated[
     float,
-    typer.Option("--relevant", help="Least relevant difference, as a share of the larger value."),
+    typer.Option(
+        "--relevant", help="Smallest difference that counts, as a share of the larger value."
+    ),
 ]
 SceneName = Annotated[
     str,
@@ -170,9 +180,7 @@ SceneName = Annotated[
 Threads = Annotated[
     int | None, typer.Option(min=1, help="Simulations at once; default one per core.")
 ]
-Device = Annotated[
-    str, typer.Option(help="Where the fast engine runs: cpu, or cuda for an NVIDIA card.")
-]
+Device = Annotated[str, typer.Option(help="Where searches run: cpu, or cuda for an NVIDIA card.")]
 X0 = Annotated[
     float | None,
     typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start."),

@@ -15,9 +15,7 @@ def run(
     name: options.SceneName,
     out: Annotated[
         Path,
-        typer.Option(
-            metavar="FOLDER", help="For results; each scene has a folder of its name in it."
-        ),
+        typer.Option(metavar="FOLDER", help="For results; one subfolder per scene."),
     ] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     seed: Annotated[
@@ -39,12 +37,12 @@ def run(
     ] = True,
     json: options.Json = None,
 ) -> None:
-    """Run a scene: print its question, scores and answer; write its traces, figures and film.
+    """Run a scene, an experiment with a question: print scores and answer; write traces, figures
+    and a film.
 
-    Each run is repeated at half the physics step, and from a start that differs by 1e-9 of itself.
-    If u chatters, it is also repeated at a quarter of the step, and if there are contacts, under
-    RK4. A score has a mark if a repetition changes it by more than 5 % (without RK4, half the step
-    by more than 2.5 %).
+    Each run is repeated at half the physics step, and from a start changed by a relative 1e-9. It
+    is also repeated at a quarter of the step if u chatters, and under RK4 if there are contacts. A
+    score that changes by more than 5 % is marked (2.5 % at half the step without RK4).
 
     Exported traces keep every number to the last bit, with its unit.
 
@@ -130,8 +128,8 @@ def view(
             metavar="MACHINE",
             autocompletion=options.PLANTS,
             help="A plant from `smc-mujoco list`; yours, FILE.xml:joint+joint, or "
-            "FILE.xml:joint of a free body; or a "
-            "scene file, FILE.py, of which the first two runs of the film's condition are shown.",
+            "FILE.xml:joint of a free body; or a scene file, FILE.py, which shows the first two "
+            "runs of the condition that it films.",
         ),
     ],
     law: options.Laws = None,
@@ -144,10 +142,10 @@ def view(
     """Watch a machine under one law or two in a browser tab, in MuJoCo's Studio; change, push and
     save what you see.
 
-    In the panel "Laws" you change the laws, their gains, mass, delay, noise and friction, and the
-    runs start again. It also shows u, s and e, and has the model's keyframes. Its button "save as
-    scene" writes view.py: `smc-mujoco run view.py` repeats the runs to the bit. The second law's
-    machine is the transparent one.
+    In the panel "Laws" you change each law and its gains, and the plant's mass, delay, noise and
+    friction; then the runs start again. It also shows u, s and e. Its button "save as scene" writes
+    view.py: `smc-mujoco run view.py` repeats the runs to the bit. The second law's machine is the
+    transparent one.
 
     Push a body: double-click it, hold Ctrl, drag with the right mouse button, and let go.
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 Seed = Annotated[
-    int, typer.Option(min=0, help="Another seed draws other instances, starts and noise.")
+    int, typer.Option(min=0, help="Another seed draws other starts, noise and phases.")
 ]
 
 
@@ -26,7 +26,8 @@ def which(
     needs: Annotated[
         str,
         typer.Option(
-            help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, "
+            help="What to compare, as a,b: fast (settling time), accurate (ultimate bound), "
+            "on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of u^2), "
             "no-overshoot; and what the law must have: no-velocity, continuous, finite-time, ..., "
             "as for `smc-mujoco list --needs`."
         ),
@@ -92,7 +93,10 @@ def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
     condition: Annotated[
-        list[str] | None, options.conditions_by_default("a study's; with --quick, three")
+        list[str] | None,
+        options.conditions_by_default(
+            "twelve, one of each kind; with --quick nominal, noise and coulomb"
+        ),
     ] = None,
     seeds: Annotated[
         int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")
@@ -120,8 +124,8 @@ def compare(
     metrics: Annotated[
         str | None,
         typer.Option(
-            help="What to compare, as a,b: scores that `smc-mujoco show` lists, or settles; "
-            "default settles, settling_time, ultimate_bound, itae and tv_rate."
+            help='What to compare, as a,b: scores that `smc-mujoco show` lists, or "settles", the '
+            "share of settled runs. Default: settles,settling_time,ultimate_bound,itae,tv_rate."
         ),
     ] = None,
     relevant: options.Relevant = RELEVANT,
@@ -132,7 +136,8 @@ def compare(
         Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")
     ] = None,
     rig: Annotated[
-        str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")
+        str | None,
+        typer.Option(help="A rig, one of `smc-mujoco rig`, in place of plants and conditions."),
     ] = None,
     seed: Seed = 0,
     json: options.Json = None,
@@ -143,13 +148,13 @@ def compare(
     say which is best and how sure that is.
 
     A law with gains in brackets keeps them. Any other law, including one from your own file, uses
-    the package's gains for the plant or, if there are none, is tuned by the same rule, which takes
-    seconds to minutes for each law on each plant. If you stop the command, it continues when you
-    start it again. --law all compares every general law.
+    the package's gains for the plant. If there are none, it is tuned by the same rule, in seconds
+    to minutes for each law on each plant. If you stop the command, it continues when you start it
+    again. --law all compares every law that is not for particular plants.
 
-    With --rig, the machine's parameter sets replace plants and conditions. Laws use the machine's
-    gains, or with --searches those found on its sets. For each metric a line says whether one law
-    wins on every set.
+    A rig is an identified machine: with --rig, its parameter sets replace plants and conditions.
+    Laws use the machine's gains, or with --searches those found on its sets. For each metric a line
+    says whether one law wins on every set.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder
