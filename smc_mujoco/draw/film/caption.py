@@ -150,7 +150,7 @@ class Caption:
             foot = foot - badges[:, 1].max() - gap
         self.badges = around(beside, below, *badges.T)
         labels = labels.clip(0.0, room - 2 * gap)
-        self.pills = around(middle, foot - labels[:, 1] / 2, *labels.T)
+        self.labels = around(middle, foot - labels[:, 1] / 2, *labels.T)
 
     def over(
         self,
@@ -236,7 +236,7 @@ class Caption:
     def label(self, draw: ImageDraw.ImageDraw, k: int, text: str, colour: str) -> None:
         """Draw a machine's label in its box, over its line in the charts."""
         s = self.scale
-        left, top, right, bottom = self.pills[k].tolist()
+        left, top, right, bottom = self.labels[k].tolist()
         y = bottom - SAMPLE_HEIGHT * s
         draw.rounded_rectangle((left, top, right, bottom), 5 * s, style.PAPER)
         self.write(draw, (left, top, right, y), text, style.PAPER, None)

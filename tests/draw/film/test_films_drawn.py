@@ -75,7 +75,7 @@ def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
     )
     tiles = np.array([[0, 60, wide, 300], [wide + 2, 60, 2 * wide + 2, 300]])
     caption.place(tiles)
-    boxes = np.concatenate([caption.pills, caption.badges])
+    boxes = np.concatenate([caption.labels, caption.badges])
     assert apart(boxes)
     both = np.concatenate([tiles, tiles])
     assert (boxes[:, 0] >= both[:, 0]).all()

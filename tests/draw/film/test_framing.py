@@ -121,7 +121,7 @@ def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeyp
         shown = stages[0]
         foot = shown.model.geom("m/foot")
         below = shown.project(shown.data.geom_xpos[[foot.id]] - [0.0, 0.0, foot.size[1]])[0]
-        assert words.tiles[0, 1] + below[1] < words.pills[0, 1]
+        assert words.tiles[0, 1] + below[1] < words.labels[0, 1]
         assert shown.data.geom_xpos[foot.id, 2] == pytest.approx(0.014, abs=1e-3)  # on the floor
         assert shown.model.geom("m/face").rgba[3] == pytest.approx(0.4)
         assert shown.model.geom("m/bob").size[0] == pytest.approx(1.3 * 0.065)
