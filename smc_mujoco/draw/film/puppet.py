@@ -24,6 +24,7 @@ POSES = 192  # of a trace, at which what must be in the picture is found
 MAX_FIXED_SIZE = 4.0
 NEAR_SHARE = 0.3
 STAND_SHARE = 0.8
+NO_FLOOR = 20.0  # sizes over a floor that is not seen
 FOLLOWED_TRAVEL = 1.0  # sizes of a machine: one that goes farther is followed; chosen
 FOLLOW_TIME = 0.25  # s, over which the followed place is a mean; chosen
 
@@ -217,14 +218,15 @@ class Puppet:
             points = np.concatenate([part - at for part, at in zip(seen, places, strict=True)])
             height = max(0.0, -float(np.concatenate(course.places)[:, 2].min()))
         else:
-            arrow_lines = (line for _, line in lines)
-            moving = np.concatenate([*course.places, *course.goals, *arrow_lines])
-            points, height = self.surrounded(moving, np.concatenate(course.others))
+            links = np.concatenate([*course.places, *course.goals])
+            moving = np.concatenate([links, *(line for _, line in lines)])
+            lowest = float(links[:, 2].min())
+            points, height = self.surrounded(moving, np.concatenate(course.others), lowest)
         return points, dataclasses.replace(self, mounts=mounts, height=height)
 
-    def surrounded(self, points: Array, around: Array) -> tuple[Array, float]:
+    def surrounded(self, points: Array, around: Array, lowest: float) -> tuple[Array, float]:
         """Return points that move, (m, 3) m, and those around them that must be in the picture
-        too, over the film's floor, and the machine's height.
+        too, over the film's floor, and the machine's height. Links go down to `lowest`, m.
 
         Of other things, `around` and what stands still, only the part close to these counts, such
         as the upper half of a stand; rails and columns end there.
@@ -259,7 +261,10 @@ class Puppet:
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
         height = -raised
         if not on_stage:  # it stands on the floor, or hangs close above it
-            height = -float(points[:, 2].min())
+            foot = float(standing[..., 2].min(initial=np.inf))
+            height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
+            if lowest < foot < np.inf:  # a floor below the links would not be below its foot
+                height += NO_FLOOR * size
         points = points + np.array([0.0, 0.0, height])
         if self.scenario.plant.tip:
             points[:, 2] = points[:, 2].clip(0.0)
