@@ -160,16 +160,21 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> Floats | 
         value = value.tolist()
     if value is None:
         return None
-    n = s.plant.n
-    values: list[Any] = [value] * n
+    values: list[Any] = [value]
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         values = items_of(name, value)
-    if len(values) != n:
+    n = s.plant.n
+    if len(values) not in (1, n):
+        wanted = "one number"
+        if n > 1:
+            wanted += f", or {n}"
         raise ScenarioError(
-            f"{name} has {counted(len(values), 'value')}, and {s.plant.name} "
-            f"{counted(n, 'channel')}: give one number for all, or one for each"
+            f"{name} has {len(values)} values, and {s.plant.name} {counted(n, 'channel')}: give "
+            f"{wanted}"
         )
-    return tuple(number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values)
+    return tuple(
+        number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values * (n // len(values))
+    )
 
 
 def physics_step(name: str, value: float | None, s: Any) -> float | None:

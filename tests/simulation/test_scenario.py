@@ -167,6 +167,7 @@ def test_a_state_of_the_wrong_length_is_refused(refused):
 def test_a_state_is_one_number_or_one_a_channel():
     for value in (
         0.5,
+        [0.5],
         [np.float32(0.5)] * 3,
         np.array(0.5),
     ):
@@ -386,8 +387,8 @@ def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(ref
 @pytest.mark.parametrize(
     ("plant", "x0", "words"),
     [
-        ("duffing", [0.1, 0.2], "2 values, and duffing 1 channel: give one number for"),
-        ("cart_pole", [0.1], "1 value, and cart_pole 2 channels: give one number for"),
+        ("duffing", [0.1, 0.2], "2 values, and duffing 1 channel: give one number$"),
+        ("cart_pole", [0.1] * 3, "3 values, and cart_pole 2 channels: give one number, or 2$"),
     ],
 )
 def test_a_start_of_another_size_names_the_sizes_that_there_are(plant, x0, words):
