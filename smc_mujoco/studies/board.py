@@ -36,8 +36,8 @@ MEDIANS = (
 )
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "J: error plus weighted variation of u, which tuning minimised; here on unseen runs, "
-    "which no search used.",
+    "J (": "J: what tuning minimised, error plus weighted variation of u. Unseen runs are those "
+    "that no search used.",
     "ITAE": "ITAE: the integral of time times the error's magnitude.",
     "TV rate": "TV rate: the total variation of u per second.",
     "": "A mark: no law is better, every run has arrived, and there are enough samples to see a "
@@ -49,9 +49,9 @@ MARKS = {
     "never": "'never' ranks behind every value.",
     "fails": "'fails' ranks behind every value.",
     "not arrived": "'not arrived' ranks behind every value.",
-    "below": "'below 0.01 rad': below the floor, the least that the problem can show: for an error "
-    "1e-4 of the start, and late in the run at least half an encoder count and the noise; for u "
-    f"{100 * MIN_COMMAND_SHARE:g} % of its bound. Such values count as equal.",
+    "below": "'below 0.01 rad': below the floor, where values count as equal. The floor is 1e-4 of "
+    "the start for an error, late in the run at least half an encoder count and the noise; for u "
+    f"it is {100 * MIN_COMMAND_SHARE:g} % of the bound.",
     "by the step": "'by the step': the medians at the physics step and at half of it, where they "
     f"differ by more than {APART}; {RANGE}.",
 }
