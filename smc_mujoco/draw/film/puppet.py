@@ -197,6 +197,11 @@ class Puppet:
         plant = self.scenario.plant
         if plant.on_stage and not plant.pose:
             return False
+        model = self.model
+        body = model.jnt_bodyid[self.ids[0]]
+        turns = model.jnt_type[model.body_jntadr[body]] == scene.HINGE
+        if turns and model.body_weldid[model.body_parentid[body]] == 0:
+            return False
         own = max(float(np.ptp(points, axis=0).max()) for points in course.places)
         return float(np.ptp(course.middle, axis=0).max()) > FOLLOWED_TRAVEL * own
 
