@@ -82,8 +82,8 @@ ARM = """
 STRANGER = {
     "reference": [smc.Constant(0.05), smc.Constant(0.0)],
     "contact": (
-        smc.Wall("fore", direction=(0, 0, -1), gap=0.28),
-        smc.Ball("fore", mass=0.5, height=0.6),
+        smc.Wall("fore", direction=(0, 0, -1), gap=0.175),
+        smc.Ball("fore", mass=0.5, height=0.05),
     ),
 }
 CLIPS = {  # name of the clip's file -> what it shows
@@ -96,10 +96,10 @@ CLIPS = {  # name of the clip's file -> what it shows
     ),
     "wall_and_ball": Clip(
         smc.plant_from(
-            ARM, channels={"shoulder": smc.Channel(x0=-0.6), "elbow": smc.Channel(x0=0.2)}
+            ARM, channels={"shoulder": smc.Channel(x0=-0.3), "elbow": smc.Channel(x0=0.1)}
         ),
         "A robot of your own, a wall and a ball",
-        1.1,
+        0.8,
         changes=STRANGER,
         laws=(
             smc.law("pid", kp=(150.0, 60.0), kd=(15.0, 5.0), ki=(50.0, 20.0)),
