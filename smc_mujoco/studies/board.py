@@ -36,22 +36,23 @@ MEDIANS = (
 )
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "J: what tuning minimised, error plus weighted variation of u. Unseen runs are those "
+    "J (": "J: what tuning minimises, error plus weighted variation of u. Unseen runs are those "
     "that no search used.",
     "ITAE": "ITAE: the integral of time times the error's magnitude.",
     "TV rate": "TV rate: the total variation of u per second.",
     "": "A mark: no law is better, every run has arrived, and there are enough samples to see a "
     "lead. Arrived: in the last fifth of the run the error stays within 10 % of its initial value, "
     "or within 5 times the sensor's resolution.",
-    "detects": f"'detects a 24 % lead': {100 * POWER:g} % of such comparisons would show a lead of "
-    "24 % between this law and the leader; in the leader's cell, between it and its closest rival.",
+    "detects a": f"'detects a 24 % lead': {100 * POWER:g} % of such comparisons would show a lead "
+    "of 24 % between this law and the leader; in the leader's cell, between it and its closest "
+    "rival.",
     "no lead": "'detects no lead': too few runs to see any lead.",
     "never": "'never' ranks behind every value.",
     "fails": "'fails' ranks behind every value.",
     "not arrived": "'not arrived' ranks behind every value.",
-    "below": "'below 0.01 rad': below the floor, where values count as equal. The floor is 1e-4 of "
-    "the start for an error, late in the run at least half an encoder count and the noise; for u "
-    f"it is {100 * MIN_COMMAND_SHARE:g} % of the bound.",
+    "below ": "'below 0.01 rad': below the floor, where values count as equal. The floor is 1e-4 "
+    "of the start for an error, late in the run at least half an encoder count and the noise; it "
+    f"is {100 * MIN_COMMAND_SHARE:g} % of the bound for u.",
     "by the step": "'by the step': the medians at the physics step and at half of it, where they "
     f"differ by more than {APART}; {RANGE}.",
 }
@@ -59,7 +60,7 @@ MARKS = {
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval]; bold: no law is better.",
-    "detects": f"Detects a 24 % lead: {100 * POWER:g} % of such comparisons would show it.",
+    "detects a": f"Detects a 24 % lead: {100 * POWER:g} % of such comparisons would show it.",
     "no lead": "Detects no lead: too few runs to see any lead.",
     "below": "Below 0.01 rad: below the least that the problem can show; such laws are not ranked.",
     "by the step": "By the step: the median at the physics step, and at half of it.",
