@@ -442,7 +442,7 @@ def ending(trace: Trace) -> str:
 
 
 def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> dict[float, str]:
-    """Return the changes of plants, and the `blows` on arms, time in s -> "mass × 2", "blow of 400
+    """Return the changes of plants, and the `blows` on bodies, time in s -> "mass × 2", "blow of 400
     N for 20 ms".
 
     The labels of the runs precede what only some of them have, where these do not say so.
@@ -456,7 +456,7 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
             events.add((fault.at, fault.words))
         for push in pushes([trace]) if blows else ():
             size = short(math.hypot(push.x, push.y, push.z))
-            events.add((push.time, f"blow of {size} N for {1e3 * push.width:.3g} ms"))
+            events.add((push.time, f"blow of {size} N for {1e3 * push.width:.4g} ms"))
         for event in events:
             who_at.setdefault(event, []).append(name)
     words: dict[float, str] = {}
@@ -469,10 +469,11 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
 
 
 def pushes(traces: Sequence[Trace]) -> list[Push]:
-    """Return the blows on the bodies of arms."""
+    """Return the blows on bodies of arms and of users' models, which no d of a trace has."""
     found = []
     for trace in traces:
-        if trace.scenario.plant.tip:
+        plant = trace.scenario.plant
+        if plant.tip or (plant.is_user_model and not plant.pose):
             found += [push for push in trace.scenario.disturbance if isinstance(push, Push)]
     return found
 

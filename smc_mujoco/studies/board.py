@@ -344,7 +344,7 @@ class Board(Tables):
         cure = "give more seeds"
         if largest.sets > 1:
             few = "sets of gains"
-            cure = "give more searches, or leave out quick"
+            cure = "leave out quick, or give `compare` more searches"
         return f"too few {few} ({largest.samples}) for a verdict, which needs {least}: {cure}"
 
     def failures(self, entry: Entry) -> str:

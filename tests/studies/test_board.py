@@ -264,7 +264,7 @@ RESULTS = {  # changes of both blocks -> the result
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
         {"ahead": None, "samples": 3, "sets": 3},
-        "too few sets of gains (3) for a verdict, which needs 7: give more searches, or leave out quick",
+        "too few sets of gains (3) for a verdict, which needs 7: leave out quick, or give `compare` more searches",
     ),
     "few runs": (
         {"ahead": None, "samples": 4, "runs": 4},

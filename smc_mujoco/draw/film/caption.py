@@ -64,7 +64,7 @@ class Caption:
         self.size = size
         self.scale = s = scale
         self.below = below
-        self.changes = style.marks(traces, names, blows=False)
+        self.changes = style.marks(traces, names, blows=not traces[0].scenario.plant.tip)
         self.lines = [look["ls"] for look in style.looks(traces)]
         inside = size[0] - 2 * EDGE * s
         title = title or style.head([trace.scenario for trace in traces])
