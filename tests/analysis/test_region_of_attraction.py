@@ -165,6 +165,7 @@ def test_a_run_that_leaves_slowly_does_not_converge_early():
     assert (found.outcome[1] != CONVERGES).all()
 
 
+@pytest.mark.slow
 def test_sticking_under_a_growing_command_is_not_decided_early():
     stuck = base("duffing", smc.law("pid"), 10.0)
     stuck = dataclasses.replace(stuck, friction=smc.Coulomb(3.0), u_max=math.inf)
@@ -175,6 +176,7 @@ def test_sticking_under_a_growing_command_is_not_decided_early():
     assert DOES_NOT not in whole[0]
 
 
+@pytest.mark.slow
 def test_distance_is_measured_from_the_reference(refused):
     held = dataclasses.replace(
         base("duffing", smc.law("lqr"), 12.0), model="nominal", reference=smc.Constant(0.3)

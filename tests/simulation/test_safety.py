@@ -36,7 +36,7 @@ from smc_mujoco.common.jit import Key, compiled
 from smc_mujoco.control.law import Measurement, catalogue
 from smc_mujoco.mechanisms.hardware import moments
 from smc_mujoco.mechanisms.hardware.moments import lever
-from smc_mujoco.simulation import callback, controller, philox, state
+from smc_mujoco.simulation import callback, controller, parts, philox, state
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key
@@ -54,7 +54,7 @@ USED = [
     (philox, "uniform", numba.njit(lambda seed, channel, stream, k: 0.5)),
     (controller, "MAX_STATE", 2e6),
     (moments, "lever", numba.njit(fastmath=True)(moments.lever.py_func)),
-    (controller, "_exert", numba.njit(lambda address, sim, data, part: 0)),
+    (parts, "_exert", numba.njit(lambda address, sim, data, part: 0)),
 ]
 
 

@@ -230,6 +230,7 @@ def test_failures_on_one_side_on_both_or_between_have_their_bounds(fails, bounds
         assert better.failed <= better.failed_before
 
 
+@pytest.mark.slow
 def test_failures_by_chance_have_no_region():
     found = 0
     for seed in range(20):

