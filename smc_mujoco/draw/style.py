@@ -442,8 +442,8 @@ def ending(trace: Trace) -> str:
 
 
 def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> dict[float, str]:
-    """Return the changes of plants, and the `blows` on bodies, time in s -> "mass × 2", "blow of 400
-    N for 20 ms".
+    """Return the changes of plants, and the `blows` on bodies, time in s -> "mass × 2", "blow of
+    400 N for 20 ms".
 
     The labels of the runs precede what only some of them have, where these do not say so.
     """
