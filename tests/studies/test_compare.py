@@ -115,7 +115,7 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert len(found.traces) == 12
 
 
-def test_a_law_without_a_run_that_did_not_fail_arrives_in_no_run_of_j(found):
+def test_a_law_that_fails_in_every_run_arrives_in_none_of_j(found):
     arrived = {"pid": np.ones(1, bool), "gone": np.ones(1, bool)}
     compare._leave_out_failed({"duffing": Holdout({}, arrived, {}, {}, 1.0)}, found.table)
     assert arrived == {"pid": True, "gone": False}
