@@ -292,21 +292,20 @@ def compare(
     length = duration or extent.duration
     if conditions is None:
         conditions = applicable(extent.conditions, machines, length)
-    tested = [find_condition(name) for name in listed("conditions", conditions)]
     trial = Trial(
-        machines,
-        tested,
-        length,
-        starts,
-        Path(out),
-        threads,
-        progress,
-        defaults,
-        searches or (QUICK_SEARCHES if quick else SEARCHES),
-        budget,
-        tune and gains == "tuned",
-        gains,
-        seed,
+        plants=machines,
+        conditions=[find_condition(name) for name in listed("conditions", conditions)],
+        duration=length,
+        starts=starts,
+        folder=Path(out),
+        threads=threads,
+        progress=progress,
+        defaults=defaults,
+        searches=searches or (QUICK_SEARCHES if quick else SEARCHES),
+        budget=budget,
+        tune=tune and gains == "tuned",
+        gain_set=gains,
+        seed=seed,
         device=device,
     )
     chosen: dict[str, list[Law | Template]] = {}
@@ -323,7 +322,7 @@ def compare(
     if worst:
         found = _worst_cases(trial, candidates, within, duration)
     by = paired_runs.GROUPS
-    if len(machines) * len(tested) > MAX_BLOCKS:
+    if len(machines) * len(trial.conditions) > MAX_BLOCKS:
         by = ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant)
     holdout = trial.holdout(candidates, seeds)

@@ -166,37 +166,24 @@ def which(
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     machine = as_plant(plant)
-    if isinstance(needs, str):
-        given = needs.split(",")
-    else:
-        given = listed("needs", needs)
-    names = []
-    for need in given:
-        name = need.strip() if isinstance(need, str) else need
-        names.append(name)
-        find("need", name, {**NEEDS, **PROPERTIES})
-    compared = [NEEDS[name] for name in names if name in NEEDS]
-    for metric in compared:
-        if why := CATALOGUE[metric].refusal(machine):
-            raise ScenarioError(why)
+    compared, properties = _asked(machine, needs)
     brief = quick and machine.is_user_model
-    chosen = _suited(machine, [name for name in names if name in PROPERTIES], laws)
+    chosen = _suited(machine, properties, laws)
     if brief and laws is None:
         known = [law for law in chosen if law.name in gain_sets.COMPARED]
         chosen = known or chosen
     length = duration or (3.0 if quick else 5.0)
     if conditions is None:
         conditions = applicable(DEFAULT_CONDITIONS, [machine], length)
-    tested = [find_condition(name) for name in listed("conditions", conditions)]
     trial = Trial(
-        [machine],
-        tested,
-        length,
-        starts,
-        Path(out),
-        threads,
-        progress,
-        defaults,
+        plants=[machine],
+        conditions=[find_condition(name) for name in listed("conditions", conditions)],
+        duration=length,
+        starts=starts,
+        folder=Path(out),
+        threads=threads,
+        progress=progress,
+        defaults=defaults,
         seed=seed,
         brief=brief,
         device=device,
@@ -207,8 +194,7 @@ def which(
 
     def judged(table: Table) -> tuple[dict[str, float], Boards]:
         settles, fit = _fit(table)
-        metrics = compared or [NEEDS[name] for name in DEFAULT_NEEDS]
-        boards = leaderboard(table.select(law=fit), metrics, defaults=defaults, relevant=relevant)
+        boards = leaderboard(table.select(law=fit), compared, defaults=defaults, relevant=relevant)
         if not boards:
             raise ScenarioError(
                 f"no need has a number in any run on {machine.name}: ask for others"
@@ -230,6 +216,23 @@ def which(
     found = {law.name: law for law, _, _ in candidates[machine.name]}
     ordered = tuple(found[name] for name in _order(boards))
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles, left_out=left_out)
+
+
+def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the metrics and the properties among the needs, by default metrics."""
+    compared, properties = [], []
+    given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
+    for need in given:
+        name = need.strip() if isinstance(need, str) else need
+        find("need", name, {**NEEDS, **PROPERTIES})
+        if name in NEEDS:
+            compared.append(NEEDS[name])
+        else:
+            properties.append(name)
+    for metric in compared:
+        if why := CATALOGUE[metric].refusal(plant):
+            raise ScenarioError(why)
+    return compared or [NEEDS[name] for name in DEFAULT_NEEDS], properties
 
 
 def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
