@@ -20,7 +20,7 @@ from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
 
 app = typer.Typer(
-    help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
+    help="Simulate, compare and tune sliding-mode controllers on MuJoCo mechanisms.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
@@ -67,8 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given and given[0] in DRAWN:
         with errors_as_sentences():
             raise ScenarioError(
-                f"no command {given[0]!r}: `smc-mujoco run SCENE` writes figures and a film; in "
-                "Python smc.figure and smc.film draw any traces"
+                f"no command {given[0]!r}: `smc-mujoco run SCENE` writes figures and a film, and "
+                "smc.figure and smc.film draw any traces in Python"
             )
     app(arguments, prog_name="smc-mujoco")
 

@@ -88,7 +88,7 @@ class Bar:
     def __str__(self) -> str:
         if not self.whole:
             return self.what
-        text = f"{self.what} {100 * self.share:.0f} %"
+        text = f"{self.what}, {100 * self.share:.0f} %"
         if self.counted:
             text = f"{self.what} {self.done:g}/{self.whole:g}"
         return ", ".join(filter(None, (text, self.left)))
@@ -97,7 +97,7 @@ class Bar:
 def told(what: str, seconds: float) -> None:
     """Tell how long something takes at most, before it starts, if that is long."""
     if seconds > LINE_PERIOD:
-        print(f"{what}: {length(seconds)} at most", file=sys.stderr)
+        print(f"{what} takes at most {length(seconds)}", file=sys.stderr)
 
 
 def length(seconds: float) -> str:
@@ -169,7 +169,7 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None]]:
     """Yield a function that adds simulated steps.
 
-    A bar shows how many runs are done and how many a second.
+    A bar shows how many are done and how many per second.
     """
     start = time.monotonic()
     done = 0
@@ -180,7 +180,9 @@ def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None
         spent = time.monotonic() - start
         complete = runs * done / steps if steps else 0.0
         rate = complete / spent if spent else 0.0
-        drawn.says(f"{math.floor(complete + 1e-9)} of {runs} runs, {rate:.3g} a second", count)
+        drawn.says(
+            f"{math.floor(complete + 1e-9)} of {runs} simulations, {rate:.3g} per second", count
+        )
 
     with bar("", steps, shown=shown and runs > 0) as drawn:
         stepped(0)

@@ -133,7 +133,7 @@ def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
 
 
 def by_words(words: Mapping[str, str]) -> str:
-    """Return "gains: shipped", or "gains: a and b default, c yours", from law -> its gains' source.
+    """Return "gains: shipped", or "gains: default for a and b, yours for c", from law -> source.
 
     A law without gains has the source "" or "none", and is left out.
     """
@@ -143,4 +143,4 @@ def by_words(words: Mapping[str, str]) -> str:
             laws.setdefault(kind, []).append(law)
     if len(laws) < 2:
         return "".join(f"gains: {kind}" for kind in laws)
-    return f"gains: {', '.join(f'{joined(names)} {kind}' for kind, names in laws.items())}"
+    return f"gains: {', '.join(f'{kind} for {joined(names)}' for kind, names in laws.items())}"

@@ -60,7 +60,7 @@ def export(
         bool, typer.Option(help="FMU: whether to compile a binary for this machine.")
     ] = True,
 ) -> None:
-    """Write a law as C or as an FMU, by OUT's ending.
+    """Export a law as C or as an FMU: to OUT.c or OUT.fmu.
 
     LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or
     gains.json that `smc-mujoco tune --out` wrote. If you leave it out, it is the name of OUT, as in

@@ -27,43 +27,44 @@ LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
 FEW = (
-    f"With fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, covering under "
-    f"{100 * LEVEL:g} %."
+    f"With fewer than {MIN_INTERVAL_SAMPLES} samples an interval is their range, with a coverage "
+    f"below {100 * LEVEL:g} %."
 )
 MEDIANS = (
-    f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains if runs share "
-    f"them. {FEW}"
+    f"A cell has a median and its {100 * LEVEL:g} % interval. Runs that share one of several sets "
+    "of gains count as one sample."
 )
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "J: what tuning minimises, error plus weighted variation of u. Unseen runs are those "
-    "that no search used.",
-    "ITAE": "ITAE: the integral of time times the error's magnitude.",
-    "TV rate": "TV rate: the total variation of u per second.",
-    "": "A mark: no law is better, every run has arrived, and there are enough samples to see a "
-    "lead. Arrived: in the last fifth of the run the error stays within 10 % of its initial value, "
+    "J (": "J, which tuning minimises, is time-weighted error plus weighted variation of u. Unseen "
+    "runs were not used in tuning.",
+    "shipped": "Shipped gains come with the package.",
+    "ITAE": "ITAE is the integral of time times absolute error.",
+    "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
+    "strong=True": "A star or bold type marks a law if no other law is better, all its runs have "
+    "arrived, and the samples are enough to detect a lead.",
+    "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
-    "detects a": f"'detects a 24 % lead': {100 * POWER:g} % of such comparisons would show a lead "
-    "of 24 % between this law and the leader; in the leader's cell, between it and its closest "
-    "rival.",
-    "no lead": "'detects no lead': too few runs to see any lead.",
+    "detectable lead ": "A detectable lead is the smallest lead over the leader that such a "
+    f"comparison finds with {100 * POWER:g} % power; in the leader's cell, over its closest rival.",
+    "no detectable": "'No detectable lead': there are too few samples to detect any lead.",
     "never": "'never' ranks behind every value.",
     "fails": "'fails' ranks behind every value.",
     "not arrived": "'not arrived' ranks behind every value.",
-    "below ": "'below 0.01 rad': below the floor, where values count as equal. The floor is 1e-4 "
-    "of the start for an error, late in the run at least half an encoder count and the noise; it "
-    f"is {100 * MIN_COMMAND_SHARE:g} % of the bound for u.",
-    "by the step": "'by the step': the medians at the physics step and at half of it, where they "
-    f"differ by more than {APART}; {RANGE}.",
+    "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
+    "initial value; late in the run it is at least half an encoder count and the noise. For u, it "
+    f"is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
+    "at half": "'at half the step': the median with half the physics step, if it differs by more "
+    f"than {APART}; {RANGE}.",
 }
 
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
-    "": f"Median [{100 * LEVEL:g} % interval]; bold: no law is better.",
-    "detects a": f"Detects a 24 % lead: {100 * POWER:g} % of such comparisons would show it.",
-    "no lead": "Detects no lead: too few runs to see any lead.",
-    "below": "Below 0.01 rad: below the least that the problem can show; such laws are not ranked.",
-    "by the step": "By the step: the median at the physics step, and at half of it.",
+    "": f"Median [{100 * LEVEL:g} % interval]; bold: no other law is better.",
+    "detectable lead ": f"Detectable lead: the smallest found with {100 * POWER:g} % power.",
+    "no detectable": "No detectable lead: too few samples to detect any lead.",
+    "below": "Below 0.01 rad: too small to be resolved; such laws are not ranked.",
+    "at half": "At half the step: the median with half the physics step.",
 }
 
 
@@ -92,9 +93,9 @@ class Lead(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), ahead in 24 of
-        24 runs"; "there in every run, while pid has none in 5 of 24, ahead in 24 of 24 runs";
-        "below the floor of 0.01 rad, and pid's is at least 1.3 times the floor".
+        """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), and it is
+        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and pid's is at least 1.3 times the
+        floor".
         """
         ratio, low, high = map(number, self.effect[:3])
         if self.floor:
@@ -103,13 +104,12 @@ class Lead(NamedTuple):
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
             text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
             return f"{text} {number(least)} times the floor"
+        share = f"{self.effect.ahead} of {self.effect.samples}"
+        ahead = f"and it is ahead in {share} runs"
         if self.effect.sets:
-            samples = "sets of gains"
-        else:
-            samples = "runs"
-        ahead = f"ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
+            ahead = f"and it is ahead with {share} sets of gains"
         if self.lacking:
-            return f"there in every run, while {self.rival} has none in {self.lacking}, {ahead}"
+            return f"defined in every run, while {self.rival} has none in {self.lacking}, {ahead}"
         return f"{ratio} times {self.rival}'s ({low} to {high}), {ahead}"
 
 
@@ -260,7 +260,7 @@ class Board(Tables):
             leads = [block.lead for block in self.blocks if block.lead]
             if leads:
                 least = max(leads, key=lambda lead: lead.effect.high)
-                where += f"; {at_worst}its value is {least.words}"
+                given += f"; {at_worst}its value is {least.words}"
             return f"{self.winner} wins{where}{given}"
         results = []
         for entry in self.entries:
@@ -277,14 +277,14 @@ class Board(Tables):
         if len(self.entries) == 1:
             return "there is one law"
         if self.barred:
-            return f"none is named over the default gains of {joined(self.barred)}"
+            return f"no law may win over the default gains of {joined(self.barred)}"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
         reasons = dict.fromkeys(block.unranked or self.too_few for block in self.blocks)
         if reason := "; ".join(filter(None, reasons)):
             return reason
         if not self.best:
-            return "none is unbeaten in every condition"
+            return "every law is beaten in some condition"
         return self.alike
 
     @property
@@ -294,7 +294,7 @@ class Board(Tables):
         """
         if len(self.best) == 1:
             return f"{self.best[0]} is undefeated, but does not beat every rival"
-        names = "both" if len(self.entries) == 2 else "all"
+        names = "both laws" if len(self.entries) == 2 else "all laws"
         if any(self.losses(entry.law) for entry in self.entries):
             names = joined(self.best)
         if all(block.level for block in self.blocks):
@@ -313,7 +313,7 @@ class Board(Tables):
         least = "no lead"
         if max(seen) < MAX_VISIBLE:
             least = f"a lead of {100 * max(seen):.2g} %"
-        return f"{names} are statistically indistinguishable ({least} would show)"
+        return f"{names} are statistically indistinguishable ({least} would be detected)"
 
     def visible(self, law: str) -> float:
         """Return the largest, over the blocks, of the least leads that would have been seen, a
@@ -420,7 +420,7 @@ def spread(interval: Interval, metric: str) -> str:
 def heading(board: Board) -> str:
     """Return a metric's label with its unit, if that is known."""
     if board.metric == SETTLES:
-        return "settles (%)"
+        return "settled runs (%)"
     if board.metric == OBJECTIVE:
         return "J (s^2)"
     in_unit = dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)  # in V for voltages
@@ -449,7 +449,7 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
     words = str([*map(tuple, itertools.chain(*cells.values()))])
     under = [text for word, text in UNDER.items() if word in words]
-    if any(entry.interval.n < MIN_INTERVAL_SAMPLES for board in boards for entry in board.entries):
+    if _few(boards):
         under.insert(1, FEW)
     return Tabular(
         headings=["law", *map(heading, boards)],
@@ -483,34 +483,44 @@ def _cell(board: Board, entry: Entry) -> Cell:
     alarms = [board.failures(entry)]
     changes = [block.by_step[entry.law] for block in board.blocks if entry.law in block.by_step]
     for before, after in changes[:1]:
-        alarms.append(f"{size(before, board.metric)} to {size(after, board.metric)} by the step")
+        step = f"becomes {size(after, board.metric)} at half the step"
+        alarms.append(f"{size(before, board.metric)} {step}")
     best = entry.rank.best and median != "" and not blind
     return Cell(median, "\n".join(filter(None, below)), best, alarm="\n".join(filter(None, alarms)))
 
 
 def _detects(lead: float, silent: int) -> str:
-    """Return the least lead that would have been seen, such as "detects a 24 % lead"."""
+    """Return the least lead that would have been seen, such as "detectable lead 24 %"."""
     if silent:
-        return "detects no lead"
+        return "no detectable lead"
     if lead >= MAX_VISIBLE:
-        return f"detects a {number(1.0 / (1.0 - lead))}-fold lead"
-    return f"detects a {100 * lead:.2g} % lead"
+        return f"detectable lead {number(1.0 / (1.0 - lead))}-fold"
+    return f"detectable lead {100 * lead:.2g} %"
+
+
+def _few(boards: Sequence[Board]) -> bool:
+    """Return whether an interval is of fewer than MIN_INTERVAL_SAMPLES samples."""
+    return any(
+        entry.interval.n < MIN_INTERVAL_SAMPLES for board in boards for entry in board.entries
+    )
 
 
 def key(boards: Sequence[Board], tables: str) -> str:
     """Return what the cells of these tables show."""
     family = max(board.family for board in boards)
-    winner = (
-        "A winner is better than every other law in a paired test, corrected for "
-        f"{counted(family, 'comparison')} per metric. The rival that a verdict names is the one "
-        "hardest to tell from the winner. A lead is measured on pairs of runs, not on medians. "
-        f"Ahead: better by over {100 * boards[0].relevant:g} % of the larger value."
-    )
+    corrected = f", corrected for {family} comparisons per metric" if family > 1 else ""
     parts = [MEDIANS]
+    if _few(boards):
+        parts.append(FEW)
     for word, text in MARKS.items():
         if word in tables:
             parts.append(text)
-    parts.append(winner)
+    parts.append(
+        f"A winner is better than every other law in a paired test{corrected}. Its verdict names "
+        "the rival that this test separates least clearly from it, with the ratio of paired runs, "
+        "which differs from the ratio of the medians. A law is ahead if it is better by more than "
+        f"{100 * boards[0].relevant:g} % of the larger value."
+    )
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")
     if gains := in_words(sources(boards)):

@@ -48,10 +48,13 @@ QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the o
 MAX_BLOCKS = 12
 MAX_SEED = 10**6
 DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
-TIMES = "Time that the compiled laws take per sample, on this machine"
+TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative to pid", "median (s)", "99 % quantile (s)"
 GAINS = "plant", "law", "gains", "sets", "best set"
-BEST_SET = "Run i uses set i, starting over after the last; the best set has the least J."
+BEST_SET = (
+    "Run i uses set i; after the last set, runs begin with the first again. The best set has the "
+    "lowest J. `smc-mujoco list LAW` has the units of a law's gains."
+)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)

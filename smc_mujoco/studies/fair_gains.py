@@ -201,7 +201,7 @@ class Trial(NamedTuple):
                     if found is None:
                         untuned.append(law)
                 seconds, size = self.expected(plant, untuned, starts[plant.name])
-                told(f"gains on {plant.name}", seconds * self.searches * size)
+                told(f"tuning for {plant.name}", seconds * self.searches * size)
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
@@ -209,7 +209,7 @@ class Trial(NamedTuple):
                 if found is None and self.tune:
                     begun += 1
                     if self.progress:
-                        print(f"gains of law {begun} of {count}", file=sys.stderr)
+                        print(f"tuning law {begun} of {count}", file=sys.stderr)
                     candidate = self.search_gains(plant, law, starts[plant.name])
                 made[plant.name].append(candidate)
         return made
@@ -387,5 +387,6 @@ def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
     best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
     remark = ""
     if names := list(search_space.without_unit(default)):
-        remark = f"no unit is given for {joined(names)}, so the search is centred on the default"
+        given = f"no unit is given for {joined(names)}"
+        remark = f"{given}, so the search is centred on their defaults"
     return Candidate(best, tuple(sets), remark)

@@ -68,14 +68,14 @@ class Advice(Tables):
 
     @property
     def answer(self) -> list[str]:
-        """Four lines: the law, its gains, the second, and how sure that is."""
+        """Four lines: the law, its gains, the second, and the evidence."""
         first = self.law
         gains = ", ".join(f"{name}={gain_text(value)}" for name, value in first.gains.items())
         return [
             f"Use: {self._name}",
             f"Gains: {gains or 'none'}, {first.source}",
             f"Second: {self.second or 'none'}",
-            f"How sure: {self._sure}",
+            f"Evidence: {self._sure}",
         ]
 
     @property
@@ -91,11 +91,11 @@ class Advice(Tables):
         settles = self.settles[self.law.name]
         if settles < RELIABLE:
             share = f"{100 * settles:.0f} % of its runs in its worst condition"
-            return f"no law is reliable here, this one settles in {share}"
+            return f"no law is reliable here; this one settles in {share}"
         if len(self.laws) < 2:
             return "there is no second law"
         if barred := [law for board in boards for law in board.barred if law != self.law.name]:
-            return f"first so far; {barred[0]} has default gains (defaults=True, --defaults)"
+            return f"first so far; --defaults lets a law win over {barred[0]}'s default gains"
         if all(board.too_few for board in boards):
             return f"first so far; {boards[0].too_few}"
         name = self.law.name
@@ -115,7 +115,7 @@ class Advice(Tables):
         if self.left_out:
             notes.append(
                 f"Left out after one search and {FEW} runs in each condition, though the best may "
-                f"be among them (leave out quick, or name five laws): {', '.join(self.left_out)}"
+                f"be among them (run without quick, or name five laws): {', '.join(self.left_out)}"
             )
         if rare := sorted(self.settles.keys() - {law.name for law in self.laws}):
             notes.append(
@@ -242,7 +242,7 @@ def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
     searches = size * (1.0 + (QUICK_SEARCHES - 1) * last / len(laws))
     runs = len(laws) * FEW + 3 * last * seeds  # each of these also at half the step
     length = len(trial.conditions) * trial.duration / (len(BRIEF.conditions) * BRIEF.duration)
-    told(f"a law for {plant.name}", seconds * (searches + length * runs))
+    told(f"choosing a law for {plant.name}", seconds * (searches + length * runs))
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:

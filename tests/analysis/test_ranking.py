@@ -712,8 +712,12 @@ BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
     ((0.3, 0.9), None, "both are below the floor of {q}, so they are not ranked"),
     ((0.5, 0.6, 3.0), None, "a and b are below the floor of {q}, so they are not ranked"),
     ((0.5, 1.01), None, "a is below the floor of {q}, unlike b's"),
-    ((0.5, 4.0, 5.0), "a", "a wins; its value is below the floor of {q}, and b's is at least 4."),
-    ((2.0, 3.0), "a", "a wins; its value is 0.6"),
+    (
+        (0.5, 4.0, 5.0),
+        "a",
+        "a wins, for these gains; its value is below the floor of {q}, and b's is at least 4.",
+    ),
+    ((2.0, 3.0), "a", "a wins, for these gains; its value is 0.6"),
     ((2.0, 2.0), None, "level within 10 %"),
 ]
 
@@ -748,7 +752,7 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
         if "not ranked" in words and below:
             assert not cells[law].strong
             assert law not in block.worse
-            assert "detects" not in cells[law].below
+            assert "detectable" not in cells[law].below
 
 
 def test_a_lead_over_the_floor_is_printed_only_where_the_test_sees_it():

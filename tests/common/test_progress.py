@@ -47,7 +47,7 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
             bar.advance(1.0)
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.splitlines()[:2] == ["duffing 25 %, 30 s left", "duffing 50 %, 20 s left"]
+    assert err.splitlines()[:2] == ["duffing, 25 %, 30 s left", "duffing, 50 %, 20 s left"]
     assert len(err.splitlines()) == 4
 
 
@@ -60,7 +60,7 @@ def test_the_time_left_is_the_median_of_pieces_that_were_not_read_from_a_file(mo
         now[0] += seconds
         shown.add_piece(seconds, 5 - i)
         shown.reached(i + 1.0, 6.0)
-        said.append(str(shown).partition(", ")[2])
+        said.append(str(shown).rpartition(", ")[2])
     now[0] += 3.0
     assert [*said, shown.left] == [
         "0 s left",
@@ -82,9 +82,9 @@ def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
     with progress.counter(0, 0, shown=True):
         pass
     assert said == [
-        "0 of 8 runs, 0 a second",
-        "2 of 8 runs, 0.625 a second",
-        "0 of 0 runs, 0 a second",
+        "0 of 8 simulations, 0 per second",
+        "2 of 8 simulations, 0.625 per second",
+        "0 of 0 simulations, 0 per second",
     ]
 
 

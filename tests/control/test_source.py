@@ -174,4 +174,4 @@ def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their
         "b": [smc.law("pid").source],
         "c": [smc.law("none").source],
     }
-    assert source.in_words(others) == "gains: a shipped, b default"
+    assert source.in_words(others) == "gains: shipped for a, default for b"

@@ -113,9 +113,9 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
                 assert power in tex
     assert re.fullmatch(r"[34]\.\de-7", table.rows[0][1].text)  # 4e-7 times 0.9 to 1.1
     assert table.rows[0][1].below.startswith(spread(boards[0].entries[0].interval, "itae"))
-    assert re.search(r"detects a [\d.]+ % lead", table.rows[0][1].below)
+    assert re.search(r"detectable lead [\d.]+ %", table.rows[0][1].below)
     below = table.to_latex().partition("bottomrule")[2]
-    assert "Detects a 24" in below
+    assert "Detectable lead: the" in below
     assert below.count("multicolumn") == 3
     assert table.rows[2][2][:2] == ("100", "84–100")
 
@@ -166,14 +166,14 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert blind[0].too_few == ""
     assert len(blind[0].best) == 3
     assert not any(map(any, marked(blind)))
-    assert "detects no lead" in repr(blind)
+    assert "no detectable lead" in repr(blind)
 
 
 @pytest.mark.parametrize("conditions", [("nominal",), ("nominal", "noise", "sine")])
 @pytest.mark.parametrize("never", [0.0, 0.4, 1.0])  # share of the rivals' runs
 @pytest.mark.parametrize("spread", [0.1, 3.0, 9.0])
 def test_where_a_law_wins_no_cell_says_that_no_lead_is_seen(spread, never, conditions):
-    """A lead of 4088 times was named beside "detects no lead", and "0 of classical (0 to .5)" where
+    """A lead of 4088 times was named beside "no detectable lead", and "0 of classical (0 to .5)" where
     its runs never settle.
     """
     table = made(conditions=conditions)
@@ -184,11 +184,11 @@ def test_where_a_law_wins_no_cell_says_that_no_lead_is_seen(spread, never, condi
     table.columns["settling_time"] = times.ravel()
     (board,) = found = leaderboard(table, metrics=["settling_time"])
     assert board.winner == "third"
-    assert "no lead" not in repr(found).split("Medians with")[0]
+    assert "no detectable" not in repr(found).split("A cell has")[0]
     assert found.tables[0].rows[0][1].strong
     if never:
         assert re.search(
-            r"wins.*while (50|second).* has none in \d+ of 20, ahead in \d+", board.result
+            r"wins.*while (50|second).* has none in \d+ of 20, and it is ahead in \d+", board.result
         )
     assert not re.search(r"\b0 of|\(0 to", board.result)
 
@@ -219,7 +219,8 @@ def test_half_a_step_that_moves_a_median_is_an_alarm():
     for row in leaderboard(table, ["itae"]).tables[0].rows:
         rows[row[0].text] = row[1]
     before = float(np.median(table.column("itae")[:20]))
-    assert rows[EVIL].alarm == f"{size(before, 'itae')} to {size(1.5 * before, 'itae')} by the step"
+    moved = f"{size(before, 'itae')} becomes {size(1.5 * before, 'itae')} at half the step"
+    assert rows[EVIL].alarm == moved
     assert rows["second"].alarm == ""
 
 
@@ -260,7 +261,7 @@ LOST = {
     "worse": LAWS,
 }
 RESULTS = {  # changes of both blocks -> the result
-    "barred": ({"untuned": ("second", "third")}, "none is named over the default gains of second"),
+    "barred": ({"untuned": ("second", "third")}, "no law may win over the default gains of second"),
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
         {"ahead": None, "samples": 3, "sets": 3},
@@ -282,8 +283,8 @@ def test_where_there_is_no_winner_the_reason_is_said(case, pair):
 
 def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     assert re.fullmatch(
-        r"third wins in both conditions; at worst its value is \S+ times \S+.* \(\S+ to \S+\), "
-        "ahead in 20 of 20 runs, for these gains",
+        r"third wins in both conditions, for these gains; at worst its value is \S+ times \S+.* "
+        r"\(\S+ to \S+\), and it is ahead in 20 of 20 runs",
         pair.result,
     )
     first, second = pair.blocks
@@ -292,4 +293,6 @@ def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     assert "third wins under nominal and loses under noise" in split
     assert "second wins under noise and loses under nominal" in split
     lead = Lead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
-    assert lead.words == "0.850 times b's (0.800 to 0.900), ahead in 5 of 8 sets of gains"
+    assert (
+        lead.words == "0.850 times b's (0.800 to 0.900), and it is ahead with 5 of 8 sets of gains"
+    )

@@ -56,8 +56,8 @@ def test_boards_print_the_sources(folder):
     boards = ranked([FAST, at_default(SLOW)], folder)
     for printed in (repr(boards), boards._repr_html_(), boards.to_latex()):
         words = " ".join(printed.split())  # lines of a terminal may end anywhere
-        assert "slow default" in words
-        assert "fast yours" in words
+        assert "default for slow" in words
+        assert "yours for fast" in words
     assert "slow [default] &" in boards.to_latex()
 
 
@@ -114,4 +114,4 @@ def test_figures_and_films_say_whose_gains_are_drawn():
     assert {"fast, gains: yours", "slow, gains: default"} <= set(drawn)
     assert [note.get_text() for note in smc.figure(alike).artists] == ["gains: yours"]
     made = caption.Caption(mixed, ["fast", "slow"], ["#000000"] * 2, None, (1280, 460), 1.0, {})
-    assert made.source == "gains: fast yours, slow default"
+    assert made.source == "gains: yours for fast, default for slow"

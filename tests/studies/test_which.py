@@ -151,7 +151,7 @@ def test_quick_drops_laws_after_few_runs_and_keeps_the_order(kept, tmp_path, mon
     assert len(found.table) == 2 * 24 * kept
     note = found.tables[-1].notes[-5]
     assert all(name in note for name in ("may be", *found.left_out))
-    assert [what for what, seconds in said if seconds > 0.0] == ["a law for mass"]
+    assert [what for what, seconds in said if seconds > 0.0] == ["choosing a law for mass"]
 
 
 REFUSED = [

@@ -164,12 +164,12 @@ def tune(
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
+    words = f"tuning {task.law.name} for {task.plant.name}"
     if progress:
-        told(f"{task.law.name} on {task.plant.name}", expected(task, searches))
+        told(words, expected(task, searches))
     codes = None if folder is None else task.codes()
-    with bar(
-        f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True
-    ) as shown:
+    words += ": evaluation"
+    with bar(words, searches * task.size, shown=progress, counted=True) as shown:
 
         def found(i: int) -> SearchResult:
             start = time.monotonic()

@@ -43,12 +43,12 @@ def tune(
     plant: options.PlantName,
     law: options.LawText,
     objective: Annotated[
-        str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
+        str, typer.Option(help="balanced: error and variation of u; tracking: error alone.")
     ] = "balanced",
     searches: Annotated[int, typer.Option(min=1, help="Independent searches.")] = 12,
     budget: Annotated[
         int,
-        typer.Option(min=1, help="How many sets a search may try, for each gain it finds."),
+        typer.Option(min=1, help="Number of sets of gains that a search may try, per gain."),
     ] = 64,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches and of the noise.")] = 0,
     out: Annotated[
@@ -66,15 +66,14 @@ def tune(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Find a law's gains on a plant by a rule that is the same for every law.
+    """Tune a law for a plant, by a rule that is the same for every law.
 
     Each gain is searched over the same number of decades about a scale that follows from its unit
-    and the plant. The objective is error times time, plus variation of u, summed over seven
-    conditions in runs of 5 s: nominal, noise, delay, a sine and a constant disturbance, 30 % more
-    and 30 % less mass. Each search has its own start, noise and initial states, so the spread
-    of their results shows how much is chance. The same seed gives the same gains. With
-    --out each search is kept in the folder FILE-searches: if you stop the command, it continues
-    there.
+    and the plant. The objective is time-weighted error plus weighted variation of u, summed over
+    runs of 5 s in seven conditions: nominal, noise, delay, a sine and a constant disturbance, 30 %
+    more and 30 % less mass. Each search has its own start, noise and initial states, so the spread
+    of their results shows how much is chance. The same seed gives the same gains. With --out each
+    search is kept in the folder FILE-searches, from which a stopped command resumes.
 
     Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
@@ -113,15 +112,15 @@ def margins(
     kinds: Annotated[
         str | None,
         typer.Option(
-            help="Any of delay, disturbance, friction, mass, noise, jitter, missed, gain, as a,b; "
-            "default: the first five."
+            help="Any of delay, disturbance, friction, mass, noise, jitter, missed and gain, "
+            "separated by commas; default: the first five."
         ),
     ] = None,
     gains: options.Gains = "tuned",
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Shorter runs, coarser results; by default 2 plants, 4 laws, 2 kinds."
+            "--quick", help="Shorter runs, coarser results; default: 2 plants, 4 laws, 2 kinds."
         ),
     ] = False,
     condition: options.Condition = "nominal",
@@ -130,14 +129,15 @@ def margins(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Find how much a law tolerates: the most delay, friction and the like with which the error
-    still ends below 5 % of its start.
+    """Find the largest delay, friction, noise and so on that a law tolerates: the error must still
+    end below 5 % of its initial value.
 
-    A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one,
-    and the delay of the command is in s. Noise is the standard deviation of the position sensor;
-    the velocity sensor has 5/s times that. For laws that can be linearised, the column "theory" has
-    the linear loop's limit, such as the delay that makes rest unstable. A law may tolerate more,
-    with a small steady oscillation.
+    The delay of the command is in s; a constant disturbance and dry friction are in N or N m. Mass
+    is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
+    rad or m; if that is 1 mrad, the velocity sensor has 5 mrad/s. Jitter is a share of the control
+    period, missed a share of the samples, and gain the share of its force that each actuator loses.
+    For laws that can be linearised, the column "theory" has the stability limit of the linear loop.
+    A law may tolerate more, with a small sustained oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
@@ -215,8 +215,7 @@ def worst(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Find the worst that can happen to laws within bounds that you give: an adversary instead of
-    random seeds.
+    """Search for the worst case of each law within bounds that you give, in place of random seeds.
 
     Only what you bound is uncertain; all else is as in the condition. If you bound nothing, what
     the plant declares is uncertain, such as an arm's payload, or else a disturbance up to a sixth
@@ -278,7 +277,8 @@ def sensitivity(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Find what breaks a law: how much of a score each uncertainty explains, and where runs fail.
+    """Find what breaks a law: how much of a score's variance each uncertainty explains, and where
+    runs fail.
 
     Mass, friction, delay, noise and the like vary together within bounds. The column "alone" has
     the share of the score's variance that an axis explains by itself, and "with others" also has
@@ -380,7 +380,7 @@ def chatter(
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
-    """Predict how much laws chatter, by harmonic balance, and measure it in runs.
+    """Predict the chattering of laws by harmonic balance, and measure it in simulations.
 
     If a law switches and the actuator lags, the loop oscillates without end. Amplitude and
     frequency are those at which N L = 1: N is the law's describing function, L the response of the

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 GAINS_HELP = (
-    "With your own gains: pid(kp=50,ki=50,kd=8). From a file: my_law.py, or gains.json of "
+    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, or gains.json of "
     "`smc-mujoco tune --out`."
 )
 
@@ -29,7 +29,7 @@ def picture(contents: str) -> Any:
     """Return an option for the file of a figure that shows `contents`."""
     return typer.Option(
         metavar="PICTURE",
-        help=f"Also draw {contents}, as PICTURE.pdf if so named, else as .svg and .png.",
+        help=f"Also draw {contents}: a PDF if PICTURE ends in .pdf, otherwise .svg and .png.",
     )
 
 
@@ -39,8 +39,8 @@ def conditions_by_default(default: str) -> Any:
         "--condition",
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
-        help="Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your own, "
-        'as "worn gear: friction=Coulomb(0.05)", or a file with one on each line. May be '
+        help="Conditions from `smc-mujoco list`, separated by commas; noise+encoder joins two. "
+        'Your own: "worn gear: friction=Coulomb(0.05)", or a file with one on each line. May be '
         f"repeated. Default: {default}.",
         show_default=False,
     )
@@ -78,7 +78,7 @@ Condition = Annotated[
         "--condition",
         metavar="NAME|TEXT",
         autocompletion=CONDITIONS,
-        help='The condition of all runs, as encoder, noise+encoder or "worn gear: '
+        help='The condition of all runs: encoder, noise+encoder or "worn gear: '
         'friction=Coulomb(0.05)".',
     ),
 ]
@@ -88,12 +88,14 @@ Defaults = Annotated[
 Disturbance = Annotated[
     float | None,
     typer.Option(
-        min=0.0, help="Bound on |d|, N or N m; default that of the plant or the condition."
+        min=0.0, help="Bound on |d|, N or N m; default: that of the plant or the condition."
     ),
 ]
 Folder = Annotated[
     Path,
-    typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there."),
+    typer.Option(
+        metavar="FOLDER", help="Folder for gains and runs; a stopped command resumes from it."
+    ),
 ]
 GainValues = Annotated[
     str,
@@ -102,14 +104,14 @@ GainValues = Annotated[
 Gains = Annotated[
     str,
     typer.Option(
-        help="Gains: tuned for error and variation of u, tracking (tuned for error alone), "
-        "study (the paper's) or default (the law's)."
+        help="Set of gains: tuned (for error and variation of u), tracking (for error alone), "
+        "study (from the paper) or default (from the law's file)."
     ),
 ]
 Joints = Annotated[
     int | None,
     typer.Option(
-        help="Number of joints of a law of many joints; default that of the values of a gain."
+        help="Number of joints of a law of many joints; default: number of values of a gain."
     ),
 ]
 Json = Annotated[
@@ -130,7 +132,7 @@ Laws = Annotated[
         "--law",
         metavar="LAW|FILE",
         autocompletion=LAWS,
-        help=f"Laws of `smc-mujoco list`, as a,b. {GAINS_HELP} May be repeated.",
+        help=f"Laws from `smc-mujoco list`, separated by commas. {GAINS_HELP} May be repeated.",
         show_default=False,
     ),
 ]
@@ -139,9 +141,9 @@ Plants = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint. Default: "
-        "inverted_pendulum, van_der_pol, duffing and the two networks of pendulums; fewer with "
-        "--quick.",
+        help="Plants from `smc-mujoco list`, or your own: FILE.xml:joint+joint. Separate several "
+        "by commas or spaces. Default: inverted_pendulum, van_der_pol, duffing and the two "
+        "pendulum networks; fewer with --quick.",
         show_default=False,
     ),
 ]
@@ -150,17 +152,18 @@ PlantName = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="A plant from `smc-mujoco list`, or your own .xml or .urdf: "
-        "FILE.xml:joint+joint@keyframe+held, with other joints held by servos, or welded: +locked. "
-        'A joint may be written "joint(motor,partner=pole,u_max=9,x0=0.2)": with a motor that the '
-        'file lacks, and a passive partner; or "joint(measured)": read, not driven.',
+        help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf: "
+        "FILE.xml:joint+joint@keyframe+held. The keyframe is the goal. Servos hold the other "
+        "joints; +locked welds them instead. Brackets after a joint hold its options: (motor) adds "
+        "a motor, (partner=pole) names a passive joint, (u_max=9,x0=0.2) sets the bound on u and "
+        "the start, and (measured) means read but not driven.",
     ),
 ]
 Quick = Annotated[
     bool,
     typer.Option(
         "--quick",
-        help="Less of everything: a first answer in minutes, plus any tuning.",
+        help="Fewer and shorter runs, for a first answer in minutes. Tuning takes extra time.",
     ),
 ]
 Relevant = Annotated[
@@ -178,12 +181,12 @@ SceneName = Annotated[
     ),
 ]
 Threads = Annotated[
-    int | None, typer.Option(min=1, help="Simulations at once; default one per core.")
+    int | None, typer.Option(min=1, help="Number of parallel simulations; default: one per core.")
 ]
 Device = Annotated[str, typer.Option(help="Where searches run: cpu, or cuda for an NVIDIA card.")]
 X0 = Annotated[
     float | None,
-    typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start."),
+    typer.Option("--x0", help="Initial position, rad or m; default: the plant's."),
 ]
 
 

@@ -15,11 +15,11 @@ def run(
     name: options.SceneName,
     out: Annotated[
         Path,
-        typer.Option(metavar="FOLDER", help="For results; one subfolder per scene."),
+        typer.Option(metavar="FOLDER", help="Folder for results; one subfolder per scene."),
     ] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")
+        int | None, typer.Option(min=0, help="Seed of all random numbers; default: the scene's.")
     ] = None,
     threads: options.Threads = None,
     export: Annotated[
@@ -32,19 +32,19 @@ def run(
     repeat: Annotated[
         bool,
         typer.Option(
-            help="Whether to repeat runs at half the physics step, to mark what depends on it."
+            help="Whether to repeat runs at half the physics step, and mark scores that differ."
         ),
     ] = True,
     json: options.Json = None,
 ) -> None:
-    """Run a scene, an experiment with a question: print scores and answer; write traces, figures
-    and a film.
+    """Run a scene (a prepared experiment), print its scores, and write traces, figures and a film.
 
-    Each run is repeated at half the physics step, and from a start changed by a relative 1e-9. It
-    is also repeated at a quarter of the step if u chatters, and under RK4 if there are contacts. A
-    score that changes by more than 5 % is marked (2.5 % at half the step without RK4).
+    Each run is repeated at half the physics step, and from an initial position changed by 1e-9 of
+    its value. It is also repeated at a quarter of the step if u chatters, and under RK4 if there
+    are contacts. A score that changes by more than 5 % is marked. Without RK4, a change of 2.5 % at
+    half the step is enough.
 
-    Exported traces keep every number to the last bit, with its unit.
+    Exported traces keep full precision, and the unit of each signal.
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
@@ -127,29 +127,31 @@ def view(
         typer.Argument(
             metavar="MACHINE",
             autocompletion=options.PLANTS,
-            help="A plant from `smc-mujoco list`; yours, FILE.xml:joint+joint, or "
-            "FILE.xml:joint of a free body; or a scene file, FILE.py, which shows the first two "
-            "runs of the condition that it films.",
+            help="A plant from `smc-mujoco list`, joints of your own model (FILE.xml:joint+joint), "
+            "a free joint of it (FILE.xml:joint), or a scene file (FILE.py). A scene shows the "
+            "first two runs of its film.",
         ),
     ],
     law: options.Laws = None,
     port: Annotated[
         int,
-        typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one from 8080 on."),
+        typer.Option(
+            min=0, max=65535, help="Port of the page; 0: the first free one from 8080 up."
+        ),
     ] = 0,
-    browser: Annotated[bool, typer.Option(help="Whether to open the browser's tab.")] = True,
+    browser: Annotated[bool, typer.Option(help="Whether to open the browser tab.")] = True,
 ) -> None:
-    """Watch a machine under one law or two in a browser tab, in MuJoCo's Studio; change, push and
-    save what you see.
+    """Watch a machine under one or two laws in a browser tab, in MuJoCo Studio. Push it, change its
+    gains, and save the scene.
 
-    In the panel "Laws" you change each law and its gains, and the plant's mass, delay, noise and
-    friction; then the runs start again. It also shows u, s and e. Its button "save as scene" writes
-    view.py: `smc-mujoco run view.py` repeats the runs to the bit. The second law's machine is the
-    transparent one.
+    The panel "Laws" changes each law and its gains, and the plant's mass, delay, noise and
+    friction; each change restarts the runs. It also shows u, s and e. Its button "save as scene"
+    writes view.py, and `smc-mujoco run view.py` repeats the runs bit for bit. The second law's
+    machine is transparent.
 
-    Push a body: double-click it, hold Ctrl, drag with the right mouse button, and let go.
+    To push a body, double-click it, hold Ctrl, and drag with the right mouse button.
 
-    It needs MuJoCo 4, and ends with Ctrl-C.
+    The command needs MuJoCo 4. Ctrl-C ends it.
 
     Example: smc-mujoco view duffing --law super_twisting,pid
 

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
 
-Seed = Annotated[
-    int, typer.Option(min=0, help="Another seed draws other starts, noise and phases.")
-]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
 
 
 def which(
@@ -26,10 +24,10 @@ def which(
     needs: Annotated[
         str,
         typer.Option(
-            help="What to compare, as a,b: fast (settling time), accurate (ultimate bound), "
-            "on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of u^2), "
-            "no-overshoot; and what the law must have: no-velocity, continuous, finite-time, ..., "
-            "as for `smc-mujoco list --needs`."
+            help="What to compare, separated by commas: fast (settling time), accurate (ultimate "
+            "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
+            "u^2), no-overshoot. Any name of `smc-mujoco list --needs`, such as no-velocity, is a "
+            "property that the law must have."
         ),
     ] = "fast,accurate,calm",
     condition: Annotated[
@@ -37,11 +35,9 @@ def which(
     ] = None,
     law: options.Laws = None,
     quick: options.Quick = False,
-    seeds: Annotated[
-        int, typer.Option(min=1, help="Runs of a law in each condition, each from another start.")
-    ] = 24,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of each law in each condition.")] = 24,
     duration: Annotated[
-        float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")
+        float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --quick.")
     ] = None,
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
@@ -52,12 +48,13 @@ def which(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Recommend a law for a plant, with its gains, the second best, and how sure the answer is.
+    """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
+    choice is.
 
     All laws that suit the plant are compared by the rules of `compare`, with the package's gains
     or with gains that are tuned now. On a model of your own, tuning takes minutes for each law.
-    --quick takes a sixteenth of that time; --law names the laws to try. If you stop the command, it
-    continues when you start it again.
+    --quick takes a sixteenth of that time. --law names the laws to try. A stopped command resumes
+    when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
@@ -99,7 +96,7 @@ def compare(
         ),
     ] = None,
     seeds: Annotated[
-        int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")
+        int, typer.Option(min=1, help="Runs of each law on each plant in each condition.")
     ] = 12,
     tune: Annotated[
         bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")
@@ -108,8 +105,8 @@ def compare(
         int | None,
         typer.Option(
             min=1,
-            help="How many searches tune a law; default 12. With --rig, laws are tuned only if "
-            "you give this.",
+            help="Number of searches that tune a law; default 12. With --rig, laws are tuned only "
+            "if you give this.",
         ),
     ] = None,
     worst: Annotated[
@@ -118,14 +115,15 @@ def compare(
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
     duration: Annotated[
-        float | None, typer.Option(help="Duration of a run, s; default 10, with --quick 3.")
+        float | None, typer.Option(help="Duration of a run, s; default 10, or 3 with --quick.")
     ] = None,
     x0: options.X0 = None,
     metrics: Annotated[
         str | None,
         typer.Option(
-            help='What to compare, as a,b: scores that `smc-mujoco show` lists, or "settles", the '
-            "share of settled runs. Default: settles,settling_time,ultimate_bound,itae,tv_rate."
+            help="What to compare, separated by commas: scores that `smc-mujoco show` lists, or "
+            '"settles", the share of settled runs. Default: settles, settling_time, '
+            "ultimate_bound, itae, tv_rate."
         ),
     ] = None,
     relevant: options.Relevant = RELEVANT,
@@ -137,24 +135,24 @@ def compare(
     ] = None,
     rig: Annotated[
         str | None,
-        typer.Option(help="A rig, one of `smc-mujoco rig`, in place of plants and conditions."),
+        typer.Option(help="A rig from `smc-mujoco rig`, instead of plants and conditions."),
     ] = None,
     seed: Seed = 0,
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Compare laws on plants in conditions: tune the laws that have no gains, run all of them, and
-    say which is best and how sure that is.
+    """Compare control laws on plants in conditions. Tune laws that have no gains, run every law,
+    and report which law is best and how certain that is.
 
-    A law with gains in brackets keeps them. Any other law, including one from your own file, uses
-    the package's gains for the plant. If there are none, it is tuned by the same rule, in seconds
-    to minutes for each law on each plant. If you stop the command, it continues when you start it
-    again. --law all compares every law that is not for particular plants.
+    Gains that you give in brackets are kept. Any other law, including one from your own file, uses
+    the package's gains for the plant. If there are none, it is tuned by the rule that found the
+    package's gains, which takes seconds to minutes for each law and plant. A stopped command
+    resumes when you start it again. --law all compares every general-purpose law.
 
-    A rig is an identified machine: with --rig, its parameter sets replace plants and conditions.
-    Laws use the machine's gains, or with --searches those found on its sets. For each metric a line
-    says whether one law wins on every set.
+    A rig is a real machine whose parameters were identified. With --rig, its parameter sets replace
+    plants and conditions. Laws use the rig's own gains; with --searches, they are tuned on the
+    parameter sets. For each metric, a line says whether one law wins on every set.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder
@@ -231,7 +229,7 @@ def compare(
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
     """Print the number of runs and the file with all of them, and end the command."""
     failed = len(table) - table.data["failure"].null_count
-    runs = f"{counted(len(table), 'run')}, {failed} of them failed"
+    runs = f"{counted(len(table), 'run')}, {failed} failed"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
     terminal.finish()

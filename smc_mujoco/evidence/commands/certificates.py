@@ -39,8 +39,7 @@ def certify(
     ] = None,
     json: options.Json = None,
 ) -> None:
-    """Prove what a law does on a plant: from where it comes to rest, and how far a bounded
-    disturbance pushes it.
+    """Prove a law's region of attraction on a plant, and how far a bounded disturbance moves it.
 
     The plant is its equation, integrated exactly, and the law acts at every instant. The command
     prints each theorem with its conditions and their margins, also where they fail. No theorem is

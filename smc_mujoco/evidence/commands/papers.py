@@ -47,8 +47,7 @@ def claims(
         typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead."),
     ] = None,
 ) -> None:
-    """Audit a paper's claims: measure each against the threshold that was fixed for it before any
-    run.
+    """Audit a paper's claims: test each against a threshold that was fixed before any run.
 
     A paper is a folder. Its paper.toml has the claims and their thresholds, and its claims.py has a
     function for each claim.

@@ -12,7 +12,10 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 
 def report(
     quick: Annotated[
-        bool, typer.Option("--quick", help="A small report, in five minutes: less of everything.")
+        bool,
+        typer.Option(
+            "--quick", help="A small report in five minutes, with fewer and shorter runs."
+        ),
     ] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
     seeds: Annotated[
@@ -24,12 +27,11 @@ def report(
     ] = None,
     threads: options.Threads = None,
 ) -> None:
-    """Compute the whole study, in about 20 minutes, and write it as one HTML file: which
-    controller, where, how sure.
+    """Run the package's own study in about 20 minutes, and write it as one HTML file.
 
-    The report has the tables of `smc-mujoco compare`; the paper's claims; margins; films. The file
-    OUT/report.html needs no network and no other file; the data are in the same folder. You can
-    stop the command at any time, and continue by starting it again.
+    The report has the tables of `smc-mujoco compare`, the paper's claims, margins and films. The
+    file OUT/report.html needs no network and no other file; the data are in the same folder. A
+    stopped command resumes when you start it again.
 
     Example: smc-mujoco report --quick --out look
     """

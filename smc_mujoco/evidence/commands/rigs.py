@@ -77,12 +77,13 @@ def rig(
     seed: Annotated[int, typer.Option(min=0, help="Fit: seed of these starts.")] = 0,
     json: options.Json = None,
 ) -> None:
-    """Show a record of a real machine beside the run of its twin, or fit the twin's quantities to
-    records.
+    """Compare a record of a real machine with its simulation, or identify the simulation's
+    parameters.
 
-    The twin starts from the measured state. If the machine's controller is known, the loop is
-    closed and only the references are those of the record; else the twin repeats the recorded
-    command. The table has the fit of the whole record, 100 (1 - |y - yhat| / |y - mean y|) percent.
+    The simulation, or twin, starts from the measured state. If the machine's controller is known,
+    the loop is closed and only the references are those of the record; else the twin repeats the
+    recorded command. The table has the fit of the whole record, 100 (1 - |y - yhat| / |y - mean y|)
+    percent.
 
     With --fit the quantities are chosen that give the least sum of squared residuals. They are
     printed with their standard errors, with what the records cannot tell, and with the fit of each

@@ -152,4 +152,4 @@ def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
     assert "nominal: |e| in m, gains: default" in str(table)
 
     beside = type(table)([table[0], dataclasses.replace(table[0], law="pid", gains="shipped")])
-    assert "gains: hierarchical default, pid shipped" in " ".join(str(beside).split())
+    assert "gains: default for hierarchical, shipped for pid" in " ".join(str(beside).split())
