@@ -71,7 +71,7 @@ def test_the_answer_has_four_lines_and_counts_comparisons(advice):
         "Use: observer_free",
         "Gains: lam=6, k1=2, yours",
         f"Second: {SLOW}",
-        f"How sure: it wins {wins} of 4 comparisons, and another law is better in 0",
+        f"Evidence: it wins {wins} of 4 comparisons, and another law is better in 0",
     ]
     assert advice.tables[-1].notes[-4:] == advice.answer
 
@@ -85,12 +85,12 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         duration=2.5,
         seeds=3,
     )
-    assert few.answer[3].startswith("How sure: first so far; too few runs (3) ")
+    assert few.answer[3].startswith("Evidence: first so far; too few runs (3) ")
     same = smc.which("duffing", laws=[FAST, FAST.named("same")], out=folder, **COMMON)
-    assert same.answer[3].startswith("How sure: first so far; it wins 0 of 6 comparisons, ")
+    assert same.answer[3].startswith("Evidence: first so far; it wins 0 of 6 comparisons, ")
     alone = smc.which("duffing", laws=FAST, out=folder, **COMMON)
     assert alone.second is None
-    assert alone.answer[2:] == ["Second: none", "How sure: there is no second law"]
+    assert alone.answer[2:] == ["Second: none", "Evidence: there is no second law"]
     short = smc.which(
         "duffing",
         laws=[FAST, SLOW],
@@ -98,12 +98,14 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         duration=0.1,
         seeds=4,
     )
-    assert "no law is reliable here, this one settles in 0 %" in short.answer[3]
+    assert "no law is reliable here; this one settles in 0 %" in short.answer[3]
     assert short.answer[0].startswith("Use: no law settles reliably; the nearest is ")
     barred = dataclasses.replace(advice.leaderboard[0].blocks[0], untuned=("slow",))
     board = dataclasses.replace(advice.leaderboard[0], blocks=(barred,))
     untuned = dataclasses.replace(advice, leaderboard=[board])
-    assert untuned.answer[3].startswith("How sure: first so far; slow has default gains")
+    assert untuned.answer[3].startswith(
+        "Evidence: first so far; --defaults lets a law win over slow's"
+    )
 
 
 def test_gains_of_the_package_are_taken_where_there_are_some(folder):
