@@ -75,7 +75,7 @@ def linear(plant: Plant) -> Linear:
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
     if plant.free or plant.mixed or g.min() <= 0.0 or np.ptp(g) > EQUALITY_TOLERANCE * g.max():
         raise ScenarioError(
-            f"{plant.name} has no theory here: give a plant with equal joints and an actuator on "
+            f"{plant.name} has no linear theory: give a plant with equal joints and an actuator on "
             "each"
         )
 
@@ -98,7 +98,7 @@ def linear(plant: Plant) -> Linear:
         or np.abs(stiffness - stiffness.T).max() > small
     ):
         raise ScenarioError(
-            f"{plant.name} has no theory here: give a plant whose joints are coupled only by "
+            f"{plant.name} has no linear theory: give a plant whose joints are coupled only by "
             "springs"
         )
     return Linear(
@@ -229,7 +229,9 @@ def restoring_force(
     if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (
         1.0 + abs(ratios[0][0] / ratios[0][1])
     ):
-        raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
+        raise ScenarioError(
+            f"{plant.name} has no linear theory at rest: give a plant with equal joints"
+        )
 
     def force(x: Array) -> Array:
         nominal = [plant.nominal(np.full(plant.n, position), v, 0, p) for position in x]

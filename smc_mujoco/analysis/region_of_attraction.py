@@ -151,7 +151,7 @@ def basin(
     reach = POSITION_REACH[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
         raise ScenarioError(
-            f"{base.plant.name} starts at 0, which tells no reach: give positions x and "
+            f"{base.plant.name} starts at 0, which gives the map no size: give positions x and "
             "velocities v"
         )
     if len(counts := items_of("points", points)) != 2:

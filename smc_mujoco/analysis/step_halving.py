@@ -32,19 +32,15 @@ CHATTERS = 10.0  # 1/s: variation of a command a second over its bound, from whi
 NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
 # at half the step, see `analysis.differ`
 APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"
-SCORE_NOTE = (
-    f"{MARK}: the score changes by more than {APART} at half the physics step, or by more than "
-    f"{100.0 * MAX_CHANGE:g} % at a quarter of it, under RK4, or from a start changed by a "
-    f"relative 1e-9. Brackets hold its smallest or largest value; {RANGE}"
-)
 NOTE = (
-    f"{MARK} half the physics step changes it by more than {APART}, or a nudged start, a quarter "
-    f"of the step or RK4 by {100.0 * MAX_CHANGE:g} %"
+    f"{MARK} marks a value that changes by more than {APART} at half the physics step, or by more "
+    f"than {100.0 * MAX_CHANGE:g} % at a quarter of it, under RK4, or from an initial position "
+    "changed by 1e-9 of its value"
 )
+SCORE_NOTE = f"{NOTE}. The smallest value is shown, with the largest in brackets; {RANGE}"
 UNTRIED = (
-    "with friction, contacts or other parts, and without RK4, half the physics step may change "
-    "numbers by more than "
-    f"{100.0 * MAX_CHANGE:g} %: these runs were not repeated with it"
+    "these runs were not repeated at half the physics step, which may change values by more than "
+    f"{100.0 * MAX_CHANGE:g} % if there are friction, contacts or other parts, or without RK4"
 )
 
 

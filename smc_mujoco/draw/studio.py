@@ -81,9 +81,7 @@ def view(
     from smc_mujoco.draw.studio_panel import Panel
 
     if hasattr(web_server.bind_public_socket, "__self__"):
-        raise ScenarioError(
-            "no view: this process had one already, and Studio crashes in a second: restart Python"
-        )
+        raise ScenarioError("no view: Studio crashes if a process opens it twice: restart Python")
     door = Door(web_server)
     door.bind("", port)
     print(f"{door.address} answers once the laws are compiled, in up to 20 s", flush=True)

@@ -536,8 +536,8 @@ def task_of(
             return task
         task = task._replace(inside=random.uniform(low, high))
     raise ScenarioError(
-        f"no gains of {law.name} in the box of its search hold the conditions of its theorem: "
-        "give other gains that the search holds, or outside_theorem=True"
+        f"no gains of {law.name} in its search range meet the conditions of its theorem: "
+        "change its gains that are held, or give outside_theorem=True"
     )
 
 
@@ -631,7 +631,7 @@ def _warn_of_result(tuned: Tuned) -> None:
     if tuned.definition.excess(first):
         _warn(
             f"all gains {tried} are predicted to chatter with more than "
-            f"{tuned.definition.chattering:g}: give a larger budget, or a larger chattering"
+            f"{tuned.definition.chattering:g}: give a larger budget or a larger limit, chattering="
         )
 
 

@@ -198,7 +198,7 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
     for text in [texts] if isinstance(texts, str) else texts:
         of_text = [name.strip() for name in COMMA.split(text) if name.strip()]
         if not of_text:
-            raise ScenarioError(f"{shown(text)} holds no name: give names, as a,b")
+            raise ScenarioError(f"{shown(text)} holds no name: give names, such as pid,adrc")
         parts += of_text
     return parts
 
@@ -289,7 +289,7 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
             and not os.path.exists(text)
         ):
             raise ScenarioError(
-                f"no file {text!r}: give a file of conditions, or one as worn: "
+                f"no file {text!r}: give a file of conditions, or a condition, such as worn: "
                 "friction=Coulomb(0.05)"
             )
         if os.path.exists(text):
