@@ -382,7 +382,7 @@ def margins(
     for base in bases:
         if not any(base.resolved.x0):
             raise ScenarioError(
-                f"{base.plant.name} starts at 0, and margins compare with the initial error: {START_CURE}"
+                f"{base.plant.name} starts at 0, and margins need an initial error: {START_CURE}"
             )
     resolution = COARSE if quick else FINE
     return margins_of(bases, listed("kinds", kinds), resolution, threads, report, device)
