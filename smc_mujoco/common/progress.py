@@ -95,9 +95,9 @@ class Bar:
 
 
 def told(what: str, seconds: float) -> None:
-    """Tell how long something takes at most, before it starts, if that is long."""
+    """Tell about how long something may take, before it starts, if that is long."""
     if seconds > LINE_PERIOD:
-        print(f"{what} takes at most {length(seconds)}", file=sys.stderr)
+        print(f"{what} takes up to about {length(seconds)}", file=sys.stderr)
 
 
 def length(seconds: float) -> str:

@@ -36,8 +36,8 @@ MEDIANS = (
 )
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "J, which tuning minimises, is time-weighted error plus weighted variation of u. Unseen "
-    "runs were not used in tuning.",
+    "J (": "J, which tuning minimises, is time-weighted relative error plus weighted variation of "
+    "u. Unseen runs were not used in tuning.",
     "shipped": "Shipped gains come with the package.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
@@ -45,15 +45,15 @@ MARKS = {
     "arrived, and the samples are enough to detect a lead.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
-    "detectable lead ": "A detectable lead is the smallest lead over the leader that such a "
-    f"comparison finds with {100 * POWER:g} % power; in the leader's cell, over its closest rival.",
+    "detectable lead ": "A detectable lead is the smallest difference from the leader that such a "
+    f"comparison finds with {100 * POWER:g} % power; for the leader, from its closest rival.",
     "no detectable": "'No detectable lead': there are too few samples to detect any lead.",
     "never": "'never' ranks behind every value.",
     "fails": "'fails' ranks behind every value.",
     "not arrived": "'not arrived' ranks behind every value.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
-    "initial value; late in the run it is at least half an encoder count and the noise. For u, it "
-    f"is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
+    "initial value; late in the run it is at least half an encoder count, and at least the noise. "
+    f"For u and its variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "at half": "'at half the step': the median with half the physics step, if it differs by more "
     f"than {APART}; {RANGE}.",
 }
@@ -517,8 +517,8 @@ def key(boards: Sequence[Board], tables: str) -> str:
             parts.append(text)
     parts.append(
         f"A winner is better than every other law in a paired test{corrected}. Its verdict names "
-        "the rival that this test separates least clearly from it, with the ratio of paired runs, "
-        "which differs from the ratio of the medians. A law is ahead if it is better by more than "
+        "the statistically closest rival, and their ratio in paired runs, which differs from the "
+        "ratio of the medians. A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):

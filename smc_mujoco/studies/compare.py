@@ -110,7 +110,7 @@ class Compared(Tables):
                 if any(words):
                     key = candidate.law.name, "; ".join(filter(None, words))
                     plants_of.setdefault(key, []).append(plant)
-        return [f"{law} on {joined(on)}: {words}" for (law, words), on in plants_of.items()]
+        return [f"{law} on {joined(on)}: {words}." for (law, words), on in plants_of.items()]
 
     @property
     def tables(self) -> list[Tabular]:
@@ -248,12 +248,12 @@ def compare(
     device: Device = "cpu",
 ) -> Compared:
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better
-    and how sure it is.
+    and how certain that is.
 
     A law whose gains you gave keeps them. Any other law has those that come with the package for
     the plant, or is tuned by one rule, yours too: run i has the gains that search i found, so
     twelve searches are twelve answers to "what do I get if I tune it?". The folder keeps each
-    search and each run: after a kill, the same call goes on from there.
+    search and each run: after a kill, the same call resumes there.
 
     Args:
       laws: names, or your own laws. Default: those of the report's first page, of these the ones

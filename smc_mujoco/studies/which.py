@@ -144,7 +144,7 @@ def which(
     device: Device = "cpu",
 ) -> Advice:
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
-    how sure the answer is.
+    how certain the answer is.
 
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".

@@ -258,7 +258,7 @@ def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_the
         **SHORT,
     )
     assert kinds(made) == {"my_law": "default", "classical": "shipped"}
-    assert made.remarks == ["my_law on duffing: default gains"]
+    assert made.remarks == ["my_law on duffing: default gains."]
     assert "classical" not in [board.winner for board in made.leaderboard]
 
 

@@ -136,7 +136,7 @@ def tune(
       threads, progress: as in `run`.
       conditions, starts, chattering: in place of the objective's, see `Objective`.
       searches: their number. They share nothing: `Tuned.sets` has the best gains of each.
-      folder: keeps each search as soon as it ends. After a kill, the same call goes on there.
+      folder: keeps each search as soon as it ends. After a kill, the same call resumes there.
       outside_theorem: whether gains may miss the conditions of the law's theorem.
       device: on which the fast engine runs candidates, "cpu" or "cuda".
 

@@ -80,7 +80,7 @@ def write(work: Work) -> Path:
     quick = " --quick" if work.plan.quick else ""
     return page.write(
         work.folder / "report.html",
-        title="Which controller, where, and how sure?",
+        title="Which controller, where, and how certain?",
         over="Sliding-mode control on MuJoCo mechanisms" + (", a quick look" if quick else ""),
         about=f"{len(compared.table)} runs of {grid.duration:g} s: {len(grid.plants)} plants, "
         f"{len(grid.laws)} laws, {len(grid.conditions)} conditions, {grid.seeds} seeds of each",
