@@ -166,7 +166,7 @@ def _key(
         key.append(pages.entry(label, look["color"], marker=look["marker"], mec="none", **line))
     label = "95 % interval"
     if samples < MIN_INTERVAL_SAMPLES:
-        label += f"; a median's is the range of fewer than {MIN_INTERVAL_SAMPLES} samples"
+        label += f" (the range, with fewer than {MIN_INTERVAL_SAMPLES} samples)"
     return [*key, pages.entry(label, **line)], shared
 
 

@@ -29,7 +29,7 @@ def list_(
     needs: Annotated[
         str | None,
         typer.Option(
-            help="Only laws that have all these, as a,b: no-velocity, no-model, continuous "
+            help="Only laws with these properties, as a,b: no-velocity, no-model, continuous "
             "(u), finite-time (of the error), one-gain, two-gains (at most)."
         ),
     ] = None,

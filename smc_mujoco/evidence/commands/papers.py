@@ -15,11 +15,12 @@ def claims(
     ids: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="ID", help="Of claims, as 3 18; by default all.", show_default=False
+            metavar="ID", help="Claims, such as 3 18; default: all.", show_default=False
         ),
     ] = None,
     gains: Annotated[
-        str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")
+        str | None,
+        typer.Option(help="Sets of gains, separated by commas; default: all of the paper's."),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")

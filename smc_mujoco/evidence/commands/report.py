@@ -23,7 +23,7 @@ def report(
     ] = None,
     law: Annotated[
         list[str] | None,
-        typer.Option(autocompletion=options.LAWS, help="Further laws, as a,b, beside the study's."),
+        typer.Option(autocompletion=options.LAWS, help="Further laws, separated by commas."),
     ] = None,
     threads: options.Threads = None,
 ) -> None:

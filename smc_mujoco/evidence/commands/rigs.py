@@ -38,7 +38,7 @@ def rig(
     sets: Annotated[
         str | None,
         typer.Option(
-            help="Published parameter sets whose twins are shown too, as a,b; default none."
+            help="Published parameter sets to show too, separated by commas; default: none."
         ),
     ] = None,
     start: Annotated[
@@ -60,7 +60,7 @@ def rig(
     quantities: Annotated[
         str | None,
         typer.Option(
-            help="Fit: quantities to find, as a,b; default those that the rig's records determine."
+            help="Fit: quantities to find, as M,b; default: those that the records determine."
         ),
     ] = None,
     given: Annotated[
