@@ -6,7 +6,6 @@ with the model or without. Memory belongs to a channel and a run, and a law is o
 measures.
 """
 
-import dataclasses
 import functools
 import itertools
 import math
@@ -18,7 +17,6 @@ import pytest
 from helpers.plants_ab import called, measured
 
 import smc_mujoco as smc
-from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
@@ -102,9 +100,7 @@ def test_none_leaves_each_plant_where_its_equation_takes_it():
 @LAWS
 def test_a_law_is_odd_in_what_it_measures_and_commands_nothing_where_there_is_no_error(name):
     law = smc.law(name)
-    # numba would compile the helpers of mpc for seconds
-    plain = rebuild(law.function, lambda helper: helper)
-    law, memory = dataclasses.replace(law, function=plain), np.zeros(law.memory)
+    memory = np.zeros(law.memory)
     for _ in range(3):
         assert called(law, measured(limit=6.0), memory) == (0.0, 0.0)
     for model in (0.0, 1.0):

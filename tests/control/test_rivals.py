@@ -12,7 +12,6 @@ from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 
 import smc_mujoco as smc
 from smc_mujoco.control.laws import loop_shaping, lqi, mpc
-from smc_mujoco.simulation import python_functions
 
 pytestmark = pytest.mark.quick
 
@@ -41,21 +40,7 @@ def call(law, memory, **fields):
 def answer(law, memory, omega, h, samples=80_000):
     """The complex factor from e = cos(omega t) to the law's u, once it has settled."""
     t = h * np.arange(samples)
-    gains = python_functions.gains_of(law)
-    u = np.array(
-        [
-            law.function(
-                measured(
-                    e=math.cos(omega * one),
-                    de=0.0,
-                    dt=h,
-                ),
-                gains,
-                memory,
-            )[0]
-            for one in t
-        ]
-    )
+    u = np.array([called(law, measured(e=math.cos(omega * one), dt=h), memory)[0] for one in t])
     last = t > t[-1] - 4.0 * math.pi / omega
     basis = np.stack(
         [np.cos(omega * t[last]), -np.sin(omega * t[last]), np.ones(last.sum())], axis=1

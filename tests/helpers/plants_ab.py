@@ -12,6 +12,7 @@ A law of degree 1 sees plant A's s as what a surface gives, with eq = 0; a law o
 no use for it. On plant B laws see e = x1, de = x2, on plant C also a = x3. The reference is 0.
 """
 
+import ctypes
 import dataclasses
 import math
 from collections.abc import Callable
@@ -23,7 +24,7 @@ from scipy.linalg import expm
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.law import Law, Measurement
-from smc_mujoco.simulation import cfunctions, python_functions
+from smc_mujoco.simulation import cfunctions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +58,8 @@ T, X, V, E, DE, A, HAS_SURFACE, S = map(
     Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s")
 )
 
+C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 4)
+
 rest = constant(0.0)
 wave = sine(1.0) + constant(0.5)  # |d| <= 1.5, |d'| <= 1
 
@@ -88,9 +91,12 @@ def on_surface(s, dt=1e-3, eq=0.0, **y):
 
 
 def called(law: Law, y: Measurement, memory: np.ndarray):
-    """u and s of a law that keeps its memory."""
-    assert law.function is not None
-    return law.function(y, python_functions.gains_of(law), memory)
+    """u and s of a law that keeps its memory, compiled, as the callback calls it."""
+    out = np.zeros(2)
+    arrays = np.array(y), np.array([*law.gains.values(), 0.0]), memory, out
+    function = C_FUNCTION(cfunctions.compile_component(law).address)
+    assert not function(*(array.ctypes.data for array in arrays))
+    return tuple(out)
 
 
 def one(law: Law, **y):
