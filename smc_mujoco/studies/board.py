@@ -31,8 +31,8 @@ FEW = (
     f"below {100 * LEVEL:g} %."
 )
 MEDIANS = (
-    f"A cell has a median and its {100 * LEVEL:g} % interval. Runs that share one of several sets "
-    "of gains count as one sample."
+    f"A cell has a median and its {100 * LEVEL:g} % interval. If a law has several sets of gains, "
+    "runs that share one count as one sample."
 )
 # A word in tables -> what their key says about it.
 MARKS = {
@@ -507,8 +507,6 @@ def _few(boards: Sequence[Board]) -> bool:
 
 def key(boards: Sequence[Board], tables: str) -> str:
     """Return what the cells of these tables show."""
-    family = max(board.family for board in boards)
-    corrected = f", corrected for {family} comparisons per metric" if family > 1 else ""
     parts = [MEDIANS]
     if _few(boards):
         parts.append(FEW)
@@ -516,10 +514,10 @@ def key(boards: Sequence[Board], tables: str) -> str:
         if word in tables:
             parts.append(text)
     parts.append(
-        f"A winner is better than every other law in a paired test{corrected}. Its verdict names "
-        "the statistically closest rival, and their ratio in paired runs, which differs from the "
-        "ratio of the medians. A law is ahead if it is better by more than "
-        f"{100 * boards[0].relevant:g} % of the larger value."
+        "A winner is better than every other law in a paired test, corrected for multiple "
+        "comparisons. Its verdict has its ratio to the statistically closest rival in paired runs, "
+        "with an interval. That ratio differs from the ratio of the medians. A law is ahead if it "
+        f"is better by more than {100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")
