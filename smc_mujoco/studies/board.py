@@ -516,8 +516,8 @@ def key(boards: Sequence[Board], tables: str) -> str:
     parts.append(
         "A winner is better than every other law in a paired test, corrected for multiple "
         "comparisons. A verdict gives the winner's ratio to the statistically closest rival in "
-        "paired runs, with an interval. That ratio differs from the ratio of the medians. A law is ahead if it "
-        f"is better by more than {100 * boards[0].relevant:g} % of the larger value."
+        "paired runs, with an interval. That ratio differs from the ratio of the medians. A law is "
+        f"ahead if it is better by more than {100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")
