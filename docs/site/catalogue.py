@@ -139,7 +139,7 @@ def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Pag
     return Page(
         f"laws/{name}",
         style.law_name(name),
-        _front(parts.formula) + "\n\n".join(filter(None, text)) + "\n",
+        _front(name, parts.formula) + "\n\n".join(filter(None, text)) + "\n",
     )
 
 
@@ -155,10 +155,12 @@ def _symbols(formula: str) -> str:
     )
 
 
-def _front(description: str) -> str:
-    if "'" not in description:
-        return f"---\ndescription: {description!r}\n---\n\n"
-    return ""
+def _front(name: str, description: str) -> str:
+    """Return what the head of a law's page tells search engines, and its short name for the site's
+    search.
+    """
+    words = f"description: {description!r}\n" * ("'" not in description)
+    return f"---\ntags: [{style.law_name(name)!r}]\n{words}---\n\n"
 
 
 def _link_up(plant: str) -> str:
@@ -393,7 +395,9 @@ def _listing(title: str, intro: str, templates: Mapping[str, Template]) -> str:
             formula = parsed.formula
         else:
             formula = _display(parsed.formula, template.gains)
-        parts += [f"## {parsed.title or style.in_words(name)}", f"`{name}`", formula]
+        title = parsed.title or style.in_words(name)
+        short = re.split(" of |, | \\(", title)[0]
+        parts += [f"## {short}", f"`{name}`" + f": {title}" * (title != short), formula]
         parts += [_gain_table(template).removeprefix("## Gains\n\n").partition("\n\n")[0]]
         parts += [
             body(template).replace("](../", "]("),

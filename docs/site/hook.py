@@ -25,9 +25,9 @@ import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
 PAGES: list[catalogue.Page] = []  # of this build
-# in search, where 1.0 is usual: definitions come first, one law's page last
-BOOST = {"words.md": 40.0, "recipes.md": 2.0, "mathematics.md": 2.0, "run_study.md": 1.5}
-BOOST |= dict.fromkeys(known.reference(), 0.2)
+# in search, where 1.0 is usual: definitions come first
+BOOST = {"words.md": 5.0, "recipes.md": 2.0, "mathematics.md": 2.0, "run_study.md": 1.5}
+BOOST |= {"api.md": 0.3, "index.md": 0.5, "papers.md": 0.5} | dict.fromkeys(known.reference(), 0.2)
 
 
 def on_config(config):
@@ -55,7 +55,8 @@ def on_files(files, config):
     files.append(File.generated(config, HEADER, abs_src_path=str(ROOT / HEADER)))
     for page in PAGES:
         files.append(File.generated(config, f"{page.path}.md", content=page.text))
-        BOOST[f"{page.path}.md"] = 0.3 if "/" in page.path else 1.0
+        # a law before its variants, whose names are longer
+        BOOST[f"{page.path}.md"] = 1.0 / len(re.split("[ -]", page.title))
     for path, content in (notebooks.pages() | known.reference()).items():
         files.append(File.generated(config, path, content=content))
         BOOST.setdefault(path, 0.3)

@@ -1,12 +1,28 @@
-/* The theme's search reads each word of a question as the beginning of a word, so that "a" and "do" find every page:
-it gets the question without the words that say nothing. */
+/* The theme's search takes each word of a question as the beginning of a word. It gets the words that say something,
+without their endings, so that "installation" finds "install"; words of one or two letters, such as J and PI, are whole. */
 "use strict";
 {
-  const EMPTY = /\b(?:add|an?|and|another|any|are|between|can|could|do|does|for|from|get|has|have|how|i|in|is|it|its|make|my|need|no|of|on|one|or|run|runs|say|says|several|that|the|there|this|to|two|use|using|want|was|what|when|where|which|who|why|will|with|you|your)\b\s*/gi;
+  const EMPTY = new Set(
+    ("a about add all an and another any are as at be between by can could do does each every for from get give has have how " +
+    "i if in into is it its make many mean means me mode modes much my need no not of on one or our own please run say says " +
+    "several should show simulate simulation simulations so some that the their them there these this to too two up use used " +
+    "using want was way we what when where which who why will with work works would you your").split(" "));
+  const ENDINGS = [
+    [/(?<=[a-z]{2}[^us])s$/, ""],
+    [/(?<=[a-z]{4})(?:i[sz]e[drs]?|i[sz]ing|i[sz]ation|ation|ity|ness)$/, ""],
+    [/(?<=[a-z]{2}ct)ion$/, ""],
+    [/(?<=[aeiouy][a-z]+)(?:ing|(?<!e)ed)$/, ""],
+    [/([bdgmnprt])\1$/, "$1"],
+  ];
+  const stem = (word) => ENDINGS.reduce((left, [ending, rest]) => left.replace(ending, rest), word);
+  const asked = (question) => {
+    const words = question.toLowerCase().match(/[\p{L}\d]+/gu) ?? [];
+    const telling = words.filter((word) => !EMPTY.has(word));
+    return (telling.length ? telling : words).map((word) => (word.length < 3 ? word + "^1" : stem(word))).join(" ");
+  };
   const post = Worker.prototype.postMessage;
   Worker.prototype.postMessage = function (message, ...rest) {
-    if (typeof message?.data === "string")
-      message = { ...message, data: message.data.replace(EMPTY, "") || message.data };
+    if (typeof message?.data === "string") message = { ...message, data: asked(message.data) };
     return post.call(this, message, ...rest);
   };
 }

@@ -7,13 +7,12 @@ skipped, but not in CI.
 
 import dataclasses
 import html.parser
-import os
 import re
-import shutil
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from helpers.browser import browser
 from helpers.commands import python
 
 import smc_mujoco as smc
@@ -41,8 +40,6 @@ TINY = dataclasses.replace(
     scenes=("duffing",),
     scene=0.1,
 )
-BROWSERS = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome")
-SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
 
 @pytest.fixture(scope="module")
@@ -196,14 +193,8 @@ def test_the_command_is_light_to_import():
 @pytest.fixture(scope="module")
 def seen(made):
     """The page in a browser, and all errors and requests."""
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        hint = "no Chromium to open the report in: apt-get install chromium"
-        pytest.fail(hint) if os.environ.get("CI") else pytest.skip(hint)
-    sync = pytest.importorskip("playwright.sync_api")
-    with sync.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=path, args=SWITCHES)
-        tab = browser.new_page(viewport={"width": 420, "height": 900})
+    with browser() as chromium:
+        tab = chromium.new_page(viewport={"width": 420, "height": 900})
         errors = []
         asked = []
         tab.on("console", lambda message: errors.append(message.text))
@@ -211,7 +202,6 @@ def seen(made):
         tab.on("request", lambda request: asked.append(request.url))
         tab.goto(made.as_uri())
         yield SimpleNamespace(page=tab, errors=errors, asked=asked)
-        browser.close()
 
 
 def test_the_page_has_no_error_asks_for_nothing_and_fits_a_phone(seen, made):
