@@ -2,6 +2,7 @@
 
     smc.law("gains.json")        # what `smc-mujoco tune --out gains.json` wrote
     smc.law("my_law.py", lam=5)  # a law made by @smc.law_function
+    smc.law("my_law.py(gains.json)")  # the same, after it was tuned
     smc.law("slow: classical(k=2, c=3)")
 
 Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a
@@ -10,6 +11,7 @@ wrote is restored by serialise.py, which runs no files.
 """
 
 import ast
+import dataclasses
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -29,6 +31,9 @@ NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DO
 # slow: pid(kp=50)
 LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)
 
+# my_law.py(gains.json)
+FILE_AND_TUNING = re.compile(r"(?P<file>[^()]+\.\w+)\s*\((?P<tuning>[^()=]+\.json)\)")
+
 UNREADABLE = SyntaxError, ValueError, RecursionError, MemoryError
 
 
@@ -40,7 +45,8 @@ def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
     Args:
       text: the name of a law of the library, such as "pid"; a name with gains, such as
         "pid(kp=50,ki=50,kd=8)"; or a file with one law: FILE.json that `smc-mujoco tune` wrote,
-        FILE.py, FILE.c or FILE.fmu. Or your own law itself.
+        FILE.py, FILE.c or FILE.fmu, also with its tuning, as "FILE.py(FILE.json)". Or your own law
+        itself.
       gains: one number for all channels, or a sequence with one for each driven channel.
 
     Raises:
@@ -71,6 +77,9 @@ def laws(text: object) -> list[str | Law]:
         gains = {}
     elif labelled := LABELLED.fullmatch(text):
         return [law(labelled["rest"]).named(labelled["label"].strip())]
+    elif tuned := FILE_AND_TUNING.fullmatch(text):
+        found = _tuned(tuned["tuning"])
+        return [dataclasses.replace(law(tuned["file"], **found.gains), source=found.source)]
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     if read := _reader(head):
@@ -149,19 +158,21 @@ def _of_python(path: str) -> list[Law]:
 
 
 def _of_tuning(path: str) -> list[Law]:
+    law = _tuned(path)
+    if law.function is None:
+        raise ScenarioError(
+            f"law {law.name} of {path} is your own: give its file with it, as FILE.py({path})"
+        )
+    return [law]
+
+
+def _tuned(path: str) -> Law:
     """Return the law of a tuning, with its search as the source of the gains."""
     with reading(
         path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote"
     ) as file:
         scenario = read_json(file)["scenario"]
-        law = serialise.law(scenario["law"], scenario["source"])
-    if law.function is None:
-        gains = ", ".join(f"{name}={value!r}" for name, value in law.gains.items())
-        raise ScenarioError(
-            f"law {law.name} of {path} is your own: "
-            f"give its file with its gains, as FILE.py({gains})"
-        )
-    return [law]
+        return serialise.law(scenario["law"], scenario["source"])
 
 
 def _of_c(path: str) -> list[Law]:

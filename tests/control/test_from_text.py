@@ -28,6 +28,9 @@ usual = smc.law("pid")
 law = its = smc.law_from(other, name="theirs")
 """
 
+TUNED = """{"scenario": {"source": null, "law": {
+  "name": "mine", "module": "mine", "gains": {"k": 7.0, "c": 1.5}, "memory": 0, "degree": 1}}}"""
+
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
@@ -38,6 +41,7 @@ def files(tmp_path, monkeypatch):
     (tmp_path / "bound.py").write_text(MINE + "law = mine(k=3.0)\n")
     (tmp_path / "two.py").write_text(MINE + MINE.replace("mine", "other"))
     (tmp_path / "notes.txt").write_text("pid")
+    (tmp_path / "mine.json").write_text(TUNED)
     (tmp_path / "empty.json").write_text("{}")
     return tmp_path
 
@@ -64,6 +68,7 @@ def tuned():
         ("theirs.py", "theirs", {}),
         ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}),
         ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
+        ("mine.py(mine.json)", "mine", {"k": 7.0}),
     ],
 )
 def test_a_text_is_its_law(files, text, name, gains):
@@ -130,7 +135,7 @@ TEXTS = (
     "twisting(r1=nan)",
     "none.py",
 )
-TEXTS += ("two.py", "notes.txt", "empty.json", "bare.py", ".", "\0", 3)
+TEXTS += ("two.py", "mine.json", "notes.txt", "empty.json", "bare.py", ".", "\0", 3)
 GAINS = ("lam", "lam=", "3=4", "lam=x", "a=1,a=2")
 
 

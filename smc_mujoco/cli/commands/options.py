@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 GAINS_HELP = (
-    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, or gains.json of "
-    "`smc-mujoco tune --out`."
+    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, gains.json of "
+    "`smc-mujoco tune --out`, or my_law.py(gains.json)."
 )
 
 
