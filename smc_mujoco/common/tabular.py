@@ -24,6 +24,7 @@ PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH = 20  # characters of a name before it is broken
 HEADING_WIDTH = 8  # characters of a heading at least
 NARROW_WIDTH = 12  # characters of a line below a number where space is short
+COLUMNS_OF_TEX = 3  # of a table that fits a column of text
 MAX_HTML_ROWS = 40
 NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH_HINT = (
@@ -194,9 +195,10 @@ class Tabular:
         Words in cells of numbers become letters, which a line under the table explains.
         """
         marks: dict[str, str] = {}
-        lines = [
-            f"% {text}" for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT) if text
-        ]
+        about = [self.title, *self.notes, "needs booktabs"]
+        if len(self.headings) > COLUMNS_OF_TEX:
+            about.append(WIDTH_HINT)
+        lines = [f"% {text}" for text in about if text]
         lines += [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",
@@ -206,8 +208,8 @@ class Tabular:
             names = map(_tex_cell, row[: self.left])
             lines.append(_tex_line([*names, *(_tex_cell(c, marks) for c in row[self.left :])]))
         lines.append("\\bottomrule")
-        meanings = "; ".join(f"{mark}: {words}" for words, mark in marks.items())
-        for text in (*textwrap.wrap(meanings, PLAIN_WIDTH), *self.under):
+        meanings = (f"{mark}: {words}".replace(" ", NO_BREAK) for words, mark in marks.items())
+        for text in (*_wrapped("; ".join(meanings), PLAIN_WIDTH).splitlines(), *self.under):
             wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
             lines.append(_tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"]))
         return "\n".join([*lines, "\\end{tabular}\n"])

@@ -60,10 +60,11 @@ MARKS = {
 
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
-    "": f"Median [{100 * LEVEL:g} % interval]; bold: no other law is better.",
+    "": f"Median [{100 * LEVEL:g} % interval].",
+    "strong=True": "Bold: no other law is better, all runs have arrived, a lead would be detected.",
     "detectable lead ": f"Detectable lead: the smallest found with {100 * POWER:g} % power.",
     "no detectable": "No detectable lead: too few samples to detect any lead.",
-    "below": "Below 0.01 rad: too small to be resolved; such laws are not ranked.",
+    "below ": "Below a floor: too small to be resolved; such laws are not ranked.",
     "at half": "At half the step: the median with half the physics step.",
 }
 
@@ -447,7 +448,7 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
     samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
-    words = str([*map(tuple, itertools.chain(*cells.values()))])
+    words = str([*itertools.chain(*cells.values())])
     under = [text for word, text in UNDER.items() if word in words]
     if _few(boards):
         under.insert(1, FEW)

@@ -116,7 +116,7 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
     assert re.search(r"detectable lead [\d.]+ %", table.rows[0][1].below)
     below = table.to_latex().partition("bottomrule")[2]
     assert "Detectable lead: the" in below
-    assert below.count("multicolumn") == 3
+    assert below.count("multicolumn") == 4
     assert table.rows[2][2][:2] == ("100", "84–100")
 
 
