@@ -91,7 +91,7 @@ class WorstCase(Tables):
             sets = [f"any of {self.sets} parameter sets"]
         else:
             sets = []
-        return ", ".join([*sets, self.within.words()])
+        return ", ".join([*sets, self.within.words(self.nominal.plant)])
 
     def shown(self, value: float) -> str:
         """Return a value of the metric as text: "fails" or "not arrived" where there is none."""

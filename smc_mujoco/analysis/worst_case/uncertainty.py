@@ -131,8 +131,13 @@ class Uncertainty:
                 "disturbance=2.0"
             )
 
-    def words(self) -> str:
-        """Return the bounds that were given as text, such as "disturbance 2, mass 0.7 to 1.3"."""
+    def words(self, plant: Plant) -> str:
+        """Return the bounds that were given as text, such as "disturbance 2 N, mass 0.7 to 1.3"."""
+        x = plant.units[0]
+        force = EFFORT[x]
+        units = {"disturbance": force, "slope": f"{force}/s", "friction": force}
+        units |= {"position_noise": x, "velocity_noise": f"{x}/s", "encoder": "counts"}
+        units |= dict.fromkeys(("hold", "delay", "jitter"), "s")
         given = {}
         for field in dataclasses.fields(self):
             if getattr(self, field.name) != field.default:
@@ -141,7 +146,8 @@ class Uncertainty:
         parts = []
         for name, bound in given.items():
             ends = bound if isinstance(bound, tuple) else (bound,)
-            parts.append(f"{name.replace('_', ' ')} {' to '.join(f'{end:g}' for end in ends)}")
+            words = f"{name.replace('_', ' ')} {' to '.join(f'{end:g}' for end in ends)}"
+            parts.append(f"{words} {units.get(name, '')}".strip())
         return ", ".join(parts)
 
 

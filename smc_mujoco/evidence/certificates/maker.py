@@ -27,6 +27,7 @@ from smc_mujoco.common.extras import extra
 from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, bounds_of
 
@@ -75,7 +76,7 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     law = scenario.law
     d0 = _bound(scenario)
     if within is not None:
-        d0 += _class(within)
+        d0 += _class(within, plant)
     values = vars(plant.values(scenario.mismatch))
     document: Fields = {
         "format": checker.FORMAT,
@@ -145,7 +146,7 @@ def _bound(scenario: Scenario) -> float:
     return total
 
 
-def _class(within: Uncertainty) -> float:
+def _class(within: Uncertainty, plant: Plant) -> float:
     """Return the bound of |d| of a class."""
     if not isinstance(within, Uncertainty):
         raise ScenarioError(
@@ -153,7 +154,7 @@ def _class(within: Uncertainty) -> float:
         )
     if dataclasses.replace(within, disturbance=1.0) != Uncertainty(disturbance=1.0):
         raise ScenarioError(
-            f"within has {within.words()}, and a certificate knows a bound of d alone: give "
+            f"within has {within.words(plant)}, and a certificate knows a bound of d alone: give "
             "smc.Uncertainty(disturbance=...)"
         )
     return within.disturbance
