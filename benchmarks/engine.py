@@ -18,6 +18,7 @@ import numpy as np
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES
 from smc_mujoco.analysis.engine.group import Group
+from smc_mujoco.draw import region
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.simulation.run import cores
 
@@ -111,26 +112,12 @@ def on_device(fields: dict, wanted: int) -> str:
 
 def picture(path: str, device: str, side: int = 1000) -> None:
     """Draw from where a weak law brings the pendulum upright, a start a pixel."""
-    from matplotlib import pyplot as plt
-
     law = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold it anywhere
     began = time.perf_counter()
     found = smc.design.basin("inverted_pendulum", law, points=(side, side), device=device)
     seconds = time.perf_counter() - began
-    figure, axes = plt.subplots(figsize=(6.0, 6.0), layout="constrained")
-    ends = (found.x[0], found.x[-1], found.v[0], found.v[-1])
-    axes.imshow(
-        np.where(found.outcome == 1, found.decided_at, np.nan),
-        origin="lower",
-        extent=ends,
-        aspect="auto",
-        cmap="cividis",
-    )
-    axes.set(xlabel="x(0), rad", ylabel="v(0), rad/s")
+    region.draw([found], path)
     share = 100.0 * found.share
-    told = f"{share:.2f} % of {side**2:,} starts come upright: dark within 1.5 s, grey 4, yellow 10"
-    axes.set_title(f"{told}\n{found.checked}", fontsize=9)
-    figure.savefig(path, dpi=200)
     print(f"{path}: {share:.3f} % of {side**2:,} starts in {seconds:.1f} s; {found.checked}")
 
 
