@@ -20,6 +20,7 @@ import numpy as np
 
 from smc_mujoco.analysis.differ import MAX_CHANGE, relative_range
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.text import number
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.limit_cycle import channel_cycle, largest_cycle
 from smc_mujoco.simulation.run import run
@@ -35,7 +36,7 @@ APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"
 NOTE = (
     f"{MARK} marks a value that changes by more than {APART} at half the physics step, or by more "
     f"than {100.0 * MAX_CHANGE:g} % at a quarter of it, under RK4, or from an initial position "
-    "changed by 1e-9 of its value"
+    f"changed by {number(NUDGE)} of its value"
 )
 SCORE_NOTE = f"{NOTE}. The smallest value is shown, with the largest in brackets; {RANGE}"
 UNTRIED = (

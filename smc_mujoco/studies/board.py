@@ -48,15 +48,13 @@ MARKS = {
     "detectable lead ": "A detectable lead is the smallest difference from the leader that such a "
     f"comparison finds with {100 * POWER:g} % power; for the leader, from its closest rival.",
     "no detectable": "'No detectable lead': there are too few samples to detect any lead.",
-    "never": "'never' ranks behind every value.",
-    "fails": "'fails' ranks behind every value.",
-    "not arrived": "'not arrived' ranks behind every value.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
     "initial value; late in the run it is at least half an encoder count, and at least the noise. "
     f"For u and its variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "at half": "'at half the step': the median with half the physics step, if it differs by more "
     f"than {APART}; {RANGE}.",
 }
+LAST = "never", "fails", "not arrived"  # words in place of a value
 
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
@@ -514,6 +512,8 @@ def key(boards: Sequence[Board], tables: str) -> str:
     for word, text in MARKS.items():
         if word in tables:
             parts.append(text)
+    if last := joined([repr(word) for word in LAST if word in tables]):
+        parts.append(f"Every value ranks before {last}.")
     parts.append(
         "A winner is better than every other law in a paired test, corrected for multiple "
         "comparisons. A verdict gives the winner's ratio to the statistically closest rival in "
