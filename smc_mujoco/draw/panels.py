@@ -82,6 +82,8 @@ UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over ti
 # of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
 UNDIVERGED_SHARE = 0.8
 MARGIN = 0.08  # of a panel's height, above and below its curves
+# of the largest value: a quantity that varies less is drawn as a constant, without its round-off
+MIN_VARIATION = 1e-3
 DASHES = (0, (4, 4))  # of a reference's line
 REFERENCE = "reference"  # id of a reference's lines
 
@@ -803,5 +805,8 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
     if name in PEAKS:
         high = max(high, MIN_RATIO * MIN_ERROR)
         return min(max(low, MIN_ERROR), high / MIN_RATIO) / 1.5, high * 1.5
-    air = MARGIN * (high - low) or 1.0
+    size = max(abs(low), abs(high))
+    air = MARGIN * (high - low)
+    if high - low <= MIN_VARIATION * size:
+        air = size / 2 or 1.0
     return low - air, high + air
