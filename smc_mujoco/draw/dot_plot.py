@@ -23,6 +23,7 @@ from smc_mujoco.analysis.paired_runs import (
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
+from smc_mujoco.common.text import number
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -52,8 +53,9 @@ def plot(
 
     Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that
     share one of several sets of gains are one sample. There is a column of panels per metric and a
-    row per plant. A hollow dot at the right edge, under "never" or "not arrived", is a law whose
-    median run fails, does not settle, or has not arrived. Sizes below 1e-9 are arrows at it.
+    row per plant; on narrow pages one column. A hollow dot at the right edge, under "never" or "not
+    arrived", is a law whose median run fails, does not settle, or has not arrived. Sizes below 1e-9
+    are arrows at it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -100,25 +102,25 @@ def plot(
         units[plant] = unit_of_x(plant, runs := scenarios(table, group))
         labels[plant] = next((one.plant for one in runs if one), plant)
     with style.page(width):
-        least = min(interval.n for interval in intervals.values())
-        key, shared = _key(table, looks, least)
-        if won := intervals.keys() & set(winners):
-            key.append(pages.entry("winner", style.INK, lw=0.0, **RING))
+        won = intervals.keys() & set(winners)
+        key, shared = _key(table, looks, list(intervals.values()), bool(won))
         rows = (len(laws) + 1) * np.array(list(map(len, conditions_of.values())))
         tall = 0.5 + LINE_HEIGHT * rows
         space = pages.head_height(width, key) + style.points(0.6)
-        page = pages.blank(width, height or space + style.points(tall.sum()), fig)
-        axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall.tolist())
-        room = 72 * width / len(names) - style.points(50)  # beside the numbers of the axis
+        across = 1 if width < pages.NARROW else len(names)
+        heights = np.repeat(tall, len(names) // across)
+        page = pages.blank(width, height or space + style.points(heights.sum()), fig)
+        axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
+        room = 72 * width / across - style.points(50)  # beside the numbers of the axis
         text = style.points(pages.TEXT_SIZE)
-        for plant, high, of_plant in zip(plants, tall, axes, strict=True):
+        for plant, high, of_plant in zip(plants, tall, axes.reshape(len(plants), -1), strict=True):
             for ax, name in zip(of_plant, names, strict=True):
                 here = name, plant
                 of_panel = {cell[2:]: its for cell, its in intervals.items() if cell[:2] == here}
                 rings = [cell[2:] for cell in won if cell[:2] == here]
                 _panel(ax, of_panel, conditions_of[plant], looks, name, rings)
                 ax.set_xlabel(_label(name, units[plant]))
-                ax.tick_params(labelleft=ax is of_plant[0])
+                ax.tick_params(labelleft=across == 1 or ax is of_plant[0])
             words = style.plant_name(labels[plant]) if title or len(plants) > 1 else ""
             place = None
             if style.width(f"{words}  not arrived", text, bold=True) >= room:
@@ -152,10 +154,13 @@ def _intervals(table: Columns, metrics: Sequence[str]) -> dict[Cell, Interval]:
 
 
 def _key(
-    table: Columns, looks: Mapping[str, Mapping[str, str]], samples: int
+    table: Columns,
+    looks: Mapping[str, Mapping[str, str]],
+    intervals: Sequence[Interval],
+    ringed: bool,
 ) -> tuple[list[Handle], str]:
-    """Return the entries of the legend, law by law, and where all gains come from if that is the
-    same.
+    """Return the entries of the legend, law by law and mark by mark, and where all gains come from
+    if that is the same.
     """
     known = sources(table, np.arange(len(table.column("law"))))
     key: list[Handle] = []
@@ -165,9 +170,14 @@ def _key(
         label = style.law_name(law) + source
         key.append(pages.entry(label, look["color"], marker=look["marker"], mec="none", **line))
     label = "95 % interval"
-    if samples < MIN_INTERVAL_SAMPLES:
+    if min(interval.n for interval in intervals) < MIN_INTERVAL_SAMPLES:
         label += f" (the range, with fewer than {MIN_INTERVAL_SAMPLES} samples)"
-    return [*key, pages.entry(label, **line)], shared
+    key.append(pages.entry(label, **line))
+    if ringed:
+        key.append(pages.entry("winner", style.INK, lw=0.0, **RING))
+    if any(interval.median == MIN_SIZE for interval in intervals):
+        key.append(pages.entry(number(MIN_SIZE / 2), lw=0.0, marker="<"))
+    return key, shared
 
 
 def _panel(
@@ -202,8 +212,11 @@ def _panel(
         drawing.note(ax, "never" if late else "not arrived")
     for j in range(1, len(conditions)):
         ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
-    middles = height * (np.arange(len(conditions)) + 0.5) - 1
-    ax.set_yticks(middles, np.char.replace(conditions, "_", " "))
+    if len(conditions) == 1:
+        ax.set_yticks(range(len(looks)), map(style.law_name, looks))
+    else:
+        middles = height * (np.arange(len(conditions)) + 0.5) - 1
+        ax.set_yticks(middles, np.char.replace(conditions, "_", " "))
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)

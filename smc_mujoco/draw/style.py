@@ -55,7 +55,7 @@ MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
 PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}
 # where a word begins in DCMotor, but not in LuGre
 CAMEL = re.compile(r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])")
-MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve they begin again
+MARKS = "osD^vPXh>*dp"  # of laws, for readers who see no colours; after twelve they begin again
 # of the runs in a picture, in widths of a line, for the same readers; chosen
 DASHES = [
     "-",

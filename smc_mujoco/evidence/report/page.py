@@ -16,8 +16,10 @@ from smc_mujoco.common.files import replacing, scratch
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.common.version import __version__
+from smc_mujoco.draw.page import Size
 from smc_mujoco.evidence.audit.verdict import MARKS, Claim, summary
 
+PHONE = "ieee-column"  # size of a picture
 TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -69,14 +71,21 @@ def folded(words: str, parts: Iterable[Markup]) -> Markup:
     return Markup("<details><summary>{}</summary>{}</details>").format(words, shown)
 
 
-def picture(draw: Callable[[Path], object], about: str) -> Markup:
-    """Return the SVG file that a function draws, with its meaning in words."""
+def picture(draw: Callable[[Path, Size], object], about: str) -> Markup:
+    """Return what a function draws as SVG, of a page's width and of a phone's, with its meaning in
+    words.
+    """
+    sources = []
     with scratch() as folder:
         path = folder / "picture.svg"
-        draw(path)
-        source = uri("image/svg+xml", path.read_bytes())
-    figure = '<figure><img src="{}" alt="{}"><figcaption>{}</figcaption></figure>'
-    return Markup(figure).format(source, about, about)
+        for size in (PHONE, None):
+            draw(path, size)
+            sources.append(uri("image/svg+xml", path.read_bytes()))
+    figure = (
+        '<figure><picture><source media="(max-width: 600px)" srcset="{}"><img src="{}" alt="{}">'
+        "</picture><figcaption>{}</figcaption></figure>"
+    )
+    return Markup(figure).format(*sources, about, about)
 
 
 def film(content: bytes, about: str) -> Markup:

@@ -105,7 +105,7 @@ def overview(compared: Compared, judged: Sequence[Claim]) -> Section:
         text(UNBEATEN),
         *tables([leaders(compared.leaderboard)]),
         text(f"The paper, in claims: {summary(judged)}.", "strong"),
-        picture(lambda path: path.write_bytes(fronts), FRONTS),
+        picture(lambda path, size: path.write_bytes(fronts), FRONTS),
     ]
     return Section("overview", "The answer", parts)
 
@@ -163,7 +163,7 @@ def _leading(outcomes: Sequence[Outcome]) -> Cell:
 def _few(laws: Sequence[str]) -> str:
     """Return the names of laws, or of more than three their number: none of these stands out."""
     if len(laws) > 3:
-        return f"{len(laws)} laws"
+        return f"any of {len(laws)} laws"
     return ", ".join(laws)
 
 
@@ -191,11 +191,12 @@ def comparison(compared: Compared) -> Section:
         )
     first = conditions[0]
     medians = picture(
-        lambda path: dot_plot.plot(
+        lambda path, size: dot_plot.plot(
             compared.table.select(condition=first),
             path,
             METRICS,
             f"Medians, {first}",
+            size,
             winners=compared.leaderboard.winners,
         ),
         f"The median of each law in condition {first}, with its 95 % interval. A ring: it wins.",
@@ -278,7 +279,9 @@ def scenes(work: Work) -> list[Markup]:
             parts.append(page.film(content, f"{plant}, nominal, from the left: {names}."))
         parts.append(
             picture(
-                lambda path, traces=traces: figure.figure(traces, path, panels=("x", "u")),
+                lambda path, size, traces=traces: figure.figure(
+                    traces, path, panels=("x", "u"), size=size
+                ),
                 f"{plant}, nominal: x and u of {names}.",
             )
         )

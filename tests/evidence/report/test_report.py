@@ -142,7 +142,7 @@ def leading(*cells) -> Any:
         ),
         (
             [block(itae="a b c d e", settles="a b c d e")],
-            Cell("5 laws", "unbeaten in 1 of 1"),
+            Cell("any of 5 laws", "unbeaten in 1 of 1"),
         ),
         ([block(itae="a b", settles="b c")], Cell("b", "unbeaten in 1 of 1")),
         ([block(itae="")], Cell("no law")),
