@@ -380,7 +380,8 @@ def _draw_beside(
             letter = "control u"
             if plant.driven > 1 or plant.direct:
                 letter = f"{channel_names(plant)[0]} u"
-            ax.set(xlabel="time before the end (ms)", ylabel=letter + panel.scale[1])
+            label = style.folded(letter + panel.scale[1])
+            ax.set(xlabel="time before the end (ms)", ylabel=label)
         elif name == "phase":
             drawing.phase(ax, next(portraits), runs.colours)
         else:

@@ -54,7 +54,7 @@ TITLE_PAD = 5.0  # points on a full page, above the title
 MAX_SHARE = 0.55
 MAX_SINGLE_SHARE = 0.95
 MAX_TICKS = 9  # ticks of an axis, as of matplotlib's
-TICK_LETTERS = 6  # of the label of a tick, and of the space beside it, at least
+TICK_LETTERS = 6  # of the label of a tick, and of the space beside it
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks, as of matplotlib's AutoLocator
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
@@ -302,7 +302,7 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
 
 
 def space_ticks(page: Figure | SubFigure) -> None:
-    """Give the axes of a page so few ticks that their labels do not touch.
+    """Give the axes of a page so few ticks that labels of TICK_LETTERS letters do not touch.
 
     Logarithmic axes and ticks that were set stay.
     """
@@ -311,7 +311,5 @@ def space_ticks(page: Figure | SubFigure) -> None:
         assert isinstance(ax, Axes)
         if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             room = 72 * ax.get_window_extent().width / ax.figure.dpi
-            numbers = ax.xaxis.get_major_formatter().format_ticks(ax.get_xticks())
-            letters = max(TICK_LETTERS, 1 + max(map(len, numbers)))
-            count = int(room / style.width("0" * letters, size))
+            count = int(room / style.width("0" * TICK_LETTERS, size))
             ax.xaxis.set_major_locator(MaxNLocator(min(max(count, 1), MAX_TICKS), steps=STEPS))

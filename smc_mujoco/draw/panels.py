@@ -321,16 +321,9 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
 
 
 def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
-    """Return the labels of panels of these heights in points; the unit is on a second line if the
-    label is long.
-    """
-    size = style.points(style.RC["font.size"])
-    words = []
-    for panel, height in zip(panels, heights, strict=True):
-        label = panel.label
-        long = style.width(label, size) > 0.85 * height
-        words.append(label.replace(" (", "\n(") if long else label)
-    return words
+    """Return the labels of panels of these heights in points, long ones on several lines."""
+    pairs = zip(panels, heights, strict=True)
+    return [style.folded(panel.label, 0.95 * height) for panel, height in pairs]
 
 
 def curve(trace: Trace, y: Array, name: str) -> ArrayPair:
@@ -696,7 +689,7 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     pair = [panel._replace(quantity=name) for name in names]
     for axis, words in zip((ax.xaxis, ax.yaxis), pair, strict=True):
         set_numbers(axis, words)
-        axis.set_label_text(words.label)
+        axis.set_label_text(style.folded(words.label))
     ax.set(xlim=limits(traces, names[0]), ylim=limits(traces, names[1]))
     one = traces[0].x.shape[1] == 1
     width = style.points(LINE if one else LIGHT_LINE)

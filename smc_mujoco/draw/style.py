@@ -524,6 +524,13 @@ def wrapped(text: str, room: float, size: float, lines: int, bold: bool = False)
     return "\n".join(broken)
 
 
+def folded(label: str, room: float = 120.0) -> str:
+    """Return an axis's label on up to four lines of a room in points, broken after underscores
+    too.
+    """
+    return wrapped(label.replace("_", "_ "), room, points(RC["font.size"]), 4).replace("_ ", "_")
+
+
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
     traces = [traces] if isinstance(traces, Trace | Scenario) else items_of("traces", traces)
