@@ -110,5 +110,5 @@ def linked(markdown: str) -> str:
 
 
 def on_page_content(html, page, config, files):
-    """Typeset the equations."""
-    return typeset(html)
+    """Typeset the equations, and keep intervals such as (1 to 2) on one line."""
+    return re.sub(r"(\([\d.e-]+) to ([\d.e-]+\))", r"\1&nbsp;to&nbsp;\2", typeset(html))
