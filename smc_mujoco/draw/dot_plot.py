@@ -111,8 +111,6 @@ def plot(
         heights = np.repeat(tall, len(names) // across)
         page = pages.blank(width, height or space + style.points(heights.sum()), fig)
         axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
-        room = 72 * width / across - style.points(50)  # beside the numbers of the axis
-        text = style.points(pages.TEXT_SIZE)
         for plant, high, of_plant in zip(plants, tall, axes.reshape(len(plants), -1), strict=True):
             for ax, name in zip(of_plant, names, strict=True):
                 here = name, plant
@@ -122,10 +120,8 @@ def plot(
                 ax.set_xlabel(_label(name, units[plant]))
                 ax.tick_params(labelleft=across == 1 or ax is of_plant[0])
             words = style.plant_name(labels[plant]) if title or len(plants) > 1 else ""
-            place = None
-            if style.width(f"{words}  not arrived", text, bold=True) >= room:
-                place = 1.0 + 1.7 * text / 72 / style.points(high)  # above the note
-            of_plant[0].set_title(words, y=place, parse_math=False)
+            above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / high  # the note
+            of_plant[0].set_title(words, y=above, parse_math=False)
         heading = style.heading([*labels.values()], conditions, short=len(plants) > 1)
         pages.set_head(page, width, title or f"Medians: {heading}", key, shared)
         return pages.write(page, paths)

@@ -408,6 +408,6 @@ def _key(shown: Sequence[Panel]) -> list[Handle]:
             handles.append(Patch(color=style.MUTED, alpha=0.3, label=label))
         elif name == "line":
             handles.append(pages.entry(label, lw=style.points(drawing.LINE)))
-        elif name == "thin lines":
+        else:
             handles.append(pages.entry(label, lw=thin))
     return handles

@@ -304,7 +304,6 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
             banded.append(panel.quantity)
         if panel.quantity == "u":
             over = max(over, mean_window(panel.traces))
-    quantities = {panel.quantity for panel in panels}
     words = {}
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
@@ -313,10 +312,8 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     if n > 1:
         shown = min(n, MAX_DRAWN_CHANNELS)
         words["thin lines"] = f"the {n} channels" if shown == n else f"{shown} of {n} channels"
-        if "x" in quantities:
+        if any(panel.quantity == "x" for panel in panels):
             words["thin lines"] += ", the slowest thick"
-    if quantities & {*PEAKS}:
-        words["peaks"] = f"largest in {1e3 * peak_window(panels[0].traces):.3g} ms"
     return words
 
 
