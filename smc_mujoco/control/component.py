@@ -548,8 +548,10 @@ def template_decorator(
         )
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)
-        except (TypeError, ValueError) as error:  # ValueError: a builtin without a signature
-            raise ScenarioError(f"{kind} {name!r} takes (y, gains, memory): {error}") from None
+        except (TypeError, ValueError):  # ValueError: a builtin without a signature
+            raise ScenarioError(
+                f"{kind} {name!r} has other arguments: give it these three, (y, gains, memory)"
+            ) from None
         return Template(
             kind=kind,
             name=name,

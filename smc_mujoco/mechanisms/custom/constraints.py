@@ -101,8 +101,8 @@ def softness_warnings(label: str, made: Plant) -> list[str]:
     sentences = []
     if parts := _giving(model, data):
         sentences.append(
-            f"{label} gives way, in mrad (mm), to a blow of 1 rad/s (m/s) and to its weight: "
-            f"{', '.join(parts)}; a smaller first number of that option in the file makes it harder"
+            f"{label} gives way {', '.join(parts)}: the first if hit at 1 rad/s or 1 m/s, the "
+            "second under its weight; a smaller first number of the option makes it harder"
         )
     if not (made.smooth or model.opt.noslip_iterations):  # which hold dry friction exactly
         sentences += _creeping(label, model, data)
@@ -110,7 +110,7 @@ def softness_warnings(label: str, made: Plant) -> list[str]:
 
 
 def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
-    """Return what gives way by more than MAX_GIVE, and by how much, in mrad (mm).
+    """Return where a model gives way by more than MAX_GIVE, and how far, in mrad (mm).
 
     A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
     by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
@@ -126,7 +126,8 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
         blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
         rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
         if blow > MAX_GIVE:
-            parts.append(f"its {what} by {1e3 * blow:.2g} and {1e3 * rest:.1g} ({option})")
+            size = f"{1e3 * blow:.2g} and {1e3 * rest:.1g} mrad or mm"
+            parts.append(f"at its {what} by {size} ({option})")
 
     off = model.opt.disableflags
     gravity = float(np.linalg.norm(model.opt.gravity))
