@@ -18,12 +18,6 @@ from smc_mujoco.evidence.rigs.rig import Fall
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
-WRONG = {
-    "mass": 80.0,
-    "viscous": 150.0,
-    "coulomb": 30.0,
-    "offset": 0.0,
-}
 
 
 def carriage(x, v, force, time, m, b, dry, constant):
@@ -100,11 +94,6 @@ def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
 def moved():
     """0.6 s of the axis on a sine, read by its encoder."""
     return smc.run(AXIS.scenario(duration=0.6, reference=smc.Sine(0.05, 4.0), x0=0.0))
-
-
-@pytest.fixture(scope="module")
-def found(moved):
-    return smc.audits.identify(AXIS.with_values(WRONG), moved, starts=1)
 
 
 @pytest.fixture(scope="module")
@@ -401,7 +390,8 @@ def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
     assert identification._of_plant(plant, None).fit(record)["x"] > 99.9
 
 
-def test_drawn_sets_have_the_errors_and_correlations_found(found):
+def test_drawn_sets_have_the_errors_and_correlations_found(moved):
+    found = smc.audits.identify(AXIS, moved, ["mass", "viscous"], starts=1, most=1)
     rig = found.drawn(1000, seed=1)
     names = list(found.values)
     sets = np.array([[each[name] for name in names] for each in rig.ensemble])
