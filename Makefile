@@ -12,7 +12,7 @@ LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-h
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
 
-promised: check test docs lowest demo ## all that a change must pass; the workflows run the same targets, each in a job
+promised: demo check test lowest docs ## all that a change must pass; the workflows run the same targets, each in a job
 
 demo: setup ## the inverted pendulum under the paper's four laws: scores, traces, a figure, a film
 	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
