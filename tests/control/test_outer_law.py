@@ -10,8 +10,6 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import INPUT_GAIN
 
-pytestmark = pytest.mark.quick
-
 
 def run(law, **changes):
     fields = {

@@ -13,8 +13,6 @@ from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 import smc_mujoco as smc
 from smc_mujoco.control.laws import loop_shaping, lqi, mpc
 
-pytestmark = pytest.mark.quick
-
 RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
 UNIT = {"a1": 0.0, "a2": 0.0, "b": 1.0}  # the plant e'' = u
 # a1, a2, b
