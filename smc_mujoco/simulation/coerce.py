@@ -345,7 +345,7 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
 
     Kinds on a joint must differ, and one at most keeps a state by which it holds the joint at rest.
     """
-    items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints(s.plant))
+    items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints)
     for part, other in itertools.combinations(items, 2):
         same = type(part) is type(other) and part.on == other.on
         both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
@@ -356,10 +356,17 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
 
 
 def _by_joint(
-    name: str, value: Any, s: Any, kind: type[P], example: str, joints: Sequence[str]
+    name: str,
+    value: Any,
+    s: Any,
+    kind: type[P],
+    example: str,
+    joints: Callable[[Plant], Sequence[str]],
 ) -> list[P]:
     """Return the parts given as one, several, None or by joint, each with the joints that it acts
-    on, which must be among `joints`.
+    on, which must be among `joints` of the plant.
+
+    Without parts the plant's model is not made, which takes a second for a thousand pendulums.
     """
     several_parts = several(kind, example)
     items: list[P] = []
@@ -370,7 +377,7 @@ def _by_joint(
                     items.append(dataclasses.replace(part, on=(joint,)))
         else:
             items += several_parts(name, item, s)
-    return [_placed(name, part, s.plant, joints) for part in items]
+    return [_placed(name, part, s.plant, joints(s.plant)) for part in items]
 
 
 def _placed(name: str, part: P, plant: Plant, joints: Sequence[str]) -> P:
@@ -395,7 +402,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     if value is None:
         return ()
     driven = driven_names(s.plant)
-    items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven)
+    items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven_names)
     for chain in dict.fromkeys(chains(items, driven)):
         drives = tuple(part for part in chain if part.drives)
         others = [type(part).__name__ for part in chain if not part.drives]
@@ -414,7 +421,7 @@ def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder,
     if value is None:
         return None
     joints = channel_names(s.plant)
-    items = _by_joint(name, value, s, Encoder, "smc.Encoder(counts=...)", joints)
+    items = _by_joint(name, value, s, Encoder, "smc.Encoder(counts=...)", channel_names)
     for joint, taken in zip(joints, chains(items, joints), strict=True):
         if len(taken) > 1:
             raise ScenarioError(f"{name} has two parts on joint {joint!r}: give one")
