@@ -118,9 +118,23 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     for path in source.rglob("*"):
         if path.is_file():
             held.add(path.relative_to(source).as_posix())
-    folders = "smc_mujoco models scenes tests benchmarks docs examples videos/gallery"
-    tops = {"Makefile", "setup.sh", *LOCKS, *(path.name for path in ROOT.glob("*.md"))}
-    assert shipped(*folders.split()) | tops <= held
+    tops = {
+        "Makefile",
+        "setup.sh",
+        *LOCKS,
+        *(path.name for path in ROOT.glob("*.md")),
+    }
+    folders = shipped(
+        "smc_mujoco",
+        "models",
+        "scenes",
+        "tests",
+        "benchmarks",
+        "docs",
+        "examples",
+        "videos/gallery",
+    )
+    assert folders | tops <= held
 
 
 def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binaries, tmp_path):

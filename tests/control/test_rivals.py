@@ -38,7 +38,19 @@ def call(law, memory, **fields):
 def answer(law, memory, omega, h, samples=80_000):
     """The complex factor from e = cos(omega t) to the law's u, once it has settled."""
     t = h * np.arange(samples)
-    u = np.array([called(law, measured(e=math.cos(omega * one), dt=h), memory)[0] for one in t])
+    u = np.array(
+        [
+            called(
+                law,
+                measured(
+                    e=math.cos(omega * one),
+                    dt=h,
+                ),
+                memory,
+            )[0]
+            for one in t
+        ]
+    )
     last = t > t[-1] - 4.0 * math.pi / omega
     basis = np.stack(
         [np.cos(omega * t[last]), -np.sin(omega * t[last]), np.ones(last.sum())], axis=1
