@@ -387,7 +387,8 @@ def _draw_beside(
         else:
             panel = places[0]._replace(quantity="settling")
             drawing.over_time(ax, panel, runs.colours, names=runs.names)
-            words = f"time (s)\nthe largest in {1e3 * drawing.peak_window(panel.traces):.3g} ms"
+            width = 1e3 * drawing.peak_window(panel.traces)
+            words = f"time (s)\nthe largest in the last {width:.3g} ms"
             ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
 

@@ -352,12 +352,14 @@ def mean_window(traces: Sequence[Trace]) -> float:
 
 
 def peaks(y: Array, trace: Trace) -> Array:
-    """Return the largest of y (K+1,) within a window around each sample, (K+1, 1), or MIN_ERROR if
+    """Return the largest of y (K+1,) within a window before each sample, (K+1, 1), or MIN_ERROR if
     that is more.
     """
     from scipy.ndimage import maximum_filter1d
 
-    return np.maximum(maximum_filter1d(y, window(trace), mode="nearest"), MIN_ERROR)[:, None]
+    width = window(trace)
+    largest = maximum_filter1d(y, width, mode="nearest", origin=(width - 1) // 2)
+    return np.maximum(largest, MIN_ERROR)[:, None]
 
 
 def peak_window(traces: Sequence[Trace]) -> float:
