@@ -384,9 +384,24 @@ class Rows:
         return np.where(never, np.inf, sizes)
 
 
-@pytest.mark.parametrize("size", [None, PAGE, COLUMN])
+@pytest.mark.parametrize(
+    "size",
+    [
+        None,
+        PAGE,
+        COLUMN,
+    ],
+)
 def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size, monkeypatch):
-    page = smc.plot(Rows(), size=size, metrics=["settling_time", "tv_rate", "settles"])
+    page = smc.plot(
+        Rows(),
+        size=size,
+        metrics=[
+            "settling_time",
+            "tv_rate",
+            "settles",
+        ],
+    )
     words_of(page, monkeypatch, whole=True)
     assert len(page.axes) == 6
     assert [label.get_text() for label in page.axes[0].get_yticklabels()] == ["nominal", "noise"]
@@ -403,10 +418,22 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size, monk
 def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_settles_is_hollow(
     size,
 ):
-    laws = ("classical", "super_twisting", "adaptive")
+    laws = (
+        "classical",
+        "super_twisting",
+        "adaptive",
+    )
     rows = Rows(laws=laws, still="duffing" if size else "")
     rows.rows = [row for row in rows.rows if row[0] == "duffing"]
-    page = smc.plot(rows, metrics=["settling_time", "ultimate_bound", "settles"], size=size)
+    page = smc.plot(
+        rows,
+        metrics=[
+            "settling_time",
+            "ultimate_bound",
+            "settles",
+        ],
+        size=size,
+    )
     settling, bound, settles = page.axes
     for k, (law, colour) in enumerate(zip(laws, style.law_colours(laws), strict=True)):
         sizes = []
@@ -428,7 +455,15 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
     assert shares == {0.0 if size else 1.0}
 
 
-@pytest.mark.parametrize("metric", ["tv_rate", "energy", "ultimate_bound", "settling_time"])
+@pytest.mark.parametrize(
+    "metric",
+    [
+        "tv_rate",
+        "energy",
+        "ultimate_bound",
+        "settling_time",
+    ],
+)
 def test_a_law_whose_runs_have_not_arrived_has_no_dot_among_others(metric, monkeypatch):
     page = smc.plot(Rows(away=("pid",)), metrics=[metric])
     for ax in page.axes:
