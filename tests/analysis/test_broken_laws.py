@@ -5,6 +5,7 @@ fails.
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.region_of_attraction import basin_of
 
 
 @smc.law_function(gains={"k": 1.0})
@@ -15,7 +16,16 @@ def late(y, gains, memory):
 
 
 QUESTIONS = {
-    "basin": lambda law: smc.design.basin("duffing", law, points=(3, 3), duration=2.0),
+    "basin": lambda law: basin_of(
+        smc.Scenario(
+            plant="duffing",
+            law=law,
+            duration=2.0,
+            integrator="implicitfast",
+        ),
+        [0.0, 1.0],
+        [0.0],
+    ),
     "margins": lambda law: smc.margins("duffing", law, kinds="delay", quick=True),
     "worst_case": lambda law: smc.worst_case(
         smc.Scenario(plant="duffing", law=law, duration=1.0),
