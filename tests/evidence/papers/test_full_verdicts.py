@@ -58,7 +58,7 @@ def test_readme_counts_the_claims_of_gaber_s_paper():
     for id, claim in paper("gaber").claims.items():
         if claim.whose == "paper":
             own.append(known("gaber")[id][0])
-    sentence = r"(?s)Of the (\d+) claims .*?, (\d+) are refuted, .*?(\d+) is not shown"
+    sentence = r"(?s)Of the (\d+) claims .*?, (\d+) are refuted, .*?(\d+) is not\s+shown"
     reported = re.findall(sentence, (ROOT / "README.md").read_text(encoding="utf-8"))
     assert reported == [(str(len(own)), str(own.count("refuted")), str(own.count("not shown")))]
 
