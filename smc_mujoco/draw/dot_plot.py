@@ -35,7 +35,8 @@ METRICS = ("settling_time", "ultimate_bound", "tv_rate")
 Cell = tuple[str, str, str, str]  # metric, plant, condition, law
 MIN_SIZE = 1e-9  # smaller sizes are drawn at it
 RING: Fields = {"marker": "o", "mfc": "none", "mec": style.INK}  # around a winner
-LINE_HEIGHT = 0.18  # inches on a full page, height of a law's line
+# inches on a full page, heights of a law's line, and of the title, numbers and label of a panel
+LINE_HEIGHT, WORDS_HEIGHT = 0.18, 0.9
 
 
 def plot(
@@ -105,7 +106,7 @@ def plot(
         won = intervals.keys() & set(winners)
         key, shared = _key(table, looks, list(intervals.values()), bool(won))
         rows = (len(laws) + 1) * np.array(list(map(len, conditions_of.values())))
-        tall = 0.5 + LINE_HEIGHT * rows
+        tall = WORDS_HEIGHT + LINE_HEIGHT * rows
         space = pages.head_height(width, key) + style.points(0.6)
         across = 1 if width < pages.NARROW else len(names)
         heights = np.repeat(tall, len(names) // across)
@@ -120,7 +121,7 @@ def plot(
                 ax.set_xlabel(_label(name, units[plant]))
                 ax.tick_params(labelleft=across == 1 or ax is of_plant[0])
             words = style.plant_name(labels[plant]) if title or len(plants) > 1 else ""
-            above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / high  # the note
+            above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)  # the note
             of_plant[0].set_title(words, y=above, parse_math=False)
         heading = style.heading([*labels.values()], conditions, short=len(plants) > 1)
         pages.set_head(page, width, title or f"Medians: {heading}", key, shared)
