@@ -73,6 +73,7 @@ KINDS |= dict.fromkeys(("u", "applied"), "control")
 WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",
+    "load": "largest |u| (% of limit)",
     "settling": "|x − r|",
     "largest": "largest |u|",
 }
@@ -102,6 +103,11 @@ def contact_force(trace: Trace) -> Array:
     return contacts(trace).force[:, None]
 
 
+def load(trace: Trace) -> Array:
+    """Return the largest |u| of a joint, as a share of its limit, (K+1, 1) %."""
+    return 100.0 * (np.abs(trace.applied) / trace.scenario.limits).max(axis=1, keepdims=True)
+
+
 QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
     "e": lambda trace: trace.x - trace.r,
@@ -116,6 +122,7 @@ QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
     "tip": off_path,
     "contact": contact_force,
+    "load": load,
     "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
     "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
 }
@@ -137,7 +144,7 @@ class Panel(NamedTuple):
         The unit is "" where the words have it; or where it depends on the law, as that of s does:
         the s of twisting is e, and that of PID is a force.
         """
-        if self.quantity in ("tip", "contact"):
+        if self.quantity in ("tip", "contact", "load"):
             return 1.0, ""
         unit = style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]
         if self.quantity in PEAKS:
@@ -268,14 +275,15 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the two panels below a film: the motion of the first two groups of channels, or of one
-    group with its u; of arms the tip's, with the force of its contact.
+    group with its u; of arms the tip's, with the force of its contact or the largest u.
 
-    The motion is x; of several channels it is the largest error.
+    The motion is x; of several channels it is the largest error. A free body whose reference goes
+    somewhere has a map of the paths in place of the error of its attitude.
     """
     plant = traces[0].scenario.plant
     first = over_groups(traces, "tip")
-    if first and any(trace.scenario.contact for trace in traces):
-        first += over_groups(traces, "contact")
+    if first:
+        first += [*over_groups(traces, "contact"), first[0]._replace(quantity="load")]
     motions = []
     controls = []
     for each in style.split(traces).items():
@@ -287,6 +295,8 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
             motions += by_channel(place)
         elif place.group.driven or not many:
             motions.append(place._replace(quantity="settling") if many or first else place)
+    if plant.pose and any(np.ptp(trace.r[:, :3], axis=0).any() for trace in traces):
+        motions[1:] = [motions[0]._replace(quantity="path")]
     return [*first, *motions, *controls][:2]
 
 

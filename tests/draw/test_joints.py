@@ -63,8 +63,8 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
 def test_panels_below_a_film_of_an_arm_tell_what_the_tip_does(trace):
     strip = panels.strip([trace])
     # joints that slide and that turn
-    assert [panel.quantity for panel in strip] == ["tip", "settling"]
+    assert [panel.quantity for panel in strip] == ["tip", "load"]
     assert [panel.label for panel in strip] == [
         "tip off its path (mm)",
-        "|x − r| (m)",
+        "largest |u| (% of limit)",
     ]

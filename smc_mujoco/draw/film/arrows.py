@@ -5,8 +5,9 @@ An arrow is the mean over the time of a frame. A bar behind the control's is its
 how far a control swings that switches faster than the film. With a drive, arrow and bar show its
 force, and a pale arrow the command. Arrows lie along a pendulum's arc, beyond the bob; or along the
 rail, above the cart in the picture. At a hinge of a user's model, whose links may have any shape,
-they bend around its axis. A free body has one arrow, of the disturbance's force. All are drawn over
-the picture, so that no link hides them.
+they bend around its axis. A free body has one arrow, of the disturbance's force; a body of a user's
+model that is pushed has one that ends before it. All are drawn over the picture, so that no link
+hides them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -55,9 +56,11 @@ NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the s
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-FLIGHT_LENGTH = 2.2  # at a free body, in radii of its largest part
+FLIGHT_LENGTH = 1.3  # at a free body, in radii of its largest part
 FLIGHT_THICKNESS = 0.07
 FLIGHT_DISTANCE = 0.6  # from the middle of a free body to its arrow
+MAX_BLOW = 3.0  # of the longest arrow: a stronger blow's is no longer
+BLOW_DISTANCE = 2.0  # thicknesses from the arrow of a blow to the middle of its body
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -71,7 +74,8 @@ class Arrow(NamedTuple):
     layer: int = 0  # distance from the body, in arrows
     size: float = 1.0  # of its shaft
     head: bool = True
-    way: Array | None = None  # of a force on a free body, (3,), in the axes of the world
+    way: Array | None = None  # of a force on a body, (3,), in the axes of the world
+    body: str = ""  # which a blow hits
 
 
 class Mount(NamedTuple):
@@ -254,11 +258,10 @@ def path(
     axis = data.xaxis[mount.joint]
     anchor = data.xanchor[mount.joint]
     owner = model.jnt_bodyid[mount.joint]
+    if arrow.way is not None:
+        return straight(model, data, mount, arrow, arrow.way)
     low, high = np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
-    if arrow.way is not None:
-        start = data.xpos[owner] + mount.unit * FLIGHT_DISTANCE * arrow.way
-        return start + mount.unit * along * arrow.way, mount.thick
     if mount.radius:
         right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
         if not right.any():
@@ -300,6 +303,25 @@ def path(
         start = box[:3] @ turned + box[3:] @ np.abs(turned) + RAIL_DISTANCE * width
     start += LAYER_DISTANCE * width * arrow.layer
     return place + start * out + reach * along * way, arrow.size * width
+
+
+def straight(
+    model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow, way: Array
+) -> tuple[Array, float]:
+    """Return the line of a force's arrow and the width of its shaft, as `path`: out of a free body;
+    or, of a blow, to the middle of its body, to the scale of the other arrows.
+    """
+    unit = MAX_SWEEP * mount.radius or mount.unit
+    width = BENT_WIDTH * mount.radius or mount.thick
+    along = unit * np.linspace(0.0, min(arrow.high, MAX_BLOW), 40)
+    if arrow.body:
+        names = [model.body(i).name.removeprefix("m/") for i in range(model.nbody)]
+        place = data.xipos[names.index(arrow.body)]
+        along -= along[-1] + BLOW_DISTANCE * width
+    else:
+        place = data.xpos[model.jnt_bodyid[mount.joint]]
+        along += unit * FLIGHT_DISTANCE
+    return place + along[:, None] * way, width
 
 
 def outline(line: Array, width: float, head: bool = True) -> Array:

@@ -21,27 +21,19 @@ SHADOW_EMISSION = 20.0  # so large that a shadow is as dark whichever light fall
 SHADE = (0.70, 0.715, 0.74)  # red, green, blue of the floor in shadow, chosen
 MIN_CAST = 1.0  # px, half the least thickness of what casts a shadow
 MIN_BOX_CAST = 3.0  # px, the same of boxes, as scale marks are
-MIN_ARM_CAST = 3.0  # px, the same of rings around an arm's links, which the links shade
 GEOM = mujoco.mjtObj.mjOBJ_GEOM
-
-Add = Callable[[mujoco.MjvScene], None]
 
 
 class Canvas:
-    """A picture of `size` px of a model, from its camera `film`.
+    """A picture of `size` px of a model, from its camera `film`."""
 
-    With `arms`, rings around links cast no shadows.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int], arms: bool = False
-    ):
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int]):
         self.data = data
         self.sun = data.light(scene.SUN).xdir.copy()
         self.extent = model.stat.extent
         eye = data.cam("film")
         middle = (eye.xpos - model.stat.center) @ eye.xmat.reshape(3, 3)[:, 2]
-        self.casts = casting(model, middle * camera.pixel(size), arms)
+        self.casts = casting(model, middle * camera.pixel(size))
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
 
@@ -49,7 +41,7 @@ class Canvas:
         """Close the renderer."""
         self.renderer.close()
 
-    def draw(self, add: Add = lambda scene: None) -> Array:
+    def draw(self, add: Callable[[mujoco.MjvScene], None]) -> Array:
         """Return the picture of `data` as it is, (height, width, 3) uint8.
 
         `add` adds shapes to the scene, such as ghosts.
@@ -61,16 +53,15 @@ class Canvas:
         return self.renderer.render()
 
 
-def casting(model: mujoco.MjModel, pixel: float, arms: bool) -> Array:
-    """Return which geoms cast shadows if opaque, (geoms,): not thin or flat ones.
+def casting(model: mujoco.MjModel, pixel: float) -> Array:
+    """Return which geoms cast shadows if opaque, (geoms,): not thin ones.
 
     `pixel` is the size of one, m.
     """
     box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
     thinnest = np.where(box, MIN_BOX_CAST, MIN_CAST) * pixel
-    flattest = MIN_ARM_CAST * pixel if arms else 0.0
     half = np.sort(model.geom_aabb[:, 3:], axis=1)
-    return (half[:, 1] > thinnest) & (half[:, 0] > flattest) & (model.geom_type != scene.PLANE)
+    return (half[:, 1] > thinnest) & (model.geom_type != scene.PLANE)
 
 
 def add_shadows(shown: mujoco.MjvScene, way: Array, casts: Array, extent: float) -> None:

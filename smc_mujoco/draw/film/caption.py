@@ -41,8 +41,7 @@ LOOKS = {  # mood -> colours of a badge and of its rim
 class Caption:
     """The text of a film: above the tiles of the machines, from `top` px on, and at their feet.
 
-    `below`, width and height in px of a full-size film, is what others draw in place of badges. A
-    close-up's deflections are `factor` times as large.
+    A close-up's deflections are `factor` times as large.
     """
 
     def __init__(
@@ -55,7 +54,6 @@ class Caption:
         scale: float,
         scales: Mapping[Group, Scale],
         states: Sequence[Sequence[State | None]] = (),
-        below: Pair | None = None,
         factor: float = 1.0,
     ):
         self.traces = traces
@@ -63,7 +61,6 @@ class Caption:
         self.colours = colours
         self.size = size
         self.scale = s = scale
-        self.below = below
         self.changes = style.marks(traces, names, blows=not traces[0].scenario.plant.tip)
         self.lines = [look["ls"] for look in style.looks(traces)]
         inside = size[0] - 2 * EDGE * s
@@ -103,10 +100,7 @@ class Caption:
         for k in range(len(self.names)):
             wide, high = self.box([self.text(k)], room)
             labels.append((wide, high + SAMPLE_HEIGHT * s))
-            if self.below is not None:
-                badges.append((self.below[0] * s, self.below[1] * s))
-            else:
-                badges.append(self.box(self.states[k] if self.states else (), room))
+            badges.append(self.box(self.states[k] if self.states else (), room))
         return np.array(labels), np.array(badges)
 
     def box(self, texts: Collection[str], room: float) -> Pair:
@@ -208,10 +202,10 @@ class Caption:
             look = (style.PAPER, style.MUTED)
             if speed < 1.0:
                 pace = f"{1.0 / speed:.3g}× slower"
-                look = (style.INK, style.INK)
+                look = (style.INK, None)
             end = right - style.width("00.000 s", LETTERS * s, bold=True) - PAD * s
             start = end - self.text_width(pace) - 2 * PAD * s
-            self.write(draw, (start, y - half, end, y + half), pace, *look, radius=half)
+            self.write(draw, (start, y - half, end, y + half), pace, *look)
 
     def write(
         self,
@@ -220,13 +214,11 @@ class Caption:
         words: str,
         fill: str,
         rim: str | None,
-        radius: float | None = None,
     ) -> None:
         """Draw a box, left, top, right, bottom px, with words in it."""
         s = self.scale
         left, top, right, bottom = map(float, box)
-        corner = 5 * s if radius is None else radius
-        draw.rounded_rectangle((left, top, right, bottom), corner, fill, rim, max(1, round(s)))
+        draw.rounded_rectangle((left, top, right, bottom), 5 * s, fill, rim, max(1, round(s)))
         middle = ((left + right) / 2, (top + bottom) / 2)
         lines = round((bottom - top) / (BOX_PITCH * s))
         words, size = fitted(words, right - left - 2 * PAD * s, LETTERS * s, lines)

@@ -1,11 +1,12 @@
-"""Charts below a film: x of each group of channels, and u, drawn once and uncovered as the clock
-runs.
+"""Charts below a film: x of each group of channels, and u, or a map of paths, drawn once and
+uncovered as the clock runs.
 
 Two pictures are drawn: the panels with every curve, and the panels with faint curves. A frame takes
 the columns up to the clock from the first and the rest from the second, so that it costs one copy.
 The time until all rest has most of the width; the rest of the run has a grey strip.
 """
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,7 +19,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
@@ -40,6 +41,7 @@ LANE_BAND = 0.45  # opacity of a band in a lane of its own
 LANE_GAP = 8  # points between a lane, and how far u swings
 LANE_HEIGHT = 0.84  # of a lane's pitch
 END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
+MAX_SWITCHES = 20  # of a u that shares its axes with others
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 RIGHT = 0.985
 BOTTOM = 0.19  # of the height
@@ -86,9 +88,16 @@ class Charts:
             figure.subplots_adjust(left=left, right=RIGHT, bottom=BOTTOM, top=TOP, wspace=gap)
             artists: list[Artist] = []
             rows = []
+            flown = None
             for ax, panel in zip(axes, strip, strict=True):
                 point = DPI * scale / 72
                 room = ax.get_window_extent().width
+                if panel.quantity == "path":
+                    from smc_mujoco.draw.film import flight
+
+                    artists += flight.paths(ax, panel, colours)
+                    flown = functools.partial(flight.flights, ax, panel.traces)
+                    continue
                 words, high = fitted(panel.label, room, LETTER_POINTS * point)
                 ax.set_title(words, fontsize=high / point)
                 laned = in_lanes(panel)
@@ -104,13 +113,10 @@ class Charts:
                         tell_swing(row, part.traces[0], shades[0])
                 rows.append(found)
             self.full = picture(canvas)
-            for artist in artists:
-                if isinstance(artist, PolyCollection):
-                    artist.set_alpha(FUTURE_BAND)
-                else:
-                    artist.set_alpha(FUTURE_LINE * (artist.get_alpha() or 1.0))
+            fade(artists)
             self.faint = picture(canvas)
         self.find(rows)
+        self.flights = flown(self.full.shape[0]) if flown else []
 
     def find(self, rows: Sequence[Sequence[Row]]) -> None:
         """Find the frames of the panels in the picture, px, and the paths of their dots."""
@@ -179,6 +185,12 @@ class Charts:
                 if time <= t[-1] + 1e-9 and np.isfinite(y[0]):
                     lasting.append((now, float(np.interp(time, t, y)), colour))
             dots += reversed(lasting)  # the first on top
+        mask = Image.new("L", charts.shape[1::-1])
+        for (t, line), colour in zip(reversed(self.flights), reversed(self.colours), strict=False):
+            flown = line[t <= time + 1e-9]
+            ImageDraw.Draw(mask).line(flown.ravel().tolist(), 255, 3 * self.dot)
+            dots.append((*flown[-1].tolist(), colour))
+        charts = np.where(np.asarray(mask)[..., None] > 0, self.full, charts)
         image = Image.fromarray(charts)
         for x, y, colour in dots:
             self.disc(image, x + 0.5, y + 0.5, self.dot + 1.5, style.PAPER)
@@ -192,9 +204,24 @@ class Charts:
         arrows.paint(image, edge, arrows.rgba(colour))
 
 
+def fade(artists: Sequence[Artist]) -> None:
+    """Make curves and bands faint, as what is still to come is."""
+    for artist in artists:
+        if isinstance(artist, PolyCollection):
+            artist.set_alpha(FUTURE_BAND)
+        else:
+            artist.set_alpha(FUTURE_LINE * (artist.get_alpha() or 1.0))
+
+
 def in_lanes(panel: Panel) -> bool:
-    """Return whether each law's u has its own lane, because a wide band would hide the others."""
-    return panel.quantity == "u" and len(panel.traces) > 1 and panels.crowded(panel, 0)
+    """Return whether each law's u has its own lane, because a wide band would hide the others, or
+    one that switches often.
+    """
+    if panel.quantity != "u" or len(panel.traces) < 2:
+        return False
+    least = panels.MIN_WIDE_BAND * np.ptp(panels.limits(panel.traces, "u"))
+    switches = [np.sum(np.abs(np.diff(trace.u, axis=0)) > least) for trace in panel.traces]
+    return max(switches) > MAX_SWITCHES or panels.crowded(panel, 0)
 
 
 def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:

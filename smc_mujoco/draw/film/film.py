@@ -291,22 +291,20 @@ def pictures(frames: Frames) -> Generator[Array]:
     scenario = traces[0].scenario
     clock = frames.clock
     tracks = tracks_at(clock.times, traces, colours)
-    over = None  # the module that draws over arms and what flies
-    below = None
-    if scenario.plant.has_path:
-        from smc_mujoco.draw.film import arm as over
-    if over and scenario.plant.tip:
-        below = over.room(traces)
     grid_states = [track.grid_states for track in tracks]
     factor = clock.close.factor if clock.close else 1.0
-    given = (frames.title, above, scale, arrows.scales(traces), grid_states, below, factor)
+    given = (frames.title, above, scale, arrows.scales(traces), grid_states, factor)
     caption = Caption(traces, names, colours, *given)
     charts = Charts(traces, names, colours, (width, low), scale)
     with contextlib.ExitStack() as opened:
         stages = []
         for stage in staged(tracks, frames.camera, caption, clock.times):
             stages.append(opened.enter_context(stage))
-        overlays = over.overlays(stages, caption.badges) if over else []
+        overlays = []
+        if scenario.plant.has_path:
+            from smc_mujoco.draw.film import arm
+
+            overlays = arm.overlays(stages)
         yield from drawn(clock, stages, overlays, caption, charts)
         if clock.close:
             close = clock.close
@@ -352,8 +350,6 @@ def drawn(
         failed = [stage.track.failed(time) for stage in stages]
         states = [stage.track.states[frame] for stage in stages]
         picture = caption.over(picture, time, failed, states, speed, clock.factor)
-        for over in overlays:
-            picture = over.beside(picture, frame)
         yield np.concatenate([picture, charts.at(time)])
 
 
@@ -369,12 +365,13 @@ def staged(
     for i, track in enumerate(tracks):
         reach, puppets[i] = puppets[i].placed(track, courses[i], followed)
         reaches.append(reach)
-    if not (followed or tracks[0].trace.scenario.plant.on_stage):  # they stand on one floor
-        highest = max(puppet.height for puppet in puppets)
-        for i, puppet in enumerate(puppets):
-            reaches[i] = reaches[i] + np.array([0.0, 0.0, highest - puppet.height])
-            puppets[i] = dataclasses.replace(puppet, height=highest)
     points = np.concatenate(reaches)
+    if not followed:  # all stand on one floor, on stands that are cut alike
+        reaches = []
+        for i, puppet in enumerate(puppets):
+            reach, puppets[i] = puppet.surrounded(points, courses)
+            reaches.append(reach)
+        points = np.concatenate(reaches)
     tiles, view = camera.tiles(len(tracks), caption.size, caption.top, caption.strip, points, turn)
     caption.place(tiles)
     for track, puppet, course in zip(tracks, puppets, courses, strict=True):
@@ -387,8 +384,7 @@ def staged(
 def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> Array:
     """Return the picture of a machine at a frame.
 
-    A machine that has failed is grey, without a ghost or arrows. An arm has a ghost where its tip
-    is far from its path.
+    A machine that has failed is grey, without a ghost or arrows.
     """
     track = stage.track
     stage.look(frame)
@@ -400,8 +396,7 @@ def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> A
         stage.aim(None)
     else:
         stage.set_colour(track.colour)
-        lost = over is None or over.lost(frame)
-        stage.aim(track.r[frame] if lost else None, time)
+        stage.aim(track.r[frame], time)
         drawn = track.drawn[frame].arrows
     picture = stage.render(drawn)
     if over:

@@ -22,8 +22,11 @@ POSES = 192  # of a trace, at which what must be in the picture is found
 # Chosen, in sizes of what moves: larger fixed things of a user's model may leave the picture, and
 # fixed things must be in it so far beside what moves, and a stand so far below and above.
 MAX_FIXED_SIZE = 4.0
-NEAR_SHARE = 0.3
+NEAR_SHARE = 0.1
 STAND_SHARE = 0.8
+FLOOR_SHARE = (
+    0.3  # a foot higher than it hangs a machine; a floor of the model so near is its floor
+)
 NO_FLOOR = 20.0  # sizes over a floor that is not seen
 FOLLOWED_TRAVEL = 1.0  # sizes of a machine: one that goes farther is followed; chosen
 FOLLOW_TIME = 0.25  # s, over which the followed place is a mean; chosen
@@ -47,6 +50,11 @@ class Course(NamedTuple):
     places: list[Array]
     goals: list[Array]
     others: list[Array]
+
+    @property
+    def reached(self) -> Array:
+        """All places of the machine and its reference, (m, 3) m."""
+        return np.concatenate([*self.places, *self.goals])
 
     @property
     def middle(self) -> Array:
@@ -152,12 +160,8 @@ class Puppet:
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Return the shape of the machine at a time, s, and its data with the channels at x."""
         now = self.shape(time)
-        if track.motion is None:
-            rest = None
-        else:
-            rest = track.motion.at(time)
         model, data = self.shapes[now].model, self.data[now]
-        data.qpos[:] = self.qpos(x, rest=rest)
+        data.qpos[:] = self.qpos(x, rest=track.rest(time))
         scene.forward(model, data)
         return model, data
 
@@ -206,8 +210,9 @@ class Puppet:
         return float(np.ptp(course.middle, axis=0).max()) > FOLLOWED_TRAVEL * own
 
     def placed(self, track: MachineTrack, course: Course, followed: bool) -> tuple[Array, "Puppet"]:
-        """Return what must be in the picture, (points, 3) m over the film's floor, and the machine
-        at its height over it, with bent arrows that suit the size of what moves.
+        """Return what moves and must be in the picture, (points, 3) m, and the machine with bent
+        arrows that suit the size of what moves; one that the camera follows at its height over the
+        film's floor.
 
         These are the corners of the boxes of all that the channels move, over the poses of its
         trace and its reference, and its arrows. Of a machine that the camera follows, the machine
@@ -223,19 +228,19 @@ class Puppet:
             points = np.concatenate([part - at for part, at in zip(seen, places, strict=True)])
             height = max(0.0, -float(np.concatenate(course.places)[:, 2].min()))
         else:
-            links = np.concatenate([*course.places, *course.goals])
-            moving = np.concatenate([links, *(line for _, line in lines)])
-            lowest = float(links[:, 2].min())
-            points, height = self.surrounded(moving, np.concatenate(course.others), lowest)
+            points = np.concatenate([course.reached, *(line for _, line in lines)])
+            height = 0.0
         return points, dataclasses.replace(self, mounts=mounts, height=height)
 
-    def surrounded(self, points: Array, around: Array, lowest: float) -> tuple[Array, float]:
-        """Return points that move, (m, 3) m, and those around them that must be in the picture
-        too, over the film's floor, and the machine's height. Links go down to `lowest`, m.
+    def surrounded(self, points: Array, courses: Sequence[Course]) -> tuple[Array, "Puppet"]:
+        """Return points that move on all machines, (m, 3) m, and those around them that must be in
+        the picture too, over the film's floor, and the machine at its height over it.
 
-        Of other things, `around` and what stands still, only the part close to these counts, such
-        as the upper half of a stand; rails and columns end there.
+        Of other things, those that move loosely and what stands still, only the part close to these
+        counts, such as the upper half of a stand; rails and columns end there.
         """
+        around = np.concatenate([np.concatenate(course.others) for course in courses])
+        lowest = min(course.reached[:, 2].min() for course in courses)
         model = self.model
         on_stage = self.scenario.plant.on_stage
         axes = self.data[0].xaxis[self.ids[self.slides]]
@@ -256,9 +261,10 @@ class Puppet:
 
             around = close(around)
             standing = close(standing)
-            beside = NEAR_SHARE * size
-            standing[..., :2] = standing[..., :2].clip(low[:2] - beside, high[:2] + beside)
         stand = STAND_SHARE * size
+        if self.scenario.plant.tip or not on_stage:
+            near = NEAR_SHARE * size
+            standing = standing.clip(low - (near, near, stand), high + near)
         if on_stage and self.slides.all():  # of a cart the rail, not its feet nor what is behind it
             stand = scene.CUT_MARGIN * size
             standing[..., 1:] = standing[..., 1:].clip(low[1:] - (0.0, stand), high[1:])
@@ -268,17 +274,23 @@ class Puppet:
         if not on_stage:  # it stands on the floor, or hangs close above it
             foot = float(standing[..., 2].min(initial=np.inf))
             height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
-            if lowest < foot < np.inf:  # a floor below the links would not be below its foot
+            hangs = foot > low[2] + FLOOR_SHARE * (high[2] - low[2])
+            if lowest < foot and not hangs:  # a floor below the links would not be below its foot
                 height += NO_FLOOR * size
+            floors = model.geom_pos[(model.geom_type == scene.PLANE) & (model.geom_bodyid == 0), 2]
+            floors = floors[np.abs(floors - lowest) < FLOOR_SHARE * size]
+            if floors.size:  # that of the model
+                height = -floors.max()
         points = points + np.array([0.0, 0.0, height])
-        if self.scenario.plant.tip:
-            points[:, 2] = points[:, 2].clip(0.0)
-        return points, height
+        points[:, 2] = points[:, 2].clip(0.0)
+        return points, dataclasses.replace(self, height=height)
 
     def lines(
         self, track: MachineTrack, mounts: Sequence[arrows.Mount]
     ) -> list[tuple[float, Array]]:
-        """Return the lines of arrows on a machine, (m, 3) m each, with their times, s."""
+        """Return the lines of arrows on a machine, (m, 3) m each, with their times, s, without
+        those of blows, whose tails may leave the picture.
+        """
         lines = []
         for drawn in track.framing:
             t = track.trace.t
@@ -286,7 +298,7 @@ class Puppet:
             at = self.posed(track, track.trace.x[sample, : self.shown], drawn.time)
             for i, arrow in drawn.arrows:
                 found = arrows.path(*at, mounts[i], arrow)
-                if found:
+                if found and not arrow.body:
                     lines.append((drawn.time, found[0]))
         return lines
 

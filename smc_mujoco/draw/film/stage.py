@@ -25,7 +25,6 @@ LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws ar
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
 GHOST_RGBA = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
-GHOST_SIZE = 0.97  # of its machine's, so that a machine at its reference hides it
 SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
 
 
@@ -85,7 +84,7 @@ class Stage:
                 ScenarioWarning,
                 users_stacklevel(),
             )
-        self.canvas = Canvas(self.model, self.data, self.size, bool(puppet.scenario.plant.tip))
+        self.canvas = Canvas(self.model, self.data, self.size)
 
     def __enter__(self) -> "Stage":
         return self
@@ -106,6 +105,8 @@ class Stage:
             self.mounts.append(mount._replace(joint=ids[-1], radius=bent))
         moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
         self.links = np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible)
+        halves = self.model.geom_aabb[self.links, 3:].min(axis=1)
+        self.thickness = 2.0 * halves.max(initial=0.0)
 
     def look(self, frame: int) -> None:
         """Put the camera where it is at a frame."""
@@ -151,23 +152,13 @@ class Stage:
         own = (1.0 - LAW_SHARE) * self.paint[links, :3]
         self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + own
 
-    def rest(self, time: float) -> Array | None:
-        """Return the pose at a time, s, in joints that have no channel."""
-        motion = self.track.motion
-        return None if motion is None else motion.at(time)
-
     def aim(self, r: Array | None, time: float = 0.0) -> None:
         """Show where the reference r, (shown,) rad or m, wants the machine, as a ghost; none where
-        r is None, or where a camera that follows the machine does not see all of the ghost.
+        r is None.
         """
         self.aimed = r is not None
         if r is not None:
-            self.goal.qpos[:] = self.puppet.qpos(r, rest=self.rest(time))
-        if self.aimed and self.followed is not None:
-            scene.forward(self.model, self.goal)
-            corners = scene.boxes(self.model, self.goal)[self.links]
-            seen = self.project(corners.reshape(-1, 3))
-            self.aimed = bool(((seen >= 0.0) & (seen <= self.size)).all())
+            self.goal.qpos[:] = self.puppet.qpos(r, rest=self.track.rest(time))
 
     def arrange(self, x: Array, ahead: Array | float = 0.0, time: float = 0.0) -> None:
         """Put the channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their
@@ -175,7 +166,7 @@ class Stage:
 
         Joints without a channel are where they were at that time, s.
         """
-        self.data.qpos[:] = self.puppet.qpos(x, ahead, self.rest(time))
+        self.data.qpos[:] = self.puppet.qpos(x, ahead, self.track.rest(time))
 
     def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> Array:
         """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
@@ -203,7 +194,7 @@ class Stage:
         across = self.project(np.array([points[0], points[0] + width * self.turn[:, 1]]))
         thick = max(float(np.ptp(across[:, 1])), arrows.MIN_SHAFT * self.scale * arrow.size)
         rim = 0
-        if mount.radius:  # it lies over a link of its colour
+        if mount.radius and not arrow.body:  # it lies over a link of its colour
             anchor = self.project(self.data.xanchor[[mount.joint]])[0]
             leader = [*anchor.tolist(), *line[0].tolist()]
             ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
@@ -221,15 +212,21 @@ class Stage:
         return self.data.body(f"m/{name}").xipos
 
     def add_ghosts(self, shown: mujoco.MjvScene) -> None:
-        """Add a translucent copy of the machine that is aimed, as its reference wants it."""
+        """Add a translucent copy of the machine that is aimed, as its reference wants it.
+
+        It is as much larger as it is farther than the machine, whose links so hide it and are not
+        cut into it.
+        """
         model = self.model
         for i in self.links.tolist() if self.aimed else ():
             if shown.ngeom >= shown.maxgeom:
                 return
             shape = shown.geoms[shown.ngeom]
-            size = GHOST_SIZE * model.geom_size[i]
-            place = self.goal.geom_xpos[i]
-            turn = self.goal.geom_xmat[i]
+            size = model.geom_size[i]
+            away = self.goal.geom_xpos[i] - self.place
+            factor = 1.0 + self.thickness / np.linalg.norm(away)
+            place = self.place + factor * away
+            turn = factor * self.goal.geom_xmat[i]
             mujoco.mjv_initGeom(shape, model.geom_type[i], size, place, turn, GHOST_RGBA)
             shape.dataid = 2 * model.geom_dataid[i]
             shape.objtype = mujoco.mjtObj.mjOBJ_UNKNOWN

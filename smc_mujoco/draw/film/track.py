@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import states
+from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.mechanisms.layout import ROTOR, joint_ids
@@ -15,6 +15,8 @@ from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
+
+BLOW_TIME = 0.12  # s for which a blow is shown after its end; chosen
 
 
 class Drawn(NamedTuple):
@@ -75,6 +77,10 @@ class MachineTrack:
         gap = states.backlash_gap(trace.scenario)  # rotors lead their joints by half of it
         self.ahead = 0.5 * gap * windows(trace.t, states.flanks(trace), edges).mean[:, :n]
 
+    def rest(self, time: float) -> Array | None:
+        """Return the pose at a time, s, (nq,), for joints that have no channel."""
+        return None if self.motion is None else self.motion.at(time)
+
     def failed(self, time: float) -> bool:
         """Return whether the run has failed by a time, s."""
         return self.trace.diverged_at is not None and time >= self.trace.diverged_at
@@ -98,8 +104,24 @@ def drawn(trace: Trace, edges: Array, sizes: Sequence[arrows.Scale], colour: str
         else:
             for i, size in enumerate(sizes):
                 found += [(i, arrow) for arrow in arrows.arrows(acting, k, i, size, colour)]
+            for body, peak in blows(trace, edges[k], time) if sizes else ():
+                size = float(np.linalg.norm(peak))
+                length = size / sizes[0].longest
+                shade = arrows.rgba(style.DISTURBANCE)
+                found.append((0, arrows.Arrow(0.0, length, shade, way=peak / size, body=body)))
         frames.append(Drawn(time, found))
     return frames
+
+
+def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
+    """Return the bodies that blows hit between two times, s, or a little before, with the peak of
+    each, (3,) N.
+    """
+    found = []
+    for push in style.pushes([trace]):
+        if start <= push.time + push.width + BLOW_TIME and stop >= push.time:
+            found.append((push.body, np.array([push.x, push.y, push.z])))
+    return found
 
 
 def motion(trace: Trace, times: Array) -> Motion | None:
@@ -116,8 +138,5 @@ def motion(trace: Trace, times: Array) -> Motion | None:
     known = len(names)
     for name in names:
         known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0
-    if known == model.nv:
-        moved = None
-    else:
-        moved = poses(trace, times)
+    moved = None if known == model.nv else poses(trace, times)
     return None if moved is None else Motion(times, moved)

@@ -125,7 +125,8 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
     )
     shown = puppet.Puppet.of(trace.scenario, np.array([0.0, -1.0, 0.0]))
     (run,) = tracks([trace], ["#0072B2"])
-    reach, _ = shown.placed(run, shown.course(run), False)
+    course = shown.course(run)
+    reach, _ = shown.surrounded(shown.placed(run, course, False)[0], [course])
     assert bool(np.ptp(reach[:, 0]) > 1.01) is seen
 
 

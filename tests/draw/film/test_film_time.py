@@ -78,3 +78,38 @@ def test_a_mark_says_when_each_law_has_settled(charts):
         alike = np.abs(picture[:, middle - 6 : middle + 7] - colour).max(axis=2) < 12
         beside = np.abs(picture[:, middle + 20 : middle + 33] - colour).max(axis=2) < 12
         assert alike.sum() > beside.sum() + 20, trace.scenario.law.name
+
+
+def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():
+    reference = [smc.Sine(0.5, 6.0), *[smc.Constant(0.0)] * 5]
+    run = made(
+        smc.Scenario(
+            plant="quadrotor",
+            reference=reference,
+            law="geometric",
+            duration=1.0,
+        )
+    )
+    x = np.stack([part(6.0 * run.t) for part in (np.sin, np.cos, *[np.zeros_like] * 4)], axis=1)
+    shown = Charts(
+        [dataclasses.replace(run, x=0.4 * x)],
+        ["one"],
+        ["#0072B2"],
+        SIZE,
+        1.0,
+    )
+    ((t, line),) = shown.flights
+    assert np.ptp(line[:, 1]) == pytest.approx(np.ptp(line[:, 0]), rel=0.01)
+    for time, wanted in ((0.2, shown.full), (0.9, shown.faint)):
+        across, down = np.round(line[np.searchsorted(t, time)]).astype(int)
+        near = np.s_[down - 2 : down + 3, across - 2 : across + 3]
+        assert (shown.at(0.5)[near] == wanted[near]).all()
+    still = dataclasses.replace(run, r=0.0 * run.r)
+    fixed = Charts(
+        [still],
+        ["one"],
+        ["#0072B2"],
+        SIZE,
+        1.0,
+    )
+    assert not fixed.flights

@@ -5,12 +5,9 @@ states.
 import contextlib
 import dataclasses
 import itertools
-import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers import arms
 from helpers.films import staged
 from helpers.sketch import Pen, failed, made
 from PIL import Image, ImageDraw
@@ -19,10 +16,9 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite
-from smc_mujoco.draw.film import arm, arrows, charts, film
+from smc_mujoco.draw.film import arrows, charts, film
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
-from smc_mujoco.metrics import tip
 
 COLOURS = ["#0072B2", "#E69F00"]
 SIZE = (640, 300)
@@ -106,73 +102,6 @@ def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
         for words in ("'one'", other, fill, "'sticks'", f"'{state}'"):
             assert words in picture
         assert ("mass × 2 since 0.2 s" in picture) is changed
-
-
-@pytest.mark.parametrize(
-    "limits",
-    [
-        [0.4, 0.2, 0.9],
-        math.inf,
-    ],
-)
-def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares_of_limits(
-    limits, pen, monkeypatch
-):
-    monkeypatch.setattr(tip, "knows_contacts", lambda scenario: True)
-    monkeypatch.setattr(tip, "contacts", lambda trace: SimpleNamespace(push=20.0 * trace.x))
-    push = smc.signals.Push(
-        "hand",
-        y=30.0,
-        z=40.0,
-        time=0.1,
-        width=0.02,
-    )
-    trace = machine(
-        arms.arm(),
-        "none",
-        u_max=limits,
-        reference=smc.Sine(0.3, 4.0),
-        duration=0.3,
-    )
-    trace = dataclasses.replace(
-        trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)
-    )
-    edges = np.array([0.08, 0.1, 0.11, 0.24])
-    low = np.array([100.0, 220.0, 260.0, 290.0])
-
-    def project(points):
-        return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
-
-    stage = SimpleNamespace(
-        track=SimpleNamespace(trace=trace, colour=COLOURS[0], edges=edges),
-        puppet=SimpleNamespace(height=0.2),
-        project=project,
-        scale=0.8,
-    )
-    stage.find = lambda name: np.array([0.4, 0.0, 0.9])
-    (over,) = arm.overlays([stage], [low])
-    within = []
-    for a, b in itertools.pairwise(edges):
-        within.append((trace.t >= a) & (trace.t < b))
-    forces = [np.linalg.norm(20.0 * trace.x[frame].mean(axis=0)) for frame in within]
-    for frame, force in enumerate(forces):
-        pen.clear()
-        over.beside(over.over(paper(), frame), frame)
-        said = "\n".join(pen)
-        assert "'50 N'" in said  # hypot(30, 40), seen for a while after it
-        (touch,) = [
-            float(note.split("'")[1][:-2]) for note in pen if " N'" in note and "'50 N'" not in note
-        ]
-        assert touch == pytest.approx(force, abs=1.0)
-        assert f"{1e3 * np.ravel(over.errors)[frame]:.0f} mm'" in said
-        boxes = []
-        for note in pen:
-            if note.startswith("rectangle") and style.RULE in note:
-                boxes.append(note)
-        assert len(boxes) == (0 if limits == math.inf else 3)
-    assert np.ravel(over.errors) == pytest.approx(
-        [tip.tip_error(trace)[frame].mean() for frame in within], rel=0.02
-    )
 
 
 def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
@@ -408,11 +337,3 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
         assert clip.n_frames == 6
         assert clip.size == size
         assert still.size == size
-    assert {path.name for path in tmp_path.iterdir()} == {
-        "a.mp4",
-        "a.png",
-        "a.webp",
-        "b.png",
-        "b.webp",
-        "first.mp4",
-    }

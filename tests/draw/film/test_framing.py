@@ -3,6 +3,7 @@ place.
 """
 
 import contextlib
+import dataclasses
 import itertools
 
 import numpy as np
@@ -117,8 +118,11 @@ def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypat
 
 
 def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeypatch):
-    with filmed(two("inverted_pendulum"), monkeypatch) as (stages, words):
+    stands, falls = two("inverted_pendulum")
+    falls = dataclasses.replace(falls, x=falls.x + 3.0)
+    with filmed([stands, falls], monkeypatch) as (stages, words):
         shown = stages[0]
+        assert stages[1].puppet.height == shown.puppet.height  # their stands are cut alike
         foot = shown.model.geom("m/foot")
         below = shown.project(shown.data.geom_xpos[[foot.id]] - [0.0, 0.0, foot.size[1]])[0]
         assert words.tiles[0, 1] + below[1] < words.labels[0, 1]

@@ -10,7 +10,7 @@ import pytest
 from helpers.sketch import made
 
 import smc_mujoco as smc
-from smc_mujoco.draw import style
+from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.film import charts
 
 SIZE = (1280, 260)
@@ -45,6 +45,22 @@ def test_each_law_has_a_lane_that_says_its_swing(drawn):
     assert tops == sorted(tops, reverse=True)
     for (lane, *_), (below, *_) in itertools.pairwise(rows):
         assert below.get_window_extent().y1 < lane.get_window_extent().y0
+
+
+def test_a_law_that_switches_in_few_samples_has_a_lane():
+    run = made(
+        smc.Scenario(
+            plant="duffing",
+            law="pid",
+            duration=1.0,
+        )
+    )
+    (group,) = style.split([run])
+    runs = []
+    for rate in (90.0, 3.0):
+        runs.append(dataclasses.replace(run, u=np.sign(np.sin(rate * run.t))[:, None]))
+    assert charts.in_lanes(panels.Panel("u", group, runs))
+    assert not charts.in_lanes(panels.Panel("u", group, runs[1:] * 2))
 
 
 def test_two_laws_that_chatter_are_told_apart(drawn):

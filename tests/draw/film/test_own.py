@@ -10,8 +10,9 @@ from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film.arrows import Arrow, scales
+from smc_mujoco.draw.film.arrows import MAX_SWEEP, Arrow, Scale, path, scales
 from smc_mujoco.draw.film.caption import key
+from smc_mujoco.draw.film.track import drawn
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SUITE = importlib.util.find_spec("dm_control")
@@ -103,3 +104,57 @@ def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     )
     assert trace.reaction.any()  # the joint's limit
     assert "reaction" in key([trace], scales([trace]))[0]
+
+
+def hung(floor, **fields):
+    """A run of a pendulum on a fixed bracket, 1.2 m above the world's origin."""
+    plant = smc.plant_from(
+        f"""<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>
+          {floor}<geom type="box" size=".05 .05 .05" pos="0 0 1.2"/><body name="rod" pos="0 0 1.2">
+          <joint name="j" axis="0 1 0"/><geom type="capsule" size=".02" fromto="0 0 0 0 0 -.5"/>
+          </body></worldbody><actuator><motor joint="j" ctrlrange="-8 8"/></actuator></mujoco>""",
+        ["j"],
+    )
+    return smc.run(
+        smc.Scenario(
+            plant=plant,
+            law="none",
+            duration=0.1,
+            **fields,
+        )
+    )
+
+
+def test_a_blow_is_an_arrow_to_its_body_that_is_to_the_scale_of_the_others():
+    push = smc.signals.Push(
+        "rod",
+        x=24.0,
+        time=0.05,
+        width=0.02,
+    )
+    trace = hung("", disturbance=push)
+    sizes = [
+        Scale(
+            8.0,
+            0.0,
+            longest=8.0,
+            full=8.0,
+        )
+    ]
+    before, during = drawn(trace, np.array([0.0, 0.04, 0.06]), sizes, "#0072B2")
+    assert not before.arrows
+    ((_, arrow),) = during.arrows
+    with staged(trace, (640, 360)) as scene:
+        line, _ = path(scene.model, scene.data, scene.mounts[0], arrow)
+        rod = scene.data.body("m/rod").xipos
+        longest = MAX_SWEEP * scene.mounts[0].radius
+    assert (np.diff(line[:, 0]) > 0.0).all()
+    assert 0.0 < rod[0] - line[-1, 0] < longest
+    assert np.ptp(line[:, 0]) == pytest.approx(3.0 * longest)
+
+
+@pytest.mark.parametrize(("floor", "shown"), [(0.6, 0.6), (-3.0, 0.68)])  # m; -3 is out of sight
+def test_a_foreign_machine_has_its_own_floor_or_one_close_below(floor, shown):
+    trace = hung(f'<geom type="plane" size="1 1 .1" pos="0 0 {floor}"/>')
+    with staged(trace, (640, 360)) as scene:
+        assert scene.puppet.height == pytest.approx(-shown, abs=0.01)
