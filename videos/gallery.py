@@ -58,6 +58,7 @@ EIGHT = {
         *[smc.Constant(0.0)] * 3,
     ],
     "x0": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    "v0": (0.6 * W, 0.6 * W, 0.0, 0.0, 0.0, 0.0),
     "disturbance": smc.signals.Wind(x=5.0, time=1.5, width=1.0),
 }
 ARM = """
