@@ -3,20 +3,21 @@ without their endings, so that "installation" finds "install"; words of one or t
 "use strict";
 {
   const EMPTY = new Set(
-    ("a about add all an and another any are as at be between by can could do does each every for from get give has have how " +
-    "i if in into is it its make many mean means me mode modes much my need no not of on one or our own please run say says " +
-    "several should show simulate simulation simulations so some that the their them there these this to too two up use used " +
-    "using want was way we what when where which who why will with work works would you your").split(" "));
+    ("a about add all an and another any are as at be between by can control could did do does during each every for " +
+    "from get give happens has have how i if in into is it its just make many me mean means mode modes much my need " +
+    "no not of on one only or our over own please run say says several should show simulate simulation simulations so " +
+    "some than that the their them then there these this to too two up use used using want was way we were what when " +
+    "where which who why will with without work works would you your").split(" "));
   const ENDINGS = [
     [/(?<=[a-z]{2}[^us])s$/, ""],
-    [/(?<=[a-z]{4})(?:i[sz]e[drs]?|i[sz]ing|i[sz]ation|ation|ity|ness)$/, ""],
+    [/(?<=[a-z]{4})(?:i[sz]e[drs]?|i[sz]ing|i[sz]ation|ation|(?<=[a-z]{5})ity|ness)$/, ""],
     [/(?<=[a-z]{2}ct)ion$/, ""],
     [/(?<=[aeiouy][a-z]+)(?:ing|(?<!e)ed)$/, ""],
     [/([bdgmnprt])\1$/, "$1"],
   ];
   const stem = (word) => ENDINGS.reduce((left, [ending, rest]) => left.replace(ending, rest), word);
   const asked = (question) => {
-    const words = question.toLowerCase().match(/[\p{L}\d]+/gu) ?? [];
+    const words = question.toLowerCase().replace(/['’]s\b/g, "").match(/[\p{L}\d]+/gu) ?? [];
     const telling = words.filter((word) => !EMPTY.has(word));
     return (telling.length ? telling : words).map((word) => (word.length < 3 ? word + "^1" : stem(word))).join(" ");
   };
