@@ -15,8 +15,8 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.draw.film.caption import LETTERS
+from smc_mujoco.draw.film.flight import blows
 from smc_mujoco.draw.film.stage import Stage
-from smc_mujoco.draw.film.track import blows
 from smc_mujoco.metrics import tip
 
 # Sizes are px of a film of full size, and chosen.

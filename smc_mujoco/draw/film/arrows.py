@@ -58,9 +58,7 @@ MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
 FLIGHT_LENGTH = 1.3  # at a free body, in radii of its largest part
 FLIGHT_THICKNESS = 0.07
-FLIGHT_DISTANCE = 0.6  # from the middle of a free body to its arrow
 MAX_BLOW = 3.0  # of the longest arrow: a stronger blow's is no longer
-BLOW_DISTANCE = 2.0  # thicknesses from the arrow of a blow to the middle of its body
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -259,7 +257,12 @@ def path(
     anchor = data.xanchor[mount.joint]
     owner = model.jnt_bodyid[mount.joint]
     if arrow.way is not None:
-        return straight(model, data, mount, arrow, arrow.way)
+        from smc_mujoco.draw.film.flight import straight
+
+        unit = MAX_SWEEP * mount.radius or mount.unit
+        width = BENT_WIDTH * mount.radius or mount.thick
+        force = min(arrow.high, MAX_BLOW) * arrow.way
+        return straight(model, data, arrow.body or owner, unit * force), width
     low, high = np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.radius:
@@ -303,25 +306,6 @@ def path(
         start = box[:3] @ turned + box[3:] @ np.abs(turned) + RAIL_DISTANCE * width
     start += LAYER_DISTANCE * width * arrow.layer
     return place + start * out + reach * along * way, arrow.size * width
-
-
-def straight(
-    model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow, way: Array
-) -> tuple[Array, float]:
-    """Return the line of a force's arrow and the width of its shaft, as `path`: out of a free body;
-    or, of a blow, to the middle of its body, to the scale of the other arrows.
-    """
-    unit = MAX_SWEEP * mount.radius or mount.unit
-    width = BENT_WIDTH * mount.radius or mount.thick
-    along = unit * np.linspace(0.0, min(arrow.high, MAX_BLOW), 40)
-    if arrow.body:
-        names = [model.body(i).name.removeprefix("m/") for i in range(model.nbody)]
-        place = data.xipos[names.index(arrow.body)]
-        along -= along[-1] + BLOW_DISTANCE * width
-    else:
-        place = data.xpos[model.jnt_bodyid[mount.joint]]
-        along += unit * FLIGHT_DISTANCE
-    return place + along[:, None] * way, width
 
 
 def outline(line: Array, width: float, head: bool = True) -> Array:

@@ -1,9 +1,10 @@
-"""A map of flights in place of a film's second chart: the paths of free bodies and of their
-references.
+"""Forces on bodies, and a map of flights in place of a film's second chart: the paths of free
+bodies and of their references.
 """
 
 from collections.abc import Sequence
 
+import mujoco
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -11,6 +12,32 @@ from matplotlib.axes import Axes
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.simulation.trace import Trace
+
+FLIGHT_DISTANCE = 0.6  # of an arrow, from the middle of a free body to it
+BLOW_DISTANCE = 1.1  # of an arrow, from the foot of that of a blow to the middle of its body
+BLOW_TIME = 0.12  # s for which a blow is shown after its end; chosen
+
+
+def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
+    """Return the bodies that blows hit between two times, s, or a little before, with the peak of
+    each, (3,) N.
+    """
+    found = []
+    for push in style.pushes([trace]):
+        if start <= push.time + push.width + BLOW_TIME and stop >= push.time:
+            found.append((push.body, np.array([push.x, push.y, push.z])))
+    return found
+
+
+def straight(model: mujoco.MjModel, data: mujoco.MjData, body: str | int, force: Array) -> Array:
+    """Return the line of a force's arrow, (40, 3) m: out of a free body, whose number is given; or,
+    of a blow on a body of a name, to its middle.
+    """
+    along = np.linspace(0.0, 1.0, 40)[:, None] * force
+    if isinstance(body, str):
+        names = [model.body(i).name.removeprefix("m/") for i in range(model.nbody)]
+        return data.xipos[names.index(body)] + along - BLOW_DISTANCE * force
+    return data.xpos[body] + along + FLIGHT_DISTANCE * force
 
 
 def plane(traces: Sequence[Trace]) -> Array:

@@ -16,8 +16,6 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
 
-BLOW_TIME = 0.12  # s for which a blow is shown after its end; chosen
-
 
 class Drawn(NamedTuple):
     """The arrows of a machine at a time, s: each with its channel."""
@@ -95,6 +93,8 @@ def drawn(trace: Trace, edges: Array, sizes: Sequence[arrows.Scale], colour: str
     """Return the arrows of a machine in each frame between `edges`, s, for what acts on its
     channels.
     """
+    from smc_mujoco.draw.film.flight import blows
+
     acting = arrows.loads(trace, edges)
     frames = []
     for k, time in enumerate(edges[1:].tolist()):
@@ -111,17 +111,6 @@ def drawn(trace: Trace, edges: Array, sizes: Sequence[arrows.Scale], colour: str
                 found.append((0, arrows.Arrow(0.0, length, shade, way=peak / size, body=body)))
         frames.append(Drawn(time, found))
     return frames
-
-
-def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
-    """Return the bodies that blows hit between two times, s, or a little before, with the peak of
-    each, (3,) N.
-    """
-    found = []
-    for push in style.pushes([trace]):
-        if start <= push.time + push.width + BLOW_TIME and stop >= push.time:
-            found.append((push.body, np.array([push.x, push.y, push.z])))
-    return found
 
 
 def motion(trace: Trace, times: Array) -> Motion | None:
