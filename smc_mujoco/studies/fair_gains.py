@@ -194,12 +194,10 @@ class Trial(NamedTuple):
         made: dict[str, list[Candidate]] = {}
         count = sum(of_plant.count(None) for of_plant in known.values())
         begun = 0
-        if self.progress and self.tune:
+        if self.progress and self.tune and count > 1:
             for plant in self.plants:
-                untuned = []
-                for law, found in zip(laws[plant.name], known[plant.name], strict=True):
-                    if found is None:
-                        untuned.append(law)
+                tried = zip(laws[plant.name], known[plant.name], strict=True)
+                untuned = [law for law, found in tried if found is None]
                 seconds, size = self.expected(plant, untuned, starts[plant.name])
                 told(f"tuning for {plant.name}", seconds * self.searches * size)
         for plant in self.plants:
