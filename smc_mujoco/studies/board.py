@@ -32,7 +32,7 @@ FEW = (
 )
 MEDIANS = (
     f"A cell has a median and its {100 * LEVEL:g} % interval. If a law has several sets of gains, "
-    "runs that share one count as one sample."
+    "runs with the same set count as one sample."
 )
 # A word in tables -> what their key says about it.
 MARKS = {
@@ -45,8 +45,8 @@ MARKS = {
     "arrived, and the samples are enough to detect a lead.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
-    "detectable lead ": "A detectable lead is the smallest difference from the leader that such a "
-    f"comparison finds with {100 * POWER:g} % power; for the leader, from its closest rival.",
+    "detectable lead ": "A detectable lead is the least difference from the leader that a paired "
+    f"test finds with {100 * POWER:g} % power. The leader's is measured from its closest rival.",
     "no detectable": "'No detectable lead': there are too few samples to detect any lead.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
     "initial value; late in the run it is at least half an encoder count, and at least the noise. "

@@ -135,9 +135,9 @@ def margins(
     The delay of the command is in s; a constant disturbance and dry friction are in N or N m. Mass
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
     rad or m; if that is 1 mrad, the velocity sensor has 5 mrad/s. Jitter is a share of the control
-    period, missed a share of the samples, and gain the share of its force that each actuator loses.
-    For laws that can be linearised, the column "theory" has the stability limit of the linear loop.
-    A law may tolerate more, with a small sustained oscillation.
+    period. Missed is the share of samples that are missed. Gain is the share of its force that each
+    actuator loses. For laws that can be linearised, the column "theory" has the stability limit of
+    the linear loop. A law may tolerate more, with a small sustained oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
@@ -215,7 +215,8 @@ def worst(
     threads: options.Threads = None,
     device: options.Device = "cpu",
 ) -> None:
-    """Search for the worst case of each law within bounds that you give, in place of random seeds.
+    """Search for the worst case of each law within bounds that you give, instead of sampling at
+    random.
 
     Only what you bound is uncertain; all else is as in the condition. If you bound nothing, what
     the plant declares is uncertain, such as an arm's payload, or else a disturbance up to a sixth

@@ -105,7 +105,7 @@ Gains = Annotated[
     str,
     typer.Option(
         help="Set of gains: tuned (for error and variation of u), tracking (for error alone), "
-        "study (from the paper) or default (from the law's file)."
+        "study (chosen for the package's first study) or default (from the law's file)."
     ),
 ]
 Joints = Annotated[
@@ -153,10 +153,10 @@ PlantName = Annotated[
         metavar="PLANT",
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf: "
-        "FILE.xml:joint+joint@keyframe+held. The keyframe is the goal. Servos hold the other "
-        "joints; +locked welds them instead. Brackets after a joint hold its options: (motor) adds "
-        "a motor, (partner=pole) names a passive joint, (u_max=9,x0=0.2) sets the bound on u and "
-        "the start, and (measured) means read but not driven.",
+        "FILE.xml:joint+joint@keyframe+held. The keyframe is the goal. With +held, servos "
+        "hold the other joints; +locked welds them. Brackets after a joint hold its options: "
+        "(motor) adds a motor, (partner=pole) names a passive joint, (u_max=9,x0=0.2) sets the "
+        "bound on u and the start, and (measured) means read but not driven.",
     ),
 ]
 Quick = Annotated[

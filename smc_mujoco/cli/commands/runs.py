@@ -41,8 +41,8 @@ def run(
 
     Each run is repeated at half the physics step, and from an initial position changed by 1e-9 of
     its value. It is also repeated at a quarter of the step if u chatters, and under RK4 if there
-    are contacts. A score that changes by more than 5 % is marked. Without RK4, a change of 2.5 % at
-    half the step is enough.
+    are contacts. A score that changes by more than 5 % is marked. If the integrator is not RK4, a
+    change of more than 2.5 % at half the step is marked too.
 
     Exported traces keep full precision, and the unit of each signal.
 

@@ -39,7 +39,8 @@ def certify(
     ] = None,
     json: options.Json = None,
 ) -> None:
-    """Prove a law's region of attraction on a plant, and how far a bounded disturbance moves it.
+    """Prove a law's region of attraction on a plant, and its ultimate bound under a bounded
+    disturbance.
 
     The plant is its equation, integrated exactly, and the law acts at every instant. The command
     prints each theorem with its conditions and their margins, also where they fail. No theorem is
