@@ -24,12 +24,8 @@ PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH = 20  # characters of a name before it is broken
 HEADING_WIDTH = 8  # characters of a heading at least
 NARROW_WIDTH = 12  # characters of a line below a number where space is short
-COLUMNS_OF_TEX = 3  # of a table that fits a column of text
 MAX_HTML_ROWS = 40
 NO_BREAK = "\N{NO-BREAK SPACE}"
-WIDTH_HINT = (
-    r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics="
-)
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
 TEX |= {
@@ -195,10 +191,7 @@ class Tabular:
         Words in cells of numbers become letters, which a line under the table explains.
         """
         marks: dict[str, str] = {}
-        about = [self.title, *self.notes, "needs booktabs"]
-        if len(self.headings) > COLUMNS_OF_TEX:
-            about.append(WIDTH_HINT)
-        lines = [f"% {text}" for text in about if text]
+        lines = [f"% {text}" for text in (self.title, *self.notes, "needs booktabs") if text]
         lines += [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",

@@ -362,13 +362,14 @@ def mean_window(traces: Sequence[Trace]) -> float:
 
 
 def peaks(y: Array, trace: Trace) -> Array:
-    """Return the largest of y (K+1,) within a window before each sample, (K+1, 1), or MIN_ERROR if
-    that is more.
+    """Return the largest of y (K+1,) within a window before each sample, the first window as a
+    whole, (K+1, 1), or MIN_ERROR if that is more.
     """
     from scipy.ndimage import maximum_filter1d
 
     width = window(trace)
     largest = maximum_filter1d(y, width, mode="nearest", origin=(width - 1) // 2)
+    largest[:width] = y[:width].max()
     return np.maximum(largest, MIN_ERROR)[:, None]
 
 
@@ -568,8 +569,9 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     if not shared or height < MIN_WORDS * size:
         return
     forever = [one for one in shared if one[1] == np.inf]
-    choices = [agreement_words(shared, names, True), agreement_words(forever, names, True)]
-    choices += [agreement_words(shared, names, False), agreement_words(forever, names, False)]
+    choices = []
+    for named in (True, False):
+        choices += [agreement_words(which, names, named) for which in (shared, forever)]
     fitting = [words for words in choices if words and style.width(words, size) <= room]
     if not fitting:
         return

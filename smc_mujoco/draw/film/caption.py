@@ -68,9 +68,11 @@ class Caption:
         self.title, self.title_size = fitted(title, inside, LETTERS * s, bold=True)
         self.close = f"last periods, deflections × {factor:g}"
         clock = style.width("00.000 s", LETTERS * s, bold=True)
-        self.room = inside - clock - self.text_width("8× slower") - (4 * PAD + EDGE) * s
+        self.room = inside - clock - self.text_width("8× slower") - (6 * PAD + EDGE) * s
         sources = [trace.scenario.law.source.words for trace in traces]
         self.source = by_words(dict(zip(names, sources, strict=True)))
+        if self.text_width(self.source) > self.room:  # in the order of the machines
+            self.source = f"gains: {', '.join(sources)}"
         said = [*key(traces, scales), self.source]
         while said and self.text_width(" · ".join(said)) > self.room:
             said.pop()
@@ -204,7 +206,7 @@ class Caption:
                 pace = f"{1.0 / speed:.3g}× slower"
                 look = (style.INK, None)
             end = right - style.width("00.000 s", LETTERS * s, bold=True) - PAD * s
-            start = end - self.text_width(pace) - 2 * PAD * s
+            start = end - self.text_width(pace) - 4 * PAD * s
             self.write(draw, (start, y - half, end, y + half), pace, *look)
 
     def write(
