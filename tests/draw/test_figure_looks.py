@@ -409,7 +409,9 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size, monk
     assert len(dots) == 6
     assert len({to_hex(dot.get_color()) for dot in dots}) == 3
     assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
-    assert page.axes[0].get_gridspec().ncols == (1 if size == COLUMN else 3)
+    grid = page.axes[0].get_gridspec()
+    assert grid is not None
+    assert grid.ncols == (1 if size == COLUMN else 3)
     with pytest.raises(smc.ScenarioError, match="unknown metric 'itaee': did you mean 'itae'"):
         smc.plot(Rows(), metrics=["itaee"])
 
