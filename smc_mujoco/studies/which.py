@@ -219,7 +219,7 @@ def which(
 
 
 def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the metrics and the properties among the needs, by default metrics."""
+    """Return the metrics and the properties among the needs; without metrics, DEFAULT_NEEDS."""
     compared, properties = [], []
     given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
     for need in given:

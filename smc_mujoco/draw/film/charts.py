@@ -185,12 +185,15 @@ class Charts:
                 if time <= t[-1] + 1e-9 and np.isfinite(y[0]):
                     lasting.append((now, float(np.interp(time, t, y)), colour))
             dots += reversed(lasting)  # the first on top
-        mask = Image.new("L", charts.shape[1::-1])
-        for (t, line), colour in zip(reversed(self.flights), reversed(self.colours), strict=False):
-            flown = line[t <= time + 1e-9]
-            ImageDraw.Draw(mask).line(flown.ravel().tolist(), 255, 3 * self.dot)
-            dots.append((*flown[-1].tolist(), colour))
-        charts = np.where(np.asarray(mask)[..., None] > 0, self.full, charts)
+        if self.flights:
+            mask = Image.new("L", charts.shape[1::-1])
+            for (t, line), colour in zip(
+                reversed(self.flights), reversed(self.colours), strict=False
+            ):
+                flown = line[t <= time + 1e-9]
+                ImageDraw.Draw(mask).line(flown.ravel().tolist(), 255, 3 * self.dot)
+                dots.append((*flown[-1].tolist(), colour))
+            charts = np.where(np.asarray(mask)[..., None] > 0, self.full, charts)
         image = Image.fromarray(charts)
         for x, y, colour in dots:
             self.disc(image, x + 0.5, y + 0.5, self.dot + 1.5, style.PAPER)

@@ -24,9 +24,8 @@ POSES = 192  # of a trace, at which what must be in the picture is found
 MAX_FIXED_SIZE = 4.0
 NEAR_SHARE = 0.1
 STAND_SHARE = 0.8
-FLOOR_SHARE = (
-    0.3  # a foot higher than it hangs a machine; a floor of the model so near is its floor
-)
+# a machine whose foot is higher hangs from it; a floor of the model that is so near is its floor
+FLOOR_SHARE = 0.3
 NO_FLOOR = 20.0  # sizes over a floor that is not seen
 FOLLOWED_TRAVEL = 1.0  # sizes of a machine: one that goes farther is followed; chosen
 FOLLOW_TIME = 0.25  # s, over which the followed place is a mean; chosen
