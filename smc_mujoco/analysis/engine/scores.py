@@ -14,8 +14,13 @@ from numba import njit
 from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
 from smc_mujoco.metrics.conventions import SETTLING_BAND
 
-# without wrappers for Python, which would take half the time to compile
-OPTIONS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# without wrappers for Python, which would take half the time to compile; and LLVM inlines all of
+# them, so that no call is left in a step
+OPTIONS: dict[str, Any] = {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "forceinline": True,
+}
 own = njit(error_model="numpy", **OPTIONS)
 RESTING = ("settling_time", "rest_share")  # of a reference that does not move
 
