@@ -18,8 +18,8 @@ from rich.console import Console
 from rich.table import Column, Table
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import entry as entries
 from smc_mujoco.cli.tables import titled
+from smc_mujoco.problems import entry as entries
 
 BOARDS = {  # kind of row -> title, headings of columns, digits after the point
     Row: (

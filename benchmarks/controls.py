@@ -28,9 +28,9 @@ from collections.abc import Iterable
 import numpy as np
 from oracle_flight import knowing, oracle_flight
 
-from smc_mujoco.benchmark.problem import Problem
 from smc_mujoco.control.from_text import law
 from smc_mujoco.control.law import FREE_BODY, Law, law_function
+from smc_mujoco.problems.problem import Problem
 from smc_mujoco.simulation.scenario import Scenario
 
 # plant -> fall, in m/s^2, or of a rotary arm 1/s^2: gravity over its length

@@ -31,11 +31,11 @@ import controls
 import numpy as np
 from scipy.stats import kendalltau, rankdata, spearmanr
 
-from smc_mujoco.benchmark import enter, suite
-from smc_mujoco.benchmark import problem as problems
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.problems import enter, suite
+from smc_mujoco.problems import problem as problems
 from smc_mujoco.simulation.run import stream
 
 INSTANCES = 7  # of each problem, for medians of laws

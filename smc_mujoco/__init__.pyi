@@ -11,8 +11,6 @@ from smc_mujoco import signals as signals
 from smc_mujoco.analysis.margins import margins as margins
 from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty as Uncertainty
-from smc_mujoco.benchmark.problem import problem as problem
-from smc_mujoco.benchmark.results import results as results
 from smc_mujoco.cli.main import play as play
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.control.estimator import estimator as estimator
@@ -43,6 +41,8 @@ from smc_mujoco.mechanisms.hardware.obstacles import Wall as Wall
 from smc_mujoco.mechanisms.plant import plant as plant
 from smc_mujoco.mechanisms.plant import plants as plants
 from smc_mujoco.metrics.catalogue import scores as scores
+from smc_mujoco.problems.problem import problem as problem
+from smc_mujoco.problems.results import results as results
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.grid import starts as starts

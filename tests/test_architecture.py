@@ -40,7 +40,7 @@ ROOMS = (
     "cli",
     "exchange",
     "evidence",
-    "benchmark",
+    "problems",
 )
 ANNEXES = ROOMS[-3:]
 HEAVY = {

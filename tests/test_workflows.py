@@ -157,7 +157,7 @@ def commit(folder, *paths):
     [
         (["entries/soft_relay/law.py", "entries/soft_relay/entry.toml"], "entries/soft_relay"),
         (["entries/one/law.py", "entries/two/law.py"], None),
-        (["entries/one/law.py", "smc_mujoco/benchmark/rules/1.toml"], None),
+        (["entries/one/law.py", "smc_mujoco/problems/rules/1.toml"], None),
         (["entries/one; id/law.py"], None),
         ([], None),
     ],

@@ -4,7 +4,7 @@ import importlib
 import importlib.util
 from types import ModuleType
 
-ANNEXES = ("exchange", "evidence", "benchmark")
+ANNEXES = ("exchange", "evidence", "problems")
 
 
 def module(name: str, what: str) -> ModuleType:

@@ -9,7 +9,7 @@ from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws
 
-ANNEXES = ("evidence", "benchmark")  # with laws that are not in the catalogue, as those of rigs
+ANNEXES = ("evidence", "problems")  # with laws that are not in the catalogue, as those of rigs
 
 
 def describe(c: Component) -> Fields:

@@ -119,7 +119,7 @@ CHILDREN = {  # what starts a process -> code that waits for it for ever
     "worker": "guard.run_isolated('waits', {}, 600.0)",
     "compiler": "os.environ['CC'] = './cc'; smc.exchange.law_from_c('hangs.c')",
     "law in C": "smc.exchange.law_from_c('hangs.c', timeout=600.0)",
-    "entry": "from smc_mujoco.benchmark.enter import enter; enter('entry', instances=1)",
+    "entry": "from smc_mujoco.problems.enter import enter; enter('entry', instances=1)",
     "renderer": "from smc_mujoco.common import gl; gl.probe('egl', open('waits.py').read())",
     "command": "process.timed(['sh', '-c', 'sleep 100 & sleep 100'], 600.0, output=False)",
 }

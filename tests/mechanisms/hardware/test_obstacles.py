@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import problem
 from smc_mujoco.metrics.tip import contacts
+from smc_mujoco.problems import problem
 from smc_mujoco.simulation import conditions
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import states

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import enter as entering
-from smc_mujoco.benchmark import entry, results, runs, suite
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.problems import enter as entering
+from smc_mujoco.problems import entry, results, runs, suite
 
 LAW = """import math
 

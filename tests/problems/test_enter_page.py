@@ -7,7 +7,7 @@ import pytest
 from helpers.pages import ROOT, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import enter, entry, pages, suite
+from smc_mujoco.problems import enter, entry, pages, suite
 
 PAGE = ROOT / "docs" / "enter.md"
 EXAMPLES = sorted(path for path in (ROOT / "examples" / "entries").iterdir() if path.is_dir())

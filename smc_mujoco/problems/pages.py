@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.benchmark import suite
-from smc_mujoco.benchmark.results import MEASURE, TITLES, WORDS, Board, Results, sound
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing, slug
 from smc_mujoco.common.text import number
+from smc_mujoco.problems import suite
+from smc_mujoco.problems.results import MEASURE, TITLES, WORDS, Board, Results, sound
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -60,10 +60,10 @@ def enter(
     Example: smc-mujoco enter entries/soft_relay --site
     """
     with delay_ctrl_c():
-        from smc_mujoco.benchmark import enter as entering
-        from smc_mujoco.benchmark import pages
-        from smc_mujoco.benchmark.results import TITLES
-        from smc_mujoco.benchmark.results import results as load
+        from smc_mujoco.problems import enter as entering
+        from smc_mujoco.problems import pages
+        from smc_mujoco.problems.results import TITLES
+        from smc_mujoco.problems.results import results as load
 
     terminal = Terminal()
     earlier = None if against is None else load(against)

@@ -7,9 +7,9 @@ in if (condition + 2 plant + version) mod 5 is below 3, or 5.
 
 from pathlib import Path
 
-from smc_mujoco.benchmark.problem import problem, rules
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.errors import find
+from smc_mujoco.problems.problem import problem, rules
 
 SUITES = Path(__file__).parent / "suites"
 PERIOD = 5  # of the pattern

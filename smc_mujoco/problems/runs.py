@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.benchmark.problem import MEASURES, Problem, problem
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.problems.problem import MEASURES, Problem, problem
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import table as tables

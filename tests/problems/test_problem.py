@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import problem as problems
 from smc_mujoco.control.law import law_function
+from smc_mujoco.problems import problem as problems
 
 pytestmark = pytest.mark.quick
 

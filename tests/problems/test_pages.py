@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import enter, pages, runs, suite
-from smc_mujoco.benchmark.enter import RESULT, TABLE
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import write_json
+from smc_mujoco.problems import enter, pages, runs, suite
+from smc_mujoco.problems.enter import RESULT, TABLE
 
 pytestmark = pytest.mark.quick
 PROBLEMS = suite.suite("smc-30@1")

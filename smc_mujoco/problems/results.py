@@ -22,13 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.benchmark import enter, runs, suite
-from smc_mujoco.benchmark.enter import RESULT, TABLE
-from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Fields, Names, Numbers
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
+from smc_mujoco.problems import enter, runs, suite
+from smc_mujoco.problems.enter import RESULT, TABLE
+from smc_mujoco.problems.problem import problem
 
 MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 TITLES = {

@@ -11,7 +11,7 @@ import problems as script
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import problem, suite
+from smc_mujoco.problems import problem, suite
 
 CELL = "duffing/noise@1"
 FRESH = 5  # a seed from which nothing was frozen

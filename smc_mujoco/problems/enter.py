@@ -18,9 +18,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from smc_mujoco.benchmark import entry as entries
-from smc_mujoco.benchmark import runs, suite
-from smc_mujoco.benchmark.problem import Problem, problem
 from smc_mujoco.common import guard
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.cache import cached
@@ -28,6 +25,9 @@ from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
 from smc_mujoco.common.version import versions
+from smc_mujoco.problems import entry as entries
+from smc_mujoco.problems import runs, suite
+from smc_mujoco.problems.problem import Problem, problem
 
 START_TIME = 120.0  # s, for imports and compilation; chosen
 RUN_TIME = 1.0  # s a run, thirty times what a compiled law takes; chosen
