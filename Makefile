@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build report gains gallery bench gpu lock setup
+.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build report gains gallery bench size gpu lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -88,6 +88,9 @@ bench: ## speed, beside bare MuJoCo and other packages
 	$(BIN)/python benchmarks/study.py --quick
 	$(BIN)/python benchmarks/memory.py
 	$(BIN)/python benchmarks/agents.py --quick
+
+size: ## tokens by room, density, the largest files and functions, beside the last release's
+	@python3 benchmarks/size.py
 
 gpu: ## the fast engine on a CUDA device, beside the processor; "no device" elsewhere
 	@$(BIN)/python -c "import numba, mujoco" 2>/dev/null || ./setup.sh

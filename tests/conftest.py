@@ -3,14 +3,12 @@ testing plugins.
 
     pytest --quick            # the first case of each test, in files that are marked quick
     pytest -m "not slow"      # without tests of over 0.3 s whose lines faster ones run, too
-    pytest -k NAME            # only files that may hold the name are imported
 
 Compiled code is kept in one folder, so that all workers, all child processes, and copies of the
 package that tests install elsewhere compile a function once. Bytecode is kept too: otherwise each
 worker would compile all tests again.
 """
 
-import ast
 import gc
 import importlib
 import os
@@ -48,10 +46,11 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Take no record of a case for unused where only first cases run: syrupy tells tests apart, not
+    """Take no record for unused where only first cases run, or none: syrupy tells tests apart, not
     their cases.
     """
-    config.option.disable_unused_snapshots |= config.getoption("quick")
+    partly = config.getoption("quick") or config.getoption("collectonly")
+    config.option.disable_unused_snapshots |= partly
 
 
 def pytest_collection() -> None:
@@ -69,37 +68,12 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out files before their import: those that are not marked quick, where quick tests are
-    asked for, and those that cannot hold what `-k` names.
+    """Leave out files that are not marked quick before their import, where quick tests are asked
+    for.
     """
-    if collection_path.suffix != ".py":
+    if collection_path.suffix != ".py" or not config.getoption("quick"):
         return None
-    source = collection_path.read_text(encoding="utf-8")
-    if config.getoption("quick") and "pytest.mark.quick" not in source:
-        return True
-    return not may_hold(config.getoption("keyword"), f"{collection_path} {source}") or None
-
-
-def may_hold(expression: str, text: str) -> bool:
-    """Return whether a file whose path and source are this text may hold a test that `-k` selects.
-
-    Only what is made of plain words, `and` and `or` is looked for.
-    """
-    try:
-        return _possible(ast.parse(expression.strip(), mode="eval").body, text.lower())
-    except SyntaxError:
-        return True
-
-
-def _possible(node: ast.expr, text: str) -> bool:
-    if isinstance(node, ast.Name):
-        return node.id.lower() in text
-    if isinstance(node, ast.BoolOp):
-        parts = [_possible(value, text) for value in node.values]
-        if isinstance(node.op, ast.And):
-            return all(parts)
-        return any(parts)
-    return True
+    return "pytest.mark.quick" not in collection_path.read_text(encoding="utf-8") or None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -13,6 +13,7 @@ import pytest
 from helpers.commands import python
 
 import smc_mujoco as smc
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 
 pytestmark = pytest.mark.quick
 
@@ -57,6 +58,9 @@ HEAVY = {
 }
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
+# methods of parts and signals, which their base classes explain
+PROTOCOLS = {*vars(Part), *vars(Friction), *vars(Actuator)}
+PROTOCOLS |= {"value", "bounds", "parameters", "edit_on", "placed", "meets"}
 # modules of public names, which anything may import
 SHELVES = {"signals", "hardware", "errors", "design", "audits", "fidelity"}
 PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
@@ -206,6 +210,21 @@ def test_a_circle_through_importlib_is_seen(tmp_path):
 # what an import costs
 
 
+def test_whoever_runs_and_compares_loads_no_annex(tmp_path):
+    code = """
+import sys
+import smc_mujoco as smc
+trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=0.01))
+smc.score(trace), smc.figure(trace), smc.film
+smc.compare("pid", "duffing", "nominal", seeds=1, duration=0.1, out="compared", progress=False)
+print(*sys.modules)
+"""
+    loaded = python("-c", code, folder=tmp_path).stdout.splitlines()[-1].split()
+    rooms = {name.split(".")[1] for name in loaded if name.startswith("smc_mujoco.")}
+    assert "simulation" in rooms
+    assert rooms.isdisjoint(ANNEXES)
+
+
 @pytest.mark.parametrize(
     ("name", "needed"),
     [
@@ -338,8 +357,7 @@ def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> boo
     """
     if path.parent.name in CATALOGUES or ast.unparse(node.body[0]) == "...":
         return True
-    of_part = "edit edit_on fields structure placed meets numbers start channels suits exact friction_rows"
-    return node.name in ("value", "bounds", "parameters", "stage_force", *of_part.split())
+    return node.name in PROTOCOLS
 
 
 def test_everything_public_is_explained():
@@ -355,6 +373,16 @@ def test_everything_public_is_explained():
             if not ast.get_docstring(node) and not explained_elsewhere(path, node):
                 silent.append(f"{node.name} of {label(path)}")
     assert silent == []
+
+
+def test_a_part_by_the_protocol_needs_no_docstring_for_its_functions():
+    methods = ["force", "stage_force", "brake", "act", "push", "read", "numbers", "start"]
+    lines = [f"    def {name}(y, p, memory): pass" for name in methods]
+    tree = ast.parse("\n".join(["class Rubber(Friction):", *lines]))
+    _, *found = public(tree)
+    assert [node.name for node in found] == methods
+    path = PACKAGE / "mechanisms" / "hardware" / "rubber.py"
+    assert all(explained_elsewhere(path, node) for node in found)
 
 
 def test_no_file_names_a_folder_of_one_machine():
