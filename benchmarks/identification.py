@@ -128,7 +128,7 @@ def main(seeds, share):
         rng = np.random.default_rng(seed)
         for name, plant, truth, record in machines(rng, share):
             start = {key: value * rng.choice((0.8, 1.2)) for key, value in truth.items()}
-            found = smc.audits.identify(plant, record, list(truth), start=start, starts=1)
+            found = smc.identify(plant, record, list(truth), start=start, starts=1)
             z.setdefault(name, []).append(
                 [(found.values[key] - truth[key]) / found.errors[key] for key in truth]
             )

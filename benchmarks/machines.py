@@ -27,7 +27,7 @@ from twin_figures import Order, TwinFigure
 
 import smc_mujoco as smc
 from smc_mujoco.common.version import versions
-from smc_mujoco.evidence.rigs.rig import Rig, percentages
+from smc_mujoco.identification.rig import Rig, percentages
 from smc_mujoco.simulation.time_series import TimeSeries
 
 STEP = Path(__file__).parents[1] / "tests" / "evidence" / "rigs" / "qube_servo_3_step.csv"

@@ -12,7 +12,7 @@ import numpy as np
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs.machines.emps import PERIOD
-from smc_mujoco.evidence.rigs.rig import Rig
+from smc_mujoco.identification.rig import Rig
 from smc_mujoco.simulation.time_series import TimeSeries
 
 SAMPLES, LAP = 24_841, 6_240  # of the record, and of the program's period

@@ -22,11 +22,12 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Surfaces, estimators, policies: surface, estimator, estimator_function, policy
     Signals and time: Signal, Jump, Fault, Clock
     Analyse: worst_case, sensitivity, Uncertainty
-    Benchmark: problem, results, rig
+    Machines: rig, rigs, identify
+    Benchmark: problem, results
 
 What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, series),
 `smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
-attraction), `smc.audits` (claims of papers, certificates, orders of accuracy, the report, rigs),
+attraction), `smc.audits` (claims of papers, certificates, orders of accuracy, the report),
 `smc.fidelity`, `smc.metrics` (of joints and tips), `smc.exchange` (laws from and to C and FMUs),
 `smc.envs` (environments for agents), `smc.errors` (warnings) and `smc.paper`.
 

@@ -24,9 +24,11 @@ from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import film as film
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.draw.studio import view as view
-from smc_mujoco.evidence.rigs.rig import rig as rig
 from smc_mujoco.exchange.law_from import law_from as law_from
 from smc_mujoco.exchange.policy import policy as policy
+from smc_mujoco.identification.identify import identify as identify
+from smc_mujoco.identification.rig import rig as rig
+from smc_mujoco.identification.rig import rigs as rigs
 from smc_mujoco.mechanisms.custom.plant_from import Channel as Channel
 from smc_mujoco.mechanisms.custom.plant_from import plant_from as plant_from
 from smc_mujoco.mechanisms.hardware.backlash import Backlash as Backlash

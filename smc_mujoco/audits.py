@@ -1,6 +1,4 @@
-"""Audits of papers, laws and machines: claims, certificates, orders of accuracy, the whole study;
-rigs, and parameters from their records.
-"""
+"""Audits of papers and laws: claims, certificates, orders of accuracy, the whole study."""
 
 from smc_mujoco.common import lazy
 

@@ -3,5 +3,3 @@ from smc_mujoco.evidence.audit.audit import audit as audit
 from smc_mujoco.evidence.audit.audit import claims as claims
 from smc_mujoco.evidence.certificates.maker import certify as certify
 from smc_mujoco.evidence.report import report as report
-from smc_mujoco.evidence.rigs.identify import identify as identify
-from smc_mujoco.evidence.rigs.rig import rigs as rigs

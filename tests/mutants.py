@@ -1,7 +1,7 @@
 """Draw small faults of a room's code at random, and say which of them the room's tests find.
 
     make mutants ROOM=metrics                      # ten mutants, from seed 0
-    make mutants ROOM=evidence/rigs SEED=7 COUNT=4
+    make mutants ROOM=identification SEED=7 COUNT=4
 
 A mutant that lives is equivalent, or shows what no test holds.
 """

@@ -36,6 +36,7 @@ ROOMS = (
     "analysis",
     "draw",
     "studies",
+    "identification",
     "envs",
     "testing",
     "cli",
@@ -124,7 +125,8 @@ def module(name: str) -> str:
 def test_the_package_has_these_rooms_and_no_other():
     entries = set()
     for path in PACKAGE.iterdir():
-        if path.name != "__pycache__":
+        # git leaves the folder of a room that moved, with what Python compiled in it
+        if path.is_file() or any(path.rglob("*.py")):
             entries.add(path.name)
     assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "audits.pyi", "py.typed"} == {
         *ROOMS,
@@ -165,7 +167,7 @@ trace = smc.run(scenarios)[0]
 smc.figure(trace, "figure.png")
 smc.leaderboard(smc.study(scenarios, "study"))
 smc.plot
-for name in "exchange law_from rig paper problem".split():
+for name in "exchange law_from paper problem".split():
     try:
         getattr(smc, name)
     except smc.ScenarioError as error:

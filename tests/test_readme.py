@@ -24,7 +24,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.common import gl
 from smc_mujoco.common.files import slug
-from smc_mujoco.evidence.rigs import ensemble
+from smc_mujoco.identification import ensemble
 from smc_mujoco.studies import fair_gains, scene
 
 pytestmark = pytest.mark.quick

@@ -42,11 +42,11 @@ OTHERS = {  # title -> names of modules that are no public names
     studies.scene.Outcome
     draw.film.film.Frames
     evidence.certificates.certificate.Certificate
-    evidence.rigs.rig.Rig
+    identification.rig.Rig
     envs.flight_env.FlightEnv
     studies.which.Advice
     analysis.tuning.result.Tuned
-    evidence.rigs.identify.Identified
+    identification.identify.Identified
     evidence.accuracy.accuracy.AccuracyTable
     analysis.chattering.Chattering
     analysis.step_halving.StepChange

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, catalogue, runs, studies
+from smc_mujoco.cli.commands import analysis, catalogue, rigs, runs, studies
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError, printable
@@ -39,6 +39,7 @@ GROUPS: dict[str, list[Callable[..., None]]] = {
         analysis.sensitivity,
         analysis.chatter,
     ],
+    "Machines": [rigs.rig],
 }
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     more = annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS

@@ -42,13 +42,13 @@ CALLS = {
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [
-        "evidence.rigs.ensemble.study",
-        "evidence.rigs.ensemble.leaderboard",
+        "identification.ensemble.study",
+        "identification.ensemble.leaderboard",
     ],
     "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
     "--threads 2 --defaults --relevant 0.05": [
-        "evidence.rigs.ensemble.study",
-        "evidence.rigs.ensemble.leaderboard",
+        "identification.ensemble.study",
+        "identification.ensemble.leaderboard",
     ],
     "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "

@@ -185,10 +185,10 @@ def test_a_missing_package_is_named_with_its_cure(monkeypatch):
 def test_a_missing_annex_is_named_and_no_other_module(monkeypatch):
     monkeypatch.setattr(annexes, "installed", lambda annex: annex != "evidence")
     with pytest.raises(extras.MissingPackageError) as missing:
-        annexes.module("smc_mujoco.evidence.rigs.rig", "a rig")
+        annexes.module("smc_mujoco.evidence.audit.audit", "a claim")
     assert (
         str(missing.value)
-        == "a rig needs smc_mujoco.evidence, which is missing here: install all of smc-mujoco"
+        == "a claim needs smc_mujoco.evidence, which is missing here: install all of smc-mujoco"
     )
     assert annexes.module("smc_mujoco.exchange", "C").__name__ == "smc_mujoco.exchange"
     assert annexes.module("smc_mujoco.common.text", "a number").__name__ == "smc_mujoco.common.text"

@@ -16,8 +16,8 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
-from smc_mujoco.evidence.rigs.identify import Identified
-from smc_mujoco.evidence.rigs.rig import Fall
+from smc_mujoco.identification.identify import Identified
+from smc_mujoco.identification.rig import Fall
 
 CHECKS = {
     "duffing: settling time, s": {
@@ -189,10 +189,10 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.report.report": lambda *_, **__: Path("report.html"),
     },
     "rig": {
-        "evidence.rigs.identify.identify": lambda of, many, *_, **__: identified(len(many)),
-        "evidence.rigs.rig.rig": repeated,
-        "evidence.rigs.records.load": lambda file, names: {"t": np.array([3.0, 4.0])},
-        "evidence.rigs.figure.residual_figure": [Path("run.svg")],
+        "identification.identify.identify": lambda of, many, *_, **__: identified(len(many)),
+        "identification.rig.rig": repeated,
+        "identification.records.load": lambda file, names: {"t": np.array([3.0, 4.0])},
+        "identification.residual_figure.residual_figure": [Path("run.svg")],
         "simulation.run.run": lambda runs: runs,
         "cli.scene.filmed": [Path("film.mp4")],
     },

@@ -342,17 +342,15 @@ def _attacked_cases(
     """Return the scenarios of each law to attack: one on a plant, one for each parameter set of a
     rig.
     """
-    from smc_mujoco.common import annexes
     from smc_mujoco.control import gain_sets
+    from smc_mujoco.identification import ensemble
+    from smc_mujoco.identification.rig import rig as find_rig
+    from smc_mujoco.identification.rig import rigs
     from smc_mujoco.mechanisms.named import as_plant
     from smc_mujoco.simulation.grid import case
 
-    rigs = ()
-    if annexes.installed("evidence"):
-        rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig").rigs()
-    if plant in rigs:
-        rig = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig").rig(plant)
-        ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
+    if plant in rigs():
+        rig = find_rig(plant)
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
         return [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]

@@ -162,7 +162,6 @@ def compare(
     arm.tex
     """
     with delay_ctrl_c():
-        from smc_mujoco.common import annexes
         from smc_mujoco.common.files import with_ending
         from smc_mujoco.studies.compare import compare as run
         from smc_mujoco.studies.leaderboard import METRICS
@@ -191,8 +190,10 @@ def compare(
                 "--condition, --gains, --worst, --quick, --no-tune, --figure, --latex, --seed "
                 "and --device"
             )
-        ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
-        machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
+        from smc_mujoco.identification import ensemble
+        from smc_mujoco.identification.rig import rig as find_rig
+
+        machine = find_rig(rig)
         chosen = options.laws(law, of_rig=machine.laws) or None
         table, boards, found = ensemble.compare(machine, chosen, seeds, **shared)
         terminal.print(boards)

@@ -1,3 +1,1 @@
-"""Rigs: real machines with published or identified numbers, their records, and identification from
-records.
-"""
+"""Rigs: real machines with published or identified numbers, and their own controllers."""

@@ -73,7 +73,7 @@ def test_noise_of_the_encoders_does_not_make_a_link_lighter(swung):
     noisy = record | {
         f"pos_meas{i}": record[f"pos_meas{i}"] + rng.normal(0.0, 1e-3, 2001) for i in (1, 2)
     }
-    found = smc.audits.identify(rig, noisy, ("r2", "I2"), starts=1)
+    found = smc.identify(rig, noisy, ("r2", "I2"), starts=1)
     assert found.values["I2"] == pytest.approx(rig.values["I2"], rel=0.05)
 
 
@@ -113,6 +113,6 @@ def test_torques_of_unused_records_are_as_far_off_as_the_page_tells(known):
 
 @pytest.mark.slow
 def test_the_numbers_are_those_that_the_records_give(known):
-    found = smc.audits.identify(RIG, [known[name] for name in TRAIN], starts=1, most=3)
+    found = smc.identify(RIG, [known[name] for name in TRAIN], starts=1, most=3)
     for name in ("r1", "r2", "I1", "I2", "cf1", "cf2"):
         assert found.values[name] == pytest.approx(RIG.values[name], rel=0.01)

@@ -10,7 +10,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control.component import Component
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig, Values
+from smc_mujoco.identification.rig import Quantity, Rig, Values
 from smc_mujoco.mechanisms.plant import Plant
 
 pytestmark = pytest.mark.quick
@@ -89,7 +89,7 @@ def test_the_numbers_of_a_machine_and_their_sources_are_as_recorded(name, snapsh
     assert "\n".join(lines(smc.rig(name))) == snapshot
 
 
-@pytest.mark.parametrize("name", smc.audits.rigs())
+@pytest.mark.parametrize("name", smc.rigs())
 def test_each_quantity_changes_the_machine(name):
     """From values where no term is 0."""
     rig = smc.rig(name)

@@ -10,7 +10,7 @@ from helpers.pages import ROOT
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs.machines.qube_servo import PERIOD, PITCH, START_TIME, zero
-from smc_mujoco.evidence.rigs.rig import Values
+from smc_mujoco.identification.rig import Values
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 RECORDS = ("12", "36")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 import smc_mujoco as smc
 from benchmarks import programs, twin_figures
 from benchmarks.twin_figures import TwinFigure
-from smc_mujoco.evidence.rigs import rig
+from smc_mujoco.identification import rig
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 
@@ -40,7 +40,7 @@ def test_every_record_that_a_rig_was_identified_from_has_rows():
     reported = set()
     for one in twin_figures.rows():
         reported.add(one.record)
-    for name in smc.audits.rigs():
+    for name in smc.rigs():
         assert set(smc.rig(name).identified_from) <= reported, name
 
 

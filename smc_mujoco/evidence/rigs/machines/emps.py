@@ -10,8 +10,8 @@ import numpy as np
 
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.evidence.rigs.controllers import cascade
-from smc_mujoco.evidence.rigs.records import Columns, Record
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
+from smc_mujoco.identification.records import Columns, Record
+from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant

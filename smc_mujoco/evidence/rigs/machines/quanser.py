@@ -9,7 +9,7 @@ records of one machine. The dead bands of the amplifiers are left out.
 import math
 
 from smc_mujoco.evidence.rigs import controllers
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import LuGre

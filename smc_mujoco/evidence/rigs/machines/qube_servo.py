@@ -12,8 +12,8 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.evidence.rigs.controllers import rotary, state_feedback
-from smc_mujoco.evidence.rigs.records import STATE_SAMPLES, Columns, Record, rate
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
+from smc_mujoco.identification.records import STATE_SAMPLES, Columns, Record, rate
+from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant

@@ -8,8 +8,8 @@ machine, models 1.0 to 3.0, disagree.
 
 import math
 
-from smc_mujoco.evidence.rigs.records import Columns
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
+from smc_mujoco.identification.records import Columns
+from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1

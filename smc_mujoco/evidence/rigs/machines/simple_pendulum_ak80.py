@@ -9,8 +9,8 @@ import math
 
 from smc_mujoco.control.law import law
 from smc_mujoco.control.source import SHIPPED, Search
-from smc_mujoco.evidence.rigs.records import Columns
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
+from smc_mujoco.identification.records import Columns
+from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import plant

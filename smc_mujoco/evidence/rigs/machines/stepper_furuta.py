@@ -18,8 +18,8 @@ from smc_mujoco.evidence.rigs.firmware import (
     TWO_STATES,
     firmware,
 )
-from smc_mujoco.evidence.rigs.records import Columns
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
+from smc_mujoco.identification.records import Columns
+from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.stepper import of_rig
 from smc_mujoco.mechanisms.plant import plant

@@ -13,7 +13,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
+from smc_mujoco.identification.records import Columns, Record, step_of
 from smc_mujoco.mechanisms.layout import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 

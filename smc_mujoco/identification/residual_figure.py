@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.evidence.rigs.records import Record
+from smc_mujoco.identification.records import Record
 
 ROW_HEIGHT = 2.6  # inches, height of a column's panels
 

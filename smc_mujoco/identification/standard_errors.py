@@ -19,8 +19,8 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.rigs import records
-from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
+from smc_mujoco.identification import records
+from smc_mujoco.identification.replays import Point, Replays, Slopes
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.signals import Noise
 

@@ -23,12 +23,12 @@ from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
-from smc_mujoco.evidence.rigs import search
-from smc_mujoco.evidence.rigs.records import Columns, Record
-from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
-from smc_mujoco.evidence.rigs.rig import Fall, Quantity, Rig, Source
-from smc_mujoco.evidence.rigs.rig import rig as find_rig
-from smc_mujoco.evidence.rigs.uncertainty import BLOCKS, MAX_CORRELATION, statistics
+from smc_mujoco.identification import gauss_newton
+from smc_mujoco.identification.records import Columns, Record
+from smc_mujoco.identification.replays import Point, Replays, Slopes
+from smc_mujoco.identification.rig import Fall, Quantity, Rig, Source
+from smc_mujoco.identification.rig import rig as find_rig
+from smc_mujoco.identification.standard_errors import BLOCKS, MAX_CORRELATION, statistics
 from smc_mujoco.mechanisms.layout import column_ends
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -164,7 +164,7 @@ class Identified:
         """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and
         PATH.png.
         """
-        from smc_mujoco.evidence.rigs.figure import residual_figure
+        from smc_mujoco.identification.residual_figure import residual_figure
 
         whole("record", record, 0, len(self.fits) - 1)
         predicted, measured, t = self.predictions[record]
@@ -268,15 +268,15 @@ def _solved(
     steps, (p,).
     """
     pieces = Replays(twin, names, data, False, report)
-    reached = search.search(pieces, starts, seed, most)
+    reached = gauss_newton.search(pieces, starts, seed, most)
     if twin.controller is None:
-        slopes, moved = search.accurate(pieces, reached)
-        return pieces, search.not_worse(pieces, slopes), moved
+        slopes, moved = gauss_newton.accurate(pieces, reached)
+        return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
     points = [closed.start, Point(reached.point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
         points += [closed.at_rest(point) for point in points]
-    slopes = search.refine(closed, search.better(closed, *points), most)
+    slopes = gauss_newton.refine(closed, gauss_newton.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
 

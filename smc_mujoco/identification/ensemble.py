@@ -20,7 +20,7 @@ from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
 from smc_mujoco.control.law import Law
-from smc_mujoco.evidence.rigs.rig import Rig, Values
+from smc_mujoco.identification.rig import Rig, Values
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, all_combinations, grid

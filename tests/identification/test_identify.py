@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs import identify as identification
-from smc_mujoco.evidence.rigs import records, uncertainty
-from smc_mujoco.evidence.rigs.figure import residual_figure
-from smc_mujoco.evidence.rigs.replays import Point, Replays
-from smc_mujoco.evidence.rigs.rig import Fall
+from smc_mujoco.identification import identify as identification
+from smc_mujoco.identification import records, standard_errors
+from smc_mujoco.identification.replays import Point, Replays
+from smc_mujoco.identification.residual_figure import residual_figure
+from smc_mujoco.identification.rig import Fall
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
@@ -79,7 +79,7 @@ def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
     offset.
     """
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
-    result = smc.audits.identify(
+    result = smc.identify(
         near,
         axis_record(0.6 + begin, begin),
         starts=1,
@@ -116,7 +116,7 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     far = AXIS.with_values({"mass": 2000.0})
     brief = smc.run(AXIS.scenario(duration=0.5, reference=smc.Sine(0.05, 8.0), x0=0.0))
     one, again, other = (
-        smc.audits.identify(
+        smc.identify(
             far,
             brief,
             ["mass"],
@@ -152,7 +152,7 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
             noise=noise,
         )
     )
-    result = smc.audits.identify(
+    result = smc.identify(
         AXIS,
         trace,
         ("mass", "viscous"),
@@ -174,7 +174,7 @@ def test_noise_is_read_off_a_moving_record():
 
 def test_parameters_that_cannot_be_told_apart_are_named(swung):
     with pytest.raises(smc.ScenarioError, match="in the records depends on torque_limit"):
-        smc.audits.identify(
+        smc.identify(
             PENDULUM,
             swung,
             ("inertia", "torque_limit"),
@@ -182,7 +182,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         )
     still = smc.run(AXIS.scenario(duration=0.06, x0=0.0))
     with pytest.raises(smc.ScenarioError, match=r"cannot tell|nothing in the records depends on"):
-        smc.audits.identify(AXIS, still, starts=1)
+        smc.identify(AXIS, still, starts=1)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
 )
 def test_what_cannot_be_found_is_named(rig, names, words):
     with pytest.raises(smc.ScenarioError, match=words):
-        smc.audits.identify(rig, {"t": [0]}, names)
+        smc.identify(rig, {"t": [0]}, names)
 
 
 def test_records_of_two_kinds_and_none_are_refused(moved):
@@ -206,7 +206,7 @@ def test_records_of_two_kinds_and_none_are_refused(moved):
         [moved, {"t": [0]}],
     ):
         with pytest.raises(smc.ScenarioError, match="records"):
-            smc.audits.identify("emps", records_given)
+            smc.identify("emps", records_given)
 
 
 def test_a_search_stays_within_its_ranges_to_the_last_bit():
@@ -299,9 +299,9 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """
     record = pushed(2026, seconds)
     rare = math.erfc(4.0 / math.sqrt(2.0))
-    found = smc.audits.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
+    found = smc.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
     assert min(found.fits[0].values()) >= min(found.fits_before[0].values())
-    free = uncertainty.BLOCKS[0] - 1
+    free = standard_errors.BLOCKS[0] - 1
     low, high = np.sqrt(chi2.ppf([rare / 2.0, 1.0 - rare / 2.0], free) / free) * [
         1.0,
         math.hypot(1.0, 0.5),
@@ -391,7 +391,7 @@ def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
 
 
 def test_drawn_sets_have_the_errors_and_correlations_found(moved):
-    found = smc.audits.identify(AXIS, moved, ["mass", "viscous"], starts=1, most=1)
+    found = smc.identify(AXIS, moved, ["mass", "viscous"], starts=1, most=1)
     rig = found.drawn(1000, seed=1)
     names = list(found.values)
     sets = np.array([[each[name] for name in names] for each in rig.ensemble])
@@ -407,7 +407,7 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
 
     It holds an offset of 340 N, and not the greater ones that the search tries.
     """
-    smc.audits.identify(
+    smc.identify(
         smc.rig("emps", offset=-340.0),
         moved,
         ["offset"],

@@ -50,7 +50,7 @@ def record():
 
 
 def test_every_number_has_a_source_and_its_licence():
-    for name in smc.audits.rigs():
+    for name in smc.rigs():
         for quantity, known in smc.rig(name).quantities.items():
             assert len(known.source) > 5, (name, quantity)
             if not known.source.startswith(("identified here", "chosen", "part of")):
@@ -61,7 +61,7 @@ def test_every_number_has_a_source_and_its_licence():
             assert known.least <= known.value <= known.most, (name, quantity)
 
 
-@pytest.mark.parametrize("name", smc.audits.rigs())
+@pytest.mark.parametrize("name", smc.rigs())
 def test_a_rig_makes_scenarios_of_its_machine(name):
     rig = smc.rig(name)
     scenario = rig.scenario("none", duration=0.02)

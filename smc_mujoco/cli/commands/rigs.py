@@ -130,7 +130,7 @@ def _list(terminal: Terminal) -> None:
     """List the rigs."""
     with delay_ctrl_c():
         from smc_mujoco.cli import tables
-        from smc_mujoco.evidence.rigs.rig import catalogue
+        from smc_mujoco.identification.rig import catalogue
 
     rows = []
     for name, known in catalogue().items():
@@ -151,10 +151,10 @@ def _fit(
 ) -> dict[str, Any]:
     """Find quantities of a rig, print them, and return them as JSON data."""
     with delay_ctrl_c():
-        from smc_mujoco.evidence.commands import tables
-        from smc_mujoco.evidence.rigs.identify import identify as find
-        from smc_mujoco.evidence.rigs.records import load
-        from smc_mujoco.evidence.rigs.rig import rigs
+        from smc_mujoco.cli import rig_tables
+        from smc_mujoco.identification.identify import identify as find
+        from smc_mujoco.identification.records import load
+        from smc_mujoco.identification.rig import rigs
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
@@ -168,7 +168,7 @@ def _fit(
         seed=seed,
         progress=True,
     )
-    for table in tables.identified(identified, [str(file) for file in files]):
+    for table in rig_tables.identified(identified, [str(file) for file in files]):
         terminal.print(table)
     for note in identified.notes:
         terminal.note(note, wrap=True)
@@ -191,11 +191,11 @@ def _repeat(
 ) -> None:
     """Show a record beside the runs of the rig's twins."""
     with delay_ctrl_c():
+        from smc_mujoco.cli import rig_tables
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.files import with_ending, writable
-        from smc_mujoco.evidence.commands import tables
-        from smc_mujoco.evidence.rigs.records import load
-        from smc_mujoco.evidence.rigs.rig import rig as find_rig
+        from smc_mujoco.identification.records import load
+        from smc_mujoco.identification.rig import rig as find_rig
         from smc_mujoco.simulation.run import run
         from smc_mujoco.simulation.trace import Trace
 
@@ -209,10 +209,10 @@ def _repeat(
     twins = {"twin": twin} | {name: twin.set(name) for name in sets}
     fits = {"twin": twin.fit(record)}
     fits |= {name: shown.fits([record])[0] for name, shown in twins.items() if name != "twin"}
-    terminal.print(tables.fits(twin.label, fits))
+    terminal.print(rig_tables.fits(twin.label, fits))
     title = f"{twin.name}: {file.stem}"
     if figure:
-        from smc_mujoco.evidence.rigs.figure import residual_figure
+        from smc_mujoco.identification.residual_figure import residual_figure
 
         predictions = {}
         for name, shown in twins.items():

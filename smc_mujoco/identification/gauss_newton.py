@@ -16,10 +16,10 @@ import itertools
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.evidence.rigs import inverse
-from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
-from smc_mujoco.evidence.rigs.rig import Values
-from smc_mujoco.evidence.rigs.uncertainty import jackknife
+from smc_mujoco.identification import inverse_dynamics
+from smc_mujoco.identification.replays import Point, Replays, Slopes, cost
+from smc_mujoco.identification.rig import Values
+from smc_mujoco.identification.standard_errors import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
@@ -68,20 +68,20 @@ def _by_torques(replays: Replays) -> Point | None:
     columns = dataclasses.replace(twin.columns, torque=tuple(f"torque of {x}" for x in joints))
     data = [twin.checked(record) for record in replays.data]
     direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
-    if not direct or not all(inverse.long_enough(record, columns) for record in data):
+    if not direct or not all(inverse_dynamics.long_enough(record, columns) for record in data):
         return None
     measured = []
     for record in data:
         u = record[twin.columns.u]
         record.update(dict.fromkeys(columns.torque, np.zeros_like(u)) | {columns.torque[0]: u})
-        measured.append(inverse.measured(record, columns))
+        measured.append(inverse_dynamics.measured(record, columns))
 
     def differences(values: Array) -> Array:
         quantities = twin.values | replays.values(Point(values, start.states))
         plant = twin.machine(Values(**quantities))["plant"]
         gaps = []
         for record, theirs in zip(data, measured, strict=True):
-            ours = inverse.torques(plant, record, columns)
+            ours = inverse_dynamics.torques(plant, record, columns)
             gaps += [ours[name] - theirs[name] for name in columns.torque]
         return np.nan_to_num(np.concatenate(gaps))
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.cli.main import app
-from smc_mujoco.evidence.rigs import ensemble
+from smc_mujoco.identification import ensemble
 
 PENDULUM = smc.rig("simple_pendulum_ak80")
 LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))

@@ -11,10 +11,10 @@ import pytest
 from helpers.sketch import made
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs import records
-from smc_mujoco.evidence.rigs.identify import POOR, SLOW, Identified
-from smc_mujoco.evidence.rigs.records import Columns, checked
-from smc_mujoco.evidence.rigs.rig import Fall
+from smc_mujoco.identification import records
+from smc_mujoco.identification.identify import POOR, SLOW, Identified
+from smc_mujoco.identification.records import Columns, checked
+from smc_mujoco.identification.rig import Fall
 
 pytestmark = pytest.mark.quick
 

@@ -11,10 +11,16 @@ import pytest
 from scipy.signal import butter, freqz
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs import identify as identification
-from smc_mujoco.evidence.rigs import inverse, records, replays, search, uncertainty
-from smc_mujoco.evidence.rigs.replays import Piece, Point, Replays, Slopes
-from smc_mujoco.evidence.rigs.rig import Fall, Quantity, fallen, percentages
+from smc_mujoco.identification import (
+    gauss_newton,
+    inverse_dynamics,
+    records,
+    replays,
+    standard_errors,
+)
+from smc_mujoco.identification import identify as identification
+from smc_mujoco.identification.replays import Piece, Point, Replays, Slopes
+from smc_mujoco.identification.rig import Fall, Quantity, fallen, percentages
 
 pytestmark = pytest.mark.quick
 
@@ -130,9 +136,9 @@ def test_a_step_is_least_squares_with_damping_within_a_factor_of_ten():
     curve = Curve(start=(1.0, 1.0))
     slopes = curve.slopes(curve.start)
     J, r = (np.concatenate(slopes.freed(rows)) for rows in (slopes.by_values, slopes.residuals))
-    np.testing.assert_allclose(search._moved(curve, slopes, 0.0), TRUE, atol=1e-6)
+    np.testing.assert_allclose(gauss_newton._moved(curve, slopes, 0.0), TRUE, atol=1e-6)
     damped = np.linalg.solve(J.T @ J * (1.0 + 0.5 * np.eye(2)), -J.T @ r)
-    np.testing.assert_allclose(search._moved(curve, slopes, 0.5), 1.0 + damped)
+    np.testing.assert_allclose(gauss_newton._moved(curve, slopes, 0.5), 1.0 + damped)
     for first, reached in (
         ((0.1, 1.0), 1.0),
         ((25.0, 1.0), 2.5),
@@ -141,7 +147,7 @@ def test_a_step_is_least_squares_with_damping_within_a_factor_of_ten():
     ):
         curve = Curve(start=first)
         slopes = curve.slopes(curve.start)
-        assert search._moved(curve, slopes, 0.0)[0] == pytest.approx(reached, rel=1e-3)
+        assert gauss_newton._moved(curve, slopes, 0.0)[0] == pytest.approx(reached, rel=1e-3)
 
 
 def test_moves_of_the_states_are_what_the_quantities_leave():
@@ -153,36 +159,36 @@ def test_moves_of_the_states_are_what_the_quantities_leave():
     np.testing.assert_allclose(after.point.values, TRUE)
     np.testing.assert_allclose(after.point.states.ravel(), [0.3, -0.3, 0.15], atol=1e-9)
     assert after.cost < 1e-20
-    variants = search._variants(curve, slopes, TRUE)
+    variants = gauss_newton._variants(curve, slopes, TRUE)
     expected = []
-    for share in (*search.SHARES, 0.0):
+    for share in (*gauss_newton.SHARES, 0.0):
         expected.append(share * np.array([0.3, -0.3, 0.15]))
     np.testing.assert_allclose([one.states.ravel() for one in variants], expected, atol=1e-9)
     curve.free = np.zeros(0, int)
-    assert len(search._variants(curve, slopes, TRUE)) == 1
+    assert len(gauss_newton._variants(curve, slopes, TRUE)) == 1
 
 
 def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start(monkeypatch):
-    monkeypatch.setattr(search, "_by_torques", None)
+    monkeypatch.setattr(gauss_newton, "_by_torques", None)
     curve = Curve(noise=0.002)
-    found = search.search(curve, 4, 0, 30)
+    found = gauss_newton.search(curve, 4, 0, 30)
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
     y = np.concatenate([piece.measured["y"] for piece in curve.pieces]) / SPREAD
     exact = np.linalg.lstsq(-rows, y, rcond=None)[0]
     np.testing.assert_allclose(found.point.values, exact[:2], rtol=1e-6)
     np.testing.assert_allclose(found.point.states.ravel(), exact[2:], atol=1e-6)
-    assert found.fit > search.GOOD_FIT
+    assert found.fit > gauss_newton.GOOD_FIT
     assert curve.evaluations < 80
-    none = search.refine(curve, curve.start, 0)
+    none = gauss_newton.refine(curve, curve.start, 0)
     assert none.point is not found.point
     np.testing.assert_array_equal(none.point.values, curve.start.values)
 
 
 def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
     curve = Curve(start=(0.5, 30.0))
-    points = search._random(curve, 3, 7)
+    points = gauss_newton._random(curve, 3, 7)
     drawn = np.array([one.values for one in curve.tried])
-    assert len(drawn) == 3 * search.CANDIDATES
+    assert len(drawn) == 3 * gauss_newton.CANDIDATES
     assert (drawn[:, 0] >= 0.01).all()
     assert (drawn[:, 0] > 10.0).any()
     assert (drawn[:, 0] <= 80.0).all()
@@ -191,23 +197,23 @@ def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
     assert {*np.sign(drawn[:, 1])} == {-1.0, 1.0}
     costs = curve.costs(list(curve.tried)).sum(axis=1).tolist()
     assert curve.costs(points).sum(axis=1).tolist() == sorted(costs)[:3]
-    again = search._random(Curve(start=(0.5, 30.0)), 3, 7)
+    again = gauss_newton._random(Curve(start=(0.5, 30.0)), 3, 7)
     assert [one.values.tolist() for one in again] == [one.values.tolist() for one in points]
-    assert search.better(curve, points[2], points[0], points[1]) is points[0]
+    assert gauss_newton.better(curve, points[2], points[0], points[1]) is points[0]
 
 
 def test_a_solution_that_is_worse_than_the_start_is_not_kept():
     curve = Curve(start=tuple(TRUE))
     bad = curve.slopes(Point(np.array([1.5, 3.0]), np.zeros((3, 1))))
-    kept = search.not_worse(curve, bad)
+    kept = gauss_newton.not_worse(curve, bad)
     np.testing.assert_allclose(kept.point.values, TRUE, atol=1e-6)
-    assert search.not_worse(curve, kept) is kept
+    assert gauss_newton.not_worse(curve, kept) is kept
 
 
 def test_a_jackknife_leaves_out_one_block_after_the_other():
     curve = Curve(noise=0.05)
-    slopes = search.refine(curve, curve.start, 5)
-    parts = math.ceil(uncertainty._blocks(slopes) / 3)
+    slopes = gauss_newton.refine(curve, curve.start, 5)
+    parts = math.ceil(standard_errors._blocks(slopes) / 3)
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
     y = np.concatenate(slopes.residuals)
     blocks = np.concatenate(
@@ -224,7 +230,7 @@ def test_a_jackknife_leaves_out_one_block_after_the_other():
     )
     every = np.linalg.lstsq(rows, y, rcond=None)[0][:2]
     expected = (len(found) - 1) / len(found) * (found - every).T @ (found - every)
-    np.testing.assert_allclose(uncertainty.jackknife(slopes), expected, rtol=1e-6)
+    np.testing.assert_allclose(standard_errors.jackknife(slopes), expected, rtol=1e-6)
     noise = 0.05 / SPREAD * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))[:2])
     np.testing.assert_allclose(np.sqrt(np.diag(expected)), noise, rtol=0.35)
 
@@ -250,9 +256,10 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
             )
             moved = inverse_normal @ (J.T @ noise)
             shares.append(
-                moved / uncertainty.by_correlation(slopes, J, uncertainty.independent(slopes))
+                moved
+                / standard_errors.by_correlation(slopes, J, standard_errors.independent(slopes))
             )
-            blocks.append(moved / np.sqrt(np.diag(uncertainty.jackknife(slopes))))
+            blocks.append(moved / np.sqrt(np.diag(standard_errors.jackknife(slopes))))
         assert low < np.sqrt(np.mean(np.square(shares))) < high
         assert (np.sqrt(np.mean(np.square(blocks))) > 2.0) == (memory > 0.0)
 
@@ -316,13 +323,13 @@ def test_replays_are_corrected_by_what_two_step_sizes_leave():
 
 def test_a_corrected_search_ends_when_a_halving_moves_nothing():
     curve = Curve(noise=0.002)
-    reached = search.search(curve, 1, 0, 30)
-    ideal, moved = search.accurate(curve, reached)
+    reached = gauss_newton.search(curve, 1, 0, 30)
+    ideal, moved = gauss_newton.accurate(curve, reached)
     assert ideal is reached
     assert moved.tolist() == [0.0, 0.0]
     curve.lag = 80.0
-    slopes, moved = search.accurate(curve, curve.slopes(reached.point))
-    assert (moved <= 0.5 * np.sqrt(np.diag(uncertainty.jackknife(slopes)))).all()
+    slopes, moved = gauss_newton.accurate(curve, curve.slopes(reached.point))
+    assert (moved <= 0.5 * np.sqrt(np.diag(standard_errors.jackknife(slopes)))).all()
     np.testing.assert_allclose(slopes.point.values, reached.point.values, atol=2e-4)
     assert curve.replayed[-1]["physics_step"] == 2.5e-4  # residuals with the first step, corrected
 
@@ -386,7 +393,10 @@ def test_torques_above_5_hz_are_left_out_by_four_poles_forward_and_backward(hert
     t = 0.002 * np.arange(10_001)
     columns = records.Columns(torque=("tau",))
     data = {"t": t, "tau": np.sin(math.tau * hertz * t)}
-    (low,), at = inverse.measured(data, columns).values(), inverse.times(data, columns)
+    (low,), at = (
+        inverse_dynamics.measured(data, columns).values(),
+        inverse_dynamics.times(data, columns),
+    )
     np.testing.assert_allclose(np.diff(at), 0.01, rtol=1e-9)
     assert at[0] == pytest.approx(0.1)
     assert at[-1] == pytest.approx(19.9)

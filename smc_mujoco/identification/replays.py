@@ -27,9 +27,9 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Data, Fields, Numbers
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
-from smc_mujoco.evidence.rigs import inverse, records
-from smc_mujoco.evidence.rigs.records import Record
-from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
+from smc_mujoco.identification import inverse_dynamics, records
+from smc_mujoco.identification.records import Record
+from smc_mujoco.identification.rig import Part, Quantity, Rig
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -346,7 +346,7 @@ class Replays:
         twin = self.twin
         data = self.twin.checked(self.data[i])
         if twin.dynamics is not None:
-            measured = inverse.measured(data, twin.columns)
+            measured = inverse_dynamics.measured(data, twin.columns)
             spread = {name: _norm(values) for name, values in measured.items()}
             return [Piece(i, None, 0, measured, spread, np.zeros(0))]
         period = twin.step(data)

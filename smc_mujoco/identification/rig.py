@@ -18,14 +18,15 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
 from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
-from smc_mujoco.evidence.rigs import inverse, records
-from smc_mujoco.evidence.rigs.records import Columns, Record
+from smc_mujoco.identification import inverse_dynamics, records
+from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max
@@ -85,7 +86,7 @@ class Rig:
     """A real machine.
 
     Attributes:
-      name, label: as in `smc.audits.rigs()`, and what it is, in a line.
+      name, label: as in `smc.rigs()`, and what it is, in a line.
       quantities: name -> Quantity.
       machine: function of the quantities, by name, that returns fields of a Scenario: plant,
         actuator, sensor, ...
@@ -102,7 +103,7 @@ class Rig:
         record, for records whose torques are predicted from the measured motion. None: records are
         replayed.
       identified_from: names of the records that its quantities were identified from.
-      free: names of the quantities that its records determine, which `smc.audits.identify` finds by
+      free: names of the quantities that its records determine, which `smc.identify` finds by
         default.
       window: s, of the pieces in which identification first repeats a record; each starts from its
         measured state.
@@ -445,9 +446,9 @@ class Rig:
         if self.dynamics is not None:
             plant = self.dynamics(Values(**self.values))
             for columns in data:
-                measured = inverse.measured(columns, names)
-                torques = inverse.torques(plant, columns, names)
-                found.append((torques, measured, inverse.times(columns, names)))
+                measured = inverse_dynamics.measured(columns, names)
+                torques = inverse_dynamics.torques(plant, columns, names)
+                found.append((torques, measured, inverse_dynamics.times(columns, names)))
             return found
         scenarios = []
         for record, state in zip(many, states or [None] * len(many), strict=True):
@@ -505,7 +506,9 @@ def fallen(predicted: Record, measured: Record, t: Array) -> Fall | None:
 @functools.cache
 def catalogue() -> Catalogue[Rig]:
     """Return every rig of smc_mujoco.evidence.rigs.machines and of other packages, by name."""
-    machines = discover("smc_mujoco.evidence.rigs.machines", Rig)
+    machines = {}
+    if annexes.installed("evidence"):
+        machines = discover("smc_mujoco.evidence.rigs.machines", Rig)
     return Catalogue(machines, added("smc_mujoco.rigs", imported(Rig, lambda rig: True)))
 
 

@@ -1,0 +1,1 @@
+"""Rigs, their records, and identification of a rig's quantities from records."""
