@@ -44,7 +44,7 @@ ROW_FILLED = 0.82  # part of a row that its axes fill
 SLIDE_PANELS = "x", "u", "settling", "channels"
 
 
-class Runs(NamedTuple):
+class DrawnRuns(NamedTuple):
     """Runs of a figure; `changes` are marks by time, s; `span` is the time that panels show, and
     the whole time, s.
     """
@@ -116,7 +116,7 @@ def figure(
             chosen = [name for name in chosen if name in SLIDE_PANELS]
     else:
         chosen = [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
-    runs = Runs(
+    runs = DrawnRuns(
         traces, names, colours, style.marks(traces, names), (drawing.horizon(traces), end(traces))
     )
     with style.page(width):
@@ -125,7 +125,7 @@ def figure(
 
 
 def _composed_page(
-    runs: Runs,
+    runs: DrawnRuns,
     chosen: Sequence[str],
     size: tuple[float, float | None],
     title: str | None,
@@ -267,7 +267,7 @@ def _draw_over_time(
     page,
     cells: Sequence[SubplotSpec],
     overview: Sequence[tuple[Panel, str]],
-    runs: Runs,
+    runs: DrawnRuns,
     named: bool,
 ) -> None:
     """Draw panels over time with their labels in the cells of a column.
@@ -301,7 +301,7 @@ def _rows(
     page,
     cell: SubplotSpec,
     panel: Panel,
-    runs: Runs,
+    runs: DrawnRuns,
     share: Axes | None = None,
 ) -> tuple[Axes, list[tuple[Axes, Panel, Sequence[str]]]]:
     """Return the axes that have the label of a panel, and its rows: axes, the panel they show, and
@@ -365,7 +365,11 @@ def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]
 
 
 def _draw_beside(
-    page, cells: Sequence[SubplotSpec], column: Sequence[str], places: Sequence[Panel], runs: Runs
+    page,
+    cells: Sequence[SubplotSpec],
+    column: Sequence[str],
+    places: Sequence[Panel],
+    runs: DrawnRuns,
 ) -> None:
     """Draw phase portraits and close-ups in the cells of a column; `places`: the first group, then
     the portraits.

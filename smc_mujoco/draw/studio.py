@@ -78,7 +78,7 @@ def view(
     from mujoco.studio import app, launch_web, viewer_protocol, web_viewer
     from mujoco.studio.web import web_server
 
-    from smc_mujoco.draw.studio_panel import Panel
+    from smc_mujoco.draw.studio_panel import StudioPanel
 
     if hasattr(web_server.bind_public_socket, "__self__"):
         raise ScenarioError("no view: Studio crashes if a process opens it twice: restart Python")
@@ -96,7 +96,7 @@ def view(
     config = viewer_protocol.ViewerConfig(
         title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser
     )
-    panel = Panel(session)
+    panel = StudioPanel(session)
     shell = app.App(
         app.Config(show_options=False, show_inspector=False)
     )  # of a simulation that is not ours

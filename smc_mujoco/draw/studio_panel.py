@@ -24,7 +24,7 @@ SAMPLES = 200  # of a curve: each goes to the browser in each frame
 SAVED_AS = Path("view.py")
 
 
-class Panel(plugin.ViewerPlugin):
+class StudioPanel(plugin.ViewerPlugin):
     """Shows a session, and puts what the user asks for into `asked`."""
 
     def __init__(self, session: Session):

@@ -13,7 +13,7 @@ import numpy as np
 
 from smc_mujoco.common import gl
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw.film import camera, scene
+from smc_mujoco.draw.film import camera, world
 
 THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape would be undefined
 FLOOR_DISTANCE = 4e-4  # of the model's extent: height of shadows over the floor
@@ -29,7 +29,7 @@ class Canvas:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int]):
         self.data = data
-        self.sun = data.light(scene.SUN).xdir.copy()
+        self.sun = data.light(world.SUN).xdir.copy()
         self.extent = model.stat.extent
         eye = data.cam("film")
         middle = (eye.xpos - model.stat.center) @ eye.xmat.reshape(3, 3)[:, 2]
@@ -61,7 +61,7 @@ def casting(model: mujoco.MjModel, pixel: float) -> Array:
     box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
     thinnest = np.where(box, MIN_BOX_CAST, MIN_CAST) * pixel
     half = np.sort(model.geom_aabb[:, 3:], axis=1)
-    return (half[:, 1] > thinnest) & (model.geom_type != scene.PLANE)
+    return (half[:, 1] > thinnest) & (model.geom_type != world.PLANE)
 
 
 def add_shadows(shown: mujoco.MjvScene, way: Array, casts: Array, extent: float) -> None:

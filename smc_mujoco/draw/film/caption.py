@@ -15,7 +15,7 @@ from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.arrows import Scale
-from smc_mujoco.draw.film.scene import MAX_CHANNELS
+from smc_mujoco.draw.film.world import MAX_CHANNELS
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
 from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation.trace import Trace

@@ -2,9 +2,9 @@
 clock.
 
 In order: pace.py sets the speed; track.py says what each run does at each frame; caption.py has the
-text, charts.py the charts; camera.py lays out the tiles; scene.py composes a machine's model,
+text, charts.py the charts; camera.py lays out the tiles; world.py composes a machine's model,
 puppet.py poses it, stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over
-arms and what flies; encoder.py writes. Frames are made and written one by one, so that memory does
+arms and what flies; video.py writes. Frames are made and written one by one, so that memory does
 not grow with a film's length.
 """
 
@@ -25,15 +25,15 @@ from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end, finite
-from smc_mujoco.draw.film import arrows, camera, pace, scene
+from smc_mujoco.draw.film import arrows, camera, pace, world
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
-from smc_mujoco.draw.film.encoder import encoder, mediapy
-from smc_mujoco.draw.film.pace import Clock
+from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.puppet import Puppet
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
+from smc_mujoco.draw.film.video import encoder, mediapy
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Frames:
         if self.at is not None:
             last = end(style.same_plant(self.traces))
             time = number("at", self.at, low=0.0, high=last + 1e-9)
-            self.clock = Clock(np.array([time]), np.ones(1))
+            self.clock = FilmClock(np.array([time]), np.ones(1))
         else:
             self.clock = pace.clock(self.traces, self.fps, self.speed)
         if self.span is not None:
@@ -333,7 +333,7 @@ def tracks_at(times: Array, traces: Sequence[Trace], colours: Sequence[str]) -> 
 
 
 def drawn(
-    clock: Clock,
+    clock: FilmClock,
     stages: Sequence[Stage],
     overlays: Sequence["arm.Overlay"],
     caption: Caption,
@@ -357,7 +357,7 @@ def staged(
     tracks: Sequence[MachineTrack], chosen: Camera | None, caption: Caption, times: Array
 ) -> Iterator[Stage]:
     """Yield the stages of machines, whose tiles the caption learns."""
-    turn = scene.turn(tracks[0].trace.scenario, chosen)
+    turn = world.turn(tracks[0].trace.scenario, chosen)
     puppets = [Puppet.of(track.trace.scenario, turn[:, 2]) for track in tracks]
     courses = [puppet.course(track) for track, puppet in zip(tracks, puppets, strict=True)]
     followed = any(map(Puppet.travels, puppets, courses))

@@ -47,7 +47,7 @@ Rate = Annotated[float, Number(low=1.0, high=120.0)]  # frames per second
 Speed = Annotated[float, Number(low=0.01, high=100.0)]  # times real time
 
 
-class Clock(NamedTuple):
+class FilmClock(NamedTuple):
     """Times of a film's frames.
 
     After them a film may show a part again, `close`, in which deflections about the mean are drawn
@@ -56,17 +56,17 @@ class Clock(NamedTuple):
 
     times: Array  # of the run, (frames,) s, ascending
     speeds: Array  # of playback, (frames,), 1 for real time
-    close: "Clock | None" = None
+    close: "FilmClock | None" = None
     factor: float = 1.0
 
-    def part(self, start: float, stop: float) -> "Clock":
+    def part(self, start: float, stop: float) -> "FilmClock":
         """Return the frames from `start` to `stop` of the run, s."""
         inside = (self.times >= start - 1e-9) & (self.times <= stop + 1e-9)
-        return Clock(self.times[inside], self.speeds[inside])
+        return FilmClock(self.times[inside], self.speeds[inside])
 
 
 @constrained
-def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None) -> Clock:
+def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None) -> FilmClock:
     """Return the times of a film's frames from t = 0 to the end of the longest trace; `speed` None:
     the rule above.
     """
@@ -74,7 +74,7 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
     whole = end(traces)
     if speed is not None:
         times = np.arange(int(whole * fps / speed + 1e-6) + 1) * (speed / fps)
-        return Clock(times, np.full(len(times), speed))
+        return FilmClock(times, np.full(len(times), speed))
     grid, wanted = speeds(traces, fps)
     times = [0.0]
     while times[-1] < whole - 1e-9:
@@ -82,10 +82,10 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
         times.append(min(times[-1] + now / fps, whole))
     frames = np.array(times)
     speeds_there = wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1]
-    return Clock(frames, speeds_there, close_up(traces, fps))
+    return FilmClock(frames, speeds_there, close_up(traces, fps))
 
 
-def close_up(traces: Sequence[Trace], fps: float) -> Clock | None:
+def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     """Return the last periods of runs in which a film shows nothing moving: those that chatter
     about one place, rattle in a backlash or stick. None of others.
     """
@@ -116,7 +116,7 @@ def close_up(traces: Sequence[Trace], fps: float) -> Clock | None:
         return None
     speed = 1.0 / rounded(max(1.0, CLOSE_TIME * frequency / PERIODS))
     times = np.arange(start, stop, speed / fps)
-    return Clock(times, np.full(len(times), speed), factor=factor)
+    return FilmClock(times, np.full(len(times), speed), factor=factor)
 
 
 def visible_sizes(scenario: Scenario) -> Array:

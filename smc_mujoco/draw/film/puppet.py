@@ -11,7 +11,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.draw.film import arrows, scene
+from smc_mujoco.draw.film import arrows, world
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.states import Shape, shapes
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
@@ -90,7 +90,7 @@ class Puppet:
     @classmethod
     def of(cls, scenario: Scenario, front: Array) -> "Puppet":
         """Return the machine before a camera whose picture's normal is `front`, (3,)."""
-        scenario = scene.first_channels(scenario)
+        scenario = world.first_channels(scenario)
         plant = scenario.plant
         found = shapes(scenario)
         model = found[0].model
@@ -100,9 +100,9 @@ class Puppet:
         start = model.qpos0
         if plant.on_stage:
             for shape in found:
-                scene.restyle(shape.model)
+                world.restyle(shape.model)
             if plant.unit != "rad" and not plant.pose:
-                rail = float(2 * np.abs(scene.fixed_boxes(model)[..., 0]).max())
+                rail = float(2 * np.abs(world.fixed_boxes(model)[..., 0]).max())
         else:
             start = models.initial_state(model, scenario)[0]
         rotors = []
@@ -161,14 +161,14 @@ class Puppet:
         now = self.shape(time)
         model, data = self.shapes[now].model, self.data[now]
         data.qpos[:] = self.qpos(x, rest=track.rest(time))
-        scene.forward(model, data)
+        world.forward(model, data)
         return model, data
 
     def course(self, track: MachineTrack) -> Course:
         """Return where a trace takes the machine, at POSES times."""
         trace = track.trace
         model = self.model
-        plane = model.geom_type == scene.PLANE
+        plane = model.geom_type == world.PLANE
         links = np.isin(model.geom_bodyid, moved_bodies(model, self.ids)) & ~plane
         if not links.any():
             raise ScenarioError(
@@ -176,7 +176,7 @@ class Puppet:
                 "give its bodies geoms, or its links <visual>"
             )
         falling = np.array([model.body(i).name.startswith(OWN) for i in model.geom_bodyid])
-        loose = ~links & ~plane & ~scene.still(model) & ~falling
+        loose = ~links & ~plane & ~world.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
         body = links | (loose & np.isin(roots, roots[links]))
         course = Course([], [], [], [])
@@ -185,12 +185,12 @@ class Puppet:
             time = float(trace.t[sample])
             goal = trace.r[sample, : self.shown]
             if np.isfinite(goal).all():
-                world = scene.boxes(*self.posed(track, goal, time))
-                course.goals.append(world[links].reshape(-1, 3))
-            world = scene.boxes(*self.posed(track, trace.x[sample, : self.shown], time))
+                corners = world.boxes(*self.posed(track, goal, time))
+                course.goals.append(corners[links].reshape(-1, 3))
+            corners = world.boxes(*self.posed(track, trace.x[sample, : self.shown], time))
             course.times.append(time)
-            course.places.append(world[body].reshape(-1, 3))
-            course.others.append(world[loose])
+            course.places.append(corners[body].reshape(-1, 3))
+            course.others.append(corners[loose])
         return course
 
     def travels(self, course: Course) -> bool:
@@ -202,7 +202,7 @@ class Puppet:
             return False
         model = self.model
         body = model.jnt_bodyid[self.ids[0]]
-        turns = model.jnt_type[model.body_jntadr[body]] == scene.HINGE
+        turns = model.jnt_type[model.body_jntadr[body]] == world.HINGE
         if turns and model.body_weldid[model.body_parentid[body]] == 0:
             return False
         own = max(float(np.ptp(points, axis=0).max()) for points in course.places)
@@ -244,10 +244,10 @@ class Puppet:
         on_stage = self.scenario.plant.on_stage
         axes = self.data[0].xaxis[self.ids[self.slides]]
         machines = [shape.model for shape in self.shapes]
-        raised = scene.cut(machines, points, axes, on_stage)
-        scene.forward(model, self.data[0])
-        kept = scene.still(model) & (model.geom_group < scene.HIDDEN_GROUP)
-        standing = scene.boxes(model, self.data[0])[kept]
+        raised = world.cut(machines, points, axes, on_stage)
+        world.forward(model, self.data[0])
+        kept = world.still(model) & (model.geom_group < world.HIDDEN_GROUP)
+        standing = world.boxes(model, self.data[0])[kept]
         low = points.min(axis=0)
         high = points.max(axis=0)
         size = (high - low).max()
@@ -265,7 +265,7 @@ class Puppet:
             near = NEAR_SHARE * size
             standing = standing.clip(low - (near, near, stand), high + near)
         if on_stage and self.slides.all():  # of a cart the rail, not its feet nor what is behind it
-            stand = scene.CUT_MARGIN * size
+            stand = world.CUT_MARGIN * size
             standing[..., 1:] = standing[..., 1:].clip(low[1:] - (0.0, stand), high[1:])
         standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
@@ -276,7 +276,7 @@ class Puppet:
             hangs = foot > low[2] + FLOOR_SHARE * (high[2] - low[2])
             if lowest < foot and not hangs:  # a floor below the links would not be below its foot
                 height += NO_FLOOR * size
-            floors = model.geom_pos[(model.geom_type == scene.PLANE) & (model.geom_bodyid == 0), 2]
+            floors = model.geom_pos[(model.geom_type == world.PLANE) & (model.geom_bodyid == 0), 2]
             floors = floors[np.abs(floors - lowest) < FLOOR_SHARE * size]
             if floors.size:  # that of the model
                 height = -floors.max()

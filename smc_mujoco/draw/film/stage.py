@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arrows, camera, scene
+from smc_mujoco.draw.film import arrows, camera, world
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.track import MachineTrack
@@ -53,9 +53,9 @@ class Stage:
         self.alone = alone
         self.followed = followed
         self.is_users = not puppet.scenario.plant.on_stage
-        self.model = scene.compose(puppet.scenario, puppet.height, self.size)
+        self.model = world.compose(puppet.scenario, puppet.height, self.size)
         if not self.is_users:
-            scene.restyle(self.model)
+            world.restyle(self.model)
         self.data = mujoco.MjData(self.model)
         self.goal = mujoco.MjData(self.model)
         self.aimed = False
@@ -75,8 +75,8 @@ class Stage:
         self.camera = film.id
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], self.turn.ravel())
         self.look(0)
-        scene.forward(self.model, self.data)
-        scene.set_floor(self.model, view, points, self.place - self.start)
+        world.forward(self.model, self.data)
+        world.set_floor(self.model, view, points, self.place - self.start)
         if self.is_users and not len(self.links):
             warnings.warn(
                 f"the picture of {puppet.scenario.plant.name} shows no part that moves: "
@@ -172,8 +172,8 @@ class Stage:
         """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
         read-only.
         """
-        scene.forward(self.model, self.data)
-        scene.forward(self.model, self.goal)
+        world.forward(self.model, self.data)
+        world.forward(self.model, self.goal)
         picture = self.canvas.draw(self.add_ghosts)
         if not drawn:
             return picture

@@ -9,7 +9,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import windows
-from smc_mujoco.draw.film import arrows, scene
+from smc_mujoco.draw.film import arrows, world
 from smc_mujoco.mechanisms.layout import ROTOR, joint_ids
 from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation import model as models
@@ -56,7 +56,7 @@ class MachineTrack:
         self.edges = edges
         self.colour = colour
         times = edges[1:]
-        n = scene.first_channels(trace.scenario).plant.n
+        n = world.first_channels(trace.scenario).plant.n
         if arms or not scales:
             sizes = []
         else:
@@ -119,7 +119,7 @@ def motion(trace: Trace, times: Array) -> Motion | None:
 
     None if there are none, or if that is not known.
     """
-    scenario = scene.first_channels(trace.scenario)
+    scenario = world.first_channels(trace.scenario)
     if scenario.plant.on_stage and not any(part.loose for part in scenario.contact):
         return None
     model = models.compile_model(scenario)

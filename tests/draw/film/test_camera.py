@@ -6,7 +6,7 @@ from helpers.films import staged, tracks
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, puppet, scene, track
+from smc_mujoco.draw.film import camera, puppet, track, world
 
 SIZE = (640, 230)
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
@@ -51,15 +51,15 @@ def test_angles_are_those_of_mujoco_s_free_camera():
 
 
 def test_an_own_model_s_camera_is_found_by_its_name(trace):
-    side = scene.turn(trace.scenario, "side")
+    side = world.turn(trace.scenario, "side")
     assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
-    azimuth = -scene.turn(trace.scenario)[:2, 2]
-    down = -scene.turn(trace.scenario)[2, 2]
+    azimuth = -world.turn(trace.scenario)[:2, 2]
+    down = -world.turn(trace.scenario)[2, 2]
     # the first that stands still, which
     assert azimuth / np.linalg.norm(azimuth) == pytest.approx([0.0, 1.0])
-    assert down == pytest.approx(np.sin(np.radians(scene.LOW_ELEVATION)))  # looks along the floor
+    assert down == pytest.approx(np.sin(np.radians(world.LOW_ELEVATION)))  # looks along the floor
     with pytest.raises(smc.ScenarioError, match="sid"):
-        scene.turn(trace.scenario, "sid")
+        world.turn(trace.scenario, "sid")
 
 
 @pytest.mark.slow

@@ -17,10 +17,10 @@ from helpers.sketch import failed
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import encoder, film, pace, scene
+from smc_mujoco.draw.film import film, pace, video, world
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales, scales_by_channel
 from smc_mujoco.draw.film.caption import key
-from smc_mujoco.draw.film.pace import Clock
+from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
@@ -53,7 +53,7 @@ def driven(traces):
 
 
 def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
-    clock = Clock(np.array(times), np.ones(len(times)))
+    clock = FilmClock(np.array(times), np.ones(len(times)))
     with contextlib.nullcontext() if charts else without_charts:
         frames = film.Frames(
             traces,
@@ -145,7 +145,7 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no masks of signals")
 def test_an_encoder_that_is_started_never_receives_ctrl_c():
-    with encoder.sigint_blocked():
+    with video.sigint_blocked():
         process = subprocess.Popen(["sleep", "60"])
     process.send_signal(signal.SIGINT)
     with pytest.raises(subprocess.TimeoutExpired):
@@ -210,7 +210,7 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
         duration=0.1,
         **{field: name},
     )
-    model = scene.compose(scenario, 0.0, SIZE)
+    model = world.compose(scenario, 0.0, SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = []
     for geom in models.spec(scenario).geoms:

@@ -13,8 +13,8 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import arrows, camera, film, scene, track
-from smc_mujoco.draw.film.pace import Clock
+from smc_mujoco.draw.film import arrows, camera, film, track, world
+from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.simulation import model as models
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
@@ -64,7 +64,7 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     with without_charts, monkeypatch.context() as patch:
         patch.setattr(film, "staged", kept)
         frames = film.Frames(traces, size=SIZE, at=0.0)
-        frames.clock = Clock(np.array(times), np.ones(len(times)))
+        frames.clock = FilmClock(np.array(times), np.ones(len(times)))
         made_of = iter(frames)
         assert [*itertools.islice(made_of, 2)]
         yield seen[:-1], seen[-1]
@@ -88,9 +88,9 @@ def test_a_stranger_that_goes_far_is_followed_and_fills_half_of_its_tile(base, c
         poses.append(track.Motion(times, moved))
     with filmed(traces, monkeypatch) as (stages, _):
         for shown in stages:
-            boxes = scene.boxes(shown.model, shown.data)
-            plane = shown.model.geom_type == scene.PLANE
-            moving = boxes[~scene.still(shown.model) & ~plane].reshape(-1, 3)
+            boxes = world.boxes(shown.model, shown.data)
+            plane = shown.model.geom_type == world.PLANE
+            moving = boxes[~world.still(shown.model) & ~plane].reshape(-1, 3)
             box = np.ptp(shown.project(moving), axis=0) / shown.size
             assert box.max() > 0.5
             assert (shown.project(moving) > -1.0).all()
@@ -152,7 +152,7 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
 
 def test_five_machines_keep_room_above_their_words():
     turn = camera.turn(90.0, -12.0)
-    cube = scene.CORNERS
+    cube = world.CORNERS
     view = camera.tiles(5, (800, 288), 54.0, lambda wide: 33.0, cube, turn)[1]
     seen = camera.project(cube, turn, view.place, view.size)
     assert ((seen >= 0.0) & (seen <= view.size)).all()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.draw.film import encoder
+from smc_mujoco.draw.film import video
 
 pytestmark = pytest.mark.quick
 
@@ -15,7 +15,7 @@ PICTURE = np.zeros((180, 320, 3), np.uint8)
 
 
 def encode(folder, count):
-    with encoder.encoder(folder / "a.mp4", (180, 320), 30.0) as write:
+    with video.encoder(folder / "a.mp4", (180, 320), 30.0) as write:
         for _ in range(count):
             write(PICTURE)
 
@@ -47,7 +47,7 @@ def test_ctrl_c_ends_a_film_as_itself_though_ffmpeg_complains_of_half_a_picture(
         raise RuntimeError("Error writing: half a picture")
 
     def stopped():
-        with encoder.encoder(tmp_path / "a.mp4", (180, 320), 30.0):
+        with video.encoder(tmp_path / "a.mp4", (180, 320), 30.0):
             monkeypatch.setattr(mediapy.VideoWriter, "close", complain)
             raise KeyboardInterrupt
 
