@@ -20,11 +20,13 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
+from smc_mujoco.mechanisms.hardware.contact import contact_pairs
 from smc_mujoco.mechanisms.hardware.encoder import remember
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.layout import (
     BASE,
+    OWN,
     PASSIVE,
     PLACES,
     POSE,
@@ -53,6 +55,7 @@ POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
 # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 MAX_OVERLAP = 1e-3
+OBSTACLE = "the obstacle"
 
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
@@ -438,7 +441,7 @@ def check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
             beyond = beyond or _overlap(model, data, (1 - part) * free + part * qpos)
     if overlap := inside or beyond:
         raise ScenarioError(
-            f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {overlap[0]} "
+            f"at x0 {shown(scenario.resolved.x0)} of {scenario.plant.name} {overlap[0]} is "
             f"{'inside' if inside else 'beyond'} {overlap[1]} of contact "
             f"{joined(map(str, scenario.contact))}: give another x0"
         )
@@ -447,12 +450,24 @@ def check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
 def _overlap(
     model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
 ) -> tuple[str, str] | None:
-    """Return the names of two geoms that overlap at qpos by more than MAX_OVERLAP, or None."""
+    """Return the names of two geoms that a contact part lets hit each other, if they overlap at
+    qpos by more than MAX_OVERLAP, or None. What else of a user's model overlaps is its own matter.
+    """
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_collision(model, data)
+    paired = contact_pairs(model)
     for contact in data.contact:
-        if contact.dist < -MAX_OVERLAP:
-            first, second = (model.geom(int(geom)).name for geom in contact.geom)
-            return first, second
+        if contact.dist < -MAX_OVERLAP and frozenset(contact.geom.tolist()) in paired:
+            first, second = (_shown_geom(model, geom) for geom in contact.geom.tolist())
+            return (second, first) if first == OBSTACLE else (first, second)
     return None
+
+
+def _shown_geom(model: mujoco.MjModel, geom: int) -> str:
+    """Return the name of a geom in a sentence; of one that this package named, that of its body."""
+    name = model.geom(geom).name
+    body = model.body(model.geom_bodyid[geom]).name
+    if body.startswith(OWN):
+        return OBSTACLE
+    return f"body {body!r}" if name.startswith(OWN) else repr(name)

@@ -150,6 +150,12 @@ def kinds(obstacles: Iterable[Obstacle]) -> list[str]:
     return [part.kind for part in obstacles if isinstance(part, Contact)]
 
 
+def contact_pairs(model: mujoco.MjModel) -> set[frozenset[int]]:
+    """Return the two geoms of each pair that an obstacle added to a model."""
+    pairs = [*_pairs(model, HIT), *_pairs(model, RUB)]
+    return {frozenset((int(model.pair_geom1[i]), int(model.pair_geom2[i]))) for i in pairs}
+
+
 def _pairs(model: mujoco.MjModel, sort: str) -> list[int]:
     return [i for i in range(model.npair) if model.pair(i).name.startswith(sort)]
 

@@ -190,7 +190,13 @@ class Wall(OfBody):
         data = _posed(model, x)
         data.geom_xpos[shape] = place
         away = _distance(model, data, geoms, shape)
-        return "" if away > 0.0 else f"body {self.body!r} {-1e3 * away:.3g} mm in its wall"
+        if away > 0.0:
+            return ""
+        start = ", ".join(f"{place:g}" for place in plant.x0)
+        return (
+            f"body {self.body!r} {-1e3 * away:.3g} mm in its wall, which stands "
+            f"{1e3 * self.gap:.3g} mm from it where the plant's own x0 is, at {start}"
+        )
 
 
 @frozen_data

@@ -264,6 +264,32 @@ def test_what_does_not_fit_is_refused_with_the_names_that_there_are(name, refuse
     refused(lambda: free(name, wall(name), x0=away), body, "wall", "x0")
 
 
+# a robot that stands {deep} m deep in its floor, and whose arm stands in its base
+STANDING = """<mujoco model="dog"><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+<body name="base" pos="0 0 {high}"><freejoint/><geom name="trunk" type="box" size=".2 .1 .12"
+mass="5"/><body name="arm" pos="0 0 .1"><joint name="arm" axis="0 1 0" range="-57 57" damping=".1"/>
+<geom name="rod" type="capsule" fromto="0 0 {base} 0 0 .3" size=".02" mass=".3"/><body
+name="hand" pos="0 0 .3"><geom name="hand" size=".03" mass=".1"/></body></body></body></worldbody>
+<contact><pair geom1="trunk" geom2="hand"/></contact><actuator><motor joint="arm"
+ctrlrange="-5 5"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("deep", [0.0, 1.5e-3, 4e-3])
+def test_a_robot_that_stands_a_little_in_its_floor_takes_any_obstacle(deep):
+    text = STANDING.format(high=0.12 - deep, base=0.05)
+    dog = smc.plant_from(text, {"arm": smc.Channel(x0=0.3)}, others="held")
+    law = smc.law("pid", kp=3.0, ki=0.0, kd=0.3)
+    ball = smc.Ball("arm", mass=0.05, height=0.02)
+    wall = smc.Wall("arm", direction=(1, 0, 0), gap=0.05)
+    for part in (smc.Stops({"arm": (-0.5, 0.5)}), ball, wall):
+        run = smc.Scenario(plant=dog, law=law, contact=part, duration=0.05)
+        assert smc.run(run).failure is None
+    with pytest.raises(smc.ScenarioError, match=r"x0 \(-0\.6,\) of dog 'rod' is beyond the obst"):
+        smc.run(dataclasses.replace(run, contact=ball, x0=-0.6))
+    with pytest.raises(smc.ScenarioError, match=r"mm in its wall, which stands 50 mm .* at 0\.3: "):
+        dataclasses.replace(run, x0=0.8)
+
+
 @EVERY
 def test_a_goal_in_an_obstacle_is_said(name):
     plant, body, joint = machine(name)
