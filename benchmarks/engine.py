@@ -18,8 +18,8 @@ import numpy as np
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES
 from smc_mujoco.analysis.engine.group import Group
-from smc_mujoco.draw import region
 from smc_mujoco.metrics import catalogue
+from smc_mujoco.robustness import region_figure
 from smc_mujoco.simulation.run import cores
 
 METRICS = ("settling_time", "itae", "tv_rate")
@@ -116,7 +116,7 @@ def picture(path: str, device: str, side: int = 1000) -> None:
     began = time.perf_counter()
     found = smc.design.basin("inverted_pendulum", law, points=(side, side), device=device)
     seconds = time.perf_counter() - began
-    region.draw([found], path)
+    region_figure.draw([found], path)
     share = 100.0 * found.share
     print(f"{path}: {share:.3f} % of {side**2:,} starts in {seconds:.1f} s; {found.checked}")
 

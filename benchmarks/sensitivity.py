@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import sobol_indices
 
-from smc_mujoco.analysis import sensitivity
+from smc_mujoco.robustness import sobol
 
 SEEDS = 60
 TRUE_POINTS = 2**16
@@ -52,15 +52,15 @@ def row(name: str, n: int) -> str:
     """Return what a function tells with a number of points."""
     k, function = FUNCTIONS[name]
     space: Any = SimpleNamespace(names=tuple(map(str, range(k))), ends=[(0.0, 1.0, "")] * k)
-    true = np.maximum(known(function(sensitivity.designs(TRUE_POINTS, k, SEEDS)), TRUE_POINTS), 0.0)
+    true = np.maximum(known(function(sobol.designs(TRUE_POINTS, k, SEEDS)), TRUE_POINTS), 0.0)
     ours = []
     saltelli = []
     held = []
     for seed in range(SEEDS):
-        designs = sensitivity.designs(n, k, seed)
+        designs = sobol.designs(n, k, seed)
         scores = function(designs)
         scores -= scores.min() + 1.0  # none is positive, so none is told by its logarithm
-        axes = sensitivity.indices(space, scores, n, designs[: 2 * n], scores[: 2 * n], seed)
+        axes = sobol.indices(space, scores, n, designs[: 2 * n], scores[: 2 * n], seed)
         its = np.array([[axis.first[:3] for axis in axes], [axis.total[:3] for axis in axes]])
         ours.append(its[..., 0])
         held.append((its[..., 1] <= true + 1e-9) & (true <= its[..., 2] + 1e-9))

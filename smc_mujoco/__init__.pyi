@@ -8,9 +8,7 @@ from smc_mujoco import fidelity as fidelity
 from smc_mujoco import hardware as hardware
 from smc_mujoco import metrics as metrics
 from smc_mujoco import signals as signals
-from smc_mujoco.analysis.margins import margins as margins
 from smc_mujoco.analysis.tuning.search import tune as tune
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty as Uncertainty
 from smc_mujoco.cli.main import play as play
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.control.estimator import estimator as estimator
@@ -45,6 +43,10 @@ from smc_mujoco.mechanisms.plant import plants as plants
 from smc_mujoco.metrics.catalogue import scores as scores
 from smc_mujoco.problems.problem import problem as problem
 from smc_mujoco.problems.results import results as results
+from smc_mujoco.robustness.margins import margins as margins
+from smc_mujoco.robustness.sensitivity import sensitivity as sensitivity
+from smc_mujoco.robustness.uncertainty import Uncertainty as Uncertainty
+from smc_mujoco.robustness.worst_case import worst_case as worst_case
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.grid import starts as starts
@@ -65,11 +67,9 @@ from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.score import score as score
-from smc_mujoco.studies.sensitivity import sensitivity as sensitivity
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
 from smc_mujoco.studies.which import which as which
-from smc_mujoco.studies.worst_case import worst_case as worst_case
 
 __version__: str
 paper = smc_mujoco.evidence.papers.gaber.scenarios

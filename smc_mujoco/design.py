@@ -3,9 +3,9 @@ chattering, a region of attraction.
 """
 
 from smc_mujoco.analysis.chattering import chattering
-from smc_mujoco.analysis.region_of_attraction import basin
 from smc_mujoco.analysis.regulator import lqr
 from smc_mujoco.analysis.state_space import state_space
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.robustness.region_of_attraction import basin
 
 __all__ = ["basin", "chattering", "lqr", "state_space", "surface_function"]

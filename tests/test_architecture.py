@@ -35,6 +35,7 @@ ROOMS = (
     "metrics",
     "analysis",
     "draw",
+    "robustness",
     "studies",
     "identification",
     "envs",

@@ -11,21 +11,21 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import differ, ranking
-from smc_mujoco.analysis import region_of_attraction as region
 from smc_mujoco.analysis.engine import outcome
 from smc_mujoco.analysis.tuning import objective, search, search_space
-from smc_mujoco.analysis.worst_case import search as attack
-from smc_mujoco.analysis.worst_case import uncertainty
 from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
 from smc_mujoco.evidence.accuracy import scaling
 from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
+from smc_mujoco.robustness import region_of_attraction as region
+from smc_mujoco.robustness import uncertainty
+from smc_mujoco.robustness import worst_case_search as attack
 from smc_mujoco.simulation import conditions, controller, scenario, signals, time_series
 from smc_mujoco.testing import golden, plugin
 
 pytestmark = pytest.mark.quick
 
-margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
+margins = importlib.import_module("smc_mujoco.robustness.margins")  # smc.margins is the function
 ROOT = Path(__file__).parents[1]
 PARTS = {
     2: "half",

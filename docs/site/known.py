@@ -50,7 +50,7 @@ OTHERS = {  # title -> names of modules that are no public names
     evidence.accuracy.accuracy.AccuracyTable
     analysis.chattering.Chattering
     analysis.step_halving.StepChange
-    studies.worst_case.WorstCase
+    robustness.worst_case.WorstCase
     evidence.audit.audit.Audit
     evidence.audit.verdict.Claim
     """,

@@ -29,8 +29,8 @@ from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
-    from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.step_halving import StepChange
+    from smc_mujoco.robustness.margins import Margin
 
 T = TypeVar("T")
 # label -> the same run again, as `step_halving.repetitions` has it

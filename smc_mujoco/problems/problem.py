@@ -197,8 +197,8 @@ class Problem:
 
     def _worst(self, scenario: Scenario) -> Scenario:
         """Return the worst run that an adversary finds for the scenario's law."""
-        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-        from smc_mujoco.studies.worst_case import worst_case
+        from smc_mujoco.robustness.uncertainty import Uncertainty
+        from smc_mujoco.robustness.worst_case import worst_case
 
         within = Uncertainty(**self._values["conditions"][self.condition])
         found = worst_case(scenario, within=within, budget=self.budget, seed=scenario.seed)

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure
 
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-    from smc_mujoco.studies.worst_case import WorstCase
+    from smc_mujoco.robustness.uncertainty import Uncertainty
+    from smc_mujoco.robustness.worst_case import WorstCase
 
 QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
 # plants times conditions that have a table each; if there are more, each plant has one table
@@ -141,7 +141,7 @@ class Compared(Tables):
         """The tables that are the same in every call: of the `leaderboard`, and of worst cases."""
         tables = self.leaderboard.tables
         if self.worst:
-            from smc_mujoco.studies.worst_case import WorstCases
+            from smc_mujoco.robustness.worst_case import WorstCases
 
             for cases in self.worst.values():
                 tables += WorstCases(cases.values()).tables
@@ -360,7 +360,7 @@ def _class(worst: object) -> "Uncertainty | None":
     """Return the class in which worst cases are searched, None for the default one."""
     if isinstance(worst, bool):
         return None
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.robustness.uncertainty import Uncertainty
 
     if not isinstance(worst, Uncertainty):
         raise ScenarioError(
@@ -376,7 +376,7 @@ def _worst_cases(
     duration: float | None,
 ) -> "dict[str, dict[str, WorstCase]]":
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
-    from smc_mujoco.studies.worst_case import DURATION
+    from smc_mujoco.robustness.worst_case import DURATION
 
     found: dict[str, dict[str, WorstCase]] = {}
     for plant in trial.plants:

@@ -34,20 +34,19 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
-from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation import coerce, run_key
 from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies import run_key
 from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.tuning.result import Tuned
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-    from smc_mujoco.studies.worst_case import WorstCase
+    from smc_mujoco.robustness.uncertainty import Uncertainty
+    from smc_mujoco.robustness.worst_case import WorstCase
 
 # what gains for a machine of one's own are searched by for a first answer; chosen
 BRIEF = Objective(conditions=(NAMED["nominal"], NAMED["noise"], NAMED["heavy"]), duration=2.0)
@@ -355,7 +354,7 @@ class Trial(NamedTuple):
         self, name: str, scenario: Scenario, within: "Uncertainty | None", budget: int | None = None
     ) -> "WorstCase":
         """Return the worst case of a scenario, which the folder keeps under a name."""
-        from smc_mujoco.studies.worst_case import cached_worst_case
+        from smc_mujoco.robustness.worst_case import cached_worst_case
 
         file = self.folder / "worst" / f"{name}.json"
         return cached_worst_case(

@@ -32,11 +32,12 @@ from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import COMPARED
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation import run_key
 from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import batches, run_key
+from smc_mujoco.studies import batches
 from smc_mujoco.studies import table as tables
 from smc_mujoco.studies.batches import Batch
 from smc_mujoco.studies.table import Table

@@ -5,7 +5,7 @@ fails.
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.region_of_attraction import basin_of
+from smc_mujoco.robustness.region_of_attraction import basin_of
 
 
 @smc.law_function(gains={"k": 1.0})

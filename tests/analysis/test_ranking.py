@@ -25,7 +25,7 @@ from smc_mujoco.analysis.ranking import (
 )
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
-from smc_mujoco.studies import run_key
+from smc_mujoco.simulation import run_key
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 
 INF = math.inf

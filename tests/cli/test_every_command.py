@@ -59,22 +59,22 @@ CALLS = {
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
-    "margins": ["analysis.margins.margins"],
-    "margins --quick": ["analysis.margins.margins"],
+    "margins": ["robustness.margins.margins"],
+    "margins --quick": ["robustness.margins.margins"],
     "margins duffing --law pid --kinds delay,mass --gains default --quick --device cuda --condition noise --x0 "
     "0.4 "
-    "--json m.json --threads 2": ["analysis.margins.margins"],
-    "worst duffing": ["studies.worst_case.worst_case"],
+    "--json m.json --threads 2": ["robustness.margins.margins"],
+    "worst duffing": ["robustness.worst_case.worst_case"],
     "worst duffing --law pid --disturbance 2 "
     "--bound slope=3,position_noise=0.01,delay=0:0.01,mass=0.7:1.3,alpha=0.8:1.2 "
     "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
-    "--json w.json --threads 2 --device cuda": ["studies.worst_case.worst_case"],
-    "worst simple_pendulum_ak80": ["studies.worst_case.worst_case"],
-    "sensitivity duffing": ["studies.sensitivity.sensitivity"],
+    "--json w.json --threads 2 --device cuda": ["robustness.worst_case.worst_case"],
+    "worst simple_pendulum_ak80": ["robustness.worst_case.worst_case"],
+    "sensitivity duffing": ["robustness.sensitivity.sensitivity"],
     "sensitivity duffing --law pid --disturbance 2 --bound "
     "delay=0:0.01,encoder=256:4096,period=1:4 "
     "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --out s "
-    "--json s.json --threads 2 --device cuda": ["studies.sensitivity.sensitivity"],
+    "--json s.json --threads 2 --device cuda": ["robustness.sensitivity.sensitivity"],
     "chatter duffing": ["simulation.grid.case"],
     "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
         "simulation.grid.case"

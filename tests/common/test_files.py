@@ -19,8 +19,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.region_of_attraction import Basin
-from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import files
@@ -28,6 +26,8 @@ from smc_mujoco.common.cache import cached
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.robustness.region_of_attraction import Basin
+from smc_mujoco.robustness.region_of_attraction import load as load_map
 from smc_mujoco.simulation import serialise
 
 WORDS = st.sampled_from(

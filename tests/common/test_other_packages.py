@@ -18,7 +18,8 @@ from smc_mujoco.common import catalogue
 from smc_mujoco.control import estimator, gain_sets, law, surface
 from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
-from smc_mujoco.studies import run_key, scene
+from smc_mujoco.simulation import run_key
+from smc_mujoco.studies import scene
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "my_smc_package"

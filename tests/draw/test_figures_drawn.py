@@ -18,12 +18,13 @@ from matplotlib.text import Text
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import Chattering
-from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.draw import amplitudes, panels, region, style
+from smc_mujoco.draw import amplitudes, panels, style
 from smc_mujoco.draw.figure import figure
 from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.robustness import region_figure
+from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.simulation.trace import PLANT_DIVERGED
 
 SINE = smc.Sine(0.3, 4.0)
@@ -177,7 +178,7 @@ PAGES = {
     "arm": lambda: figure(arm(), labels=["near", "far"]),
     "lags": lags,
     "balance": balance,
-    "maps": lambda: region.draw(basins()),
+    "maps": lambda: region_figure.draw(basins()),
 }
 
 
@@ -445,7 +446,7 @@ def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_
 
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():
-    page = region.draw(basins())
+    page = region_figure.draw(basins())
     for ax, its in zip(page.axes, basins(), strict=True):
         legend = ax.get_legend()
         assert legend is not None
@@ -466,7 +467,10 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
         colours = []
         for colour in mesh.get_cmap()(range(5)):
             colours.append(to_hex(colour))
-        assert colours[0] == style.ramp(style.law_colour(its.law), 3, region.LIGHTEST)[2].lower()
+        assert (
+            colours[0]
+            == style.ramp(style.law_colour(its.law), 3, region_figure.LIGHTEST)[2].lower()
+        )
         assert colours[4] == style.FAILED.lower(), "grey, not another law's orange"
         assert ax.get_title(loc="left") == style.law_name(its.law)
     assert page.legends[0].get_title().get_text() == "Van der Pol oscillator"
@@ -496,7 +500,7 @@ REFUSED = {  # call -> arguments, and what replaces them
             {"panels": []},
         ],
     ),
-    region.draw: ({"maps": []}, [{}]),
+    region_figure.draw: ({"maps": []}, [{}]),
     smc.plot: ({"table": ONE}, [{}]),
     smc.show: ({"what": ONE}, [{}]),
     smc.film: (

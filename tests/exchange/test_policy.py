@@ -15,7 +15,7 @@ import pytest
 from helpers.episodes import columns, dm_control_suite, driven_by_dm, flat, run_of
 
 import smc_mujoco as smc
-from smc_mujoco.studies import run_key
+from smc_mujoco.simulation import run_key
 
 pytestmark = [
     pytest.mark.quick,

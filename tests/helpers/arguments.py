@@ -6,9 +6,9 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.scenario import Scenario

@@ -12,7 +12,7 @@ from helpers.runs import ARRAYS, assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.custom.scales import needs
-from smc_mujoco.studies import run_key
+from smc_mujoco.simulation import run_key
 
 SINE = smc.Sine(0.3, 4.0)
 MOVE = smc.signals.MinimumJerk(0.4, 0.01, 0.03)

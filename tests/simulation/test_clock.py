@@ -9,7 +9,7 @@ from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import margins
+from smc_mujoco.robustness import margins
 from smc_mujoco.simulation.conditions import find_condition
 
 PERIOD, STEPS = 0.01, 10  # s, and physics steps in it

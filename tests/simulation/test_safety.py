@@ -36,10 +36,9 @@ from smc_mujoco.common.jit import Key, compiled
 from smc_mujoco.control.law import Measurement, catalogue
 from smc_mujoco.mechanisms.hardware import moments
 from smc_mujoco.mechanisms.hardware.moments import lever
-from smc_mujoco.simulation import callback, controller, parts, philox, state
+from smc_mujoco.simulation import callback, controller, parts, philox, run_key, state
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare
-from smc_mujoco.studies import run_key
 
 # the module; the public name is the function
 RUN = importlib.import_module("smc_mujoco.simulation.run")

@@ -19,7 +19,8 @@ from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import options
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
-from smc_mujoco.studies import batches, compare, fair_gains, worst_case
+from smc_mujoco.robustness import worst_case
+from smc_mujoco.studies import batches, compare, fair_gains
 from smc_mujoco.studies.leaderboard import METRICS, Holdout
 
 SHORT = {"duration": 0.5, "budget": 16, "progress": False}

@@ -9,9 +9,11 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common import cache
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
-from smc_mujoco.studies import run_key, study, worst_case
+from smc_mujoco.robustness import worst_case
+from smc_mujoco.robustness.worst_case import WorstCase, default_budget
+from smc_mujoco.simulation import run_key
+from smc_mujoco.studies import study
 from smc_mujoco.studies.scene import slug
-from smc_mujoco.studies.worst_case import WorstCase, default_budget
 
 RUN = smc.Scenario(plant="duffing", law="classical", duration=8.0)
 WITHIN = smc.Uncertainty(disturbance=0.5, mass=(0.8, 1.2))

@@ -7,7 +7,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
-from smc_mujoco.studies import run_key
+from smc_mujoco.simulation import run_key
 
 FAST, SLOW = (
     smc.law("observer_free", lam=6.0, k1=k1).named(name)

@@ -13,9 +13,9 @@ from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run_key import condition
 from smc_mujoco.studies import batches
 from smc_mujoco.studies import study as store
-from smc_mujoco.studies.run_key import condition
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 

@@ -16,7 +16,7 @@ from helpers.runs import fails_late
 import smc_mujoco as smc
 from smc_mujoco.common.text import number
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.run_key import condition, key
+from smc_mujoco.simulation.run_key import condition, key
 from smc_mujoco.studies.study import Store, study
 from smc_mujoco.studies.table import MAX_ROWS, Table, content
 

@@ -20,7 +20,6 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.law_time import law_time
-from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
 from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component
@@ -35,6 +34,7 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
+from smc_mujoco.robustness.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 

@@ -13,7 +13,7 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.robustness.uncertainty import Uncertainty
     from smc_mujoco.simulation.scenario import Scenario
 
 Bound = Annotated[
@@ -142,13 +142,13 @@ def margins(
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.margins import KINDS
-        from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.control.source import in_words
         from smc_mujoco.mechanisms.named import as_plant
+        from smc_mujoco.robustness.margins import KINDS
+        from smc_mujoco.robustness.margins import margins as search
         from smc_mujoco.simulation.conditions import PLANTS
         from smc_mujoco.simulation.grid import case
 
@@ -237,7 +237,7 @@ def worst(
     with delay_ctrl_c():
         from smc_mujoco.control.source import in_words
         from smc_mujoco.draw.page import files
-        from smc_mujoco.studies.worst_case import WorstCases, worst_case
+        from smc_mujoco.robustness.worst_case import WorstCases, worst_case
 
     terminal = Terminal(json)
     within = _within(disturbance, bound)
@@ -296,8 +296,8 @@ def sensitivity(
     with delay_ctrl_c():
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
+        from smc_mujoco.robustness.sensitivity import sensitivity
         from smc_mujoco.simulation.grid import case
-        from smc_mujoco.studies.sensitivity import sensitivity
 
     terminal = Terminal(json)
     over = _within(disturbance, bound)
@@ -318,7 +318,7 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     """Return the class of the options --disturbance and --bound: numbers and ranges; None if
     neither is given.
     """
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.robustness.uncertainty import Uncertainty
 
     fields: dict[str, Any] = {} if disturbance is None else {"disturbance": disturbance}
     known = {field.name for field in dataclasses.fields(Uncertainty)}

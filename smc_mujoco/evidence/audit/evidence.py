@@ -24,8 +24,8 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import TEXT_FIELDS, Paper
 from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.simulation.run_key import condition, portable_key
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.run_key import condition, portable_key
 
 FORMAT = "smc-mujoco evidence 1"
 CLAIM_FIELDS = ("id", "text", "where", "whose", "how", "read")

@@ -29,10 +29,10 @@ from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.run_key import Hashes, key
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.studies.batches import result_columns
-from smc_mujoco.studies.run_key import Hashes, key
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.aliases import Fields, Pair
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
@@ -28,6 +27,7 @@ from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, bounds_of
 

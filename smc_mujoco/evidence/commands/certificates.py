@@ -80,10 +80,10 @@ def _certified(
     plant: str, law: str, condition: str, gains: str, disturbance: float | None
 ) -> "Certificate":
     """Return the certificate of a law with its gains of a set."""
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.control import gain_sets
     from smc_mujoco.evidence.certificates.maker import certify as make
     from smc_mujoco.mechanisms.named import jointed
+    from smc_mujoco.robustness.uncertainty import Uncertainty
     from smc_mujoco.simulation.grid import case
 
     machine = jointed(plant, "a theorem")

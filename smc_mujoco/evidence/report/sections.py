@@ -14,8 +14,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from smc_mujoco.analysis import margins as margin_search
-from smc_mujoco.analysis.margins import MARGIN_KINDS, Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common.files import read_json, shipped, write_json
 from smc_mujoco.common.tabular import Cell, Tabular
@@ -30,6 +28,8 @@ from smc_mujoco.evidence.report.page import Section, heading, picture, tables, t
 from smc_mujoco.evidence.report.plan import GAINS, Work
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
+from smc_mujoco.robustness import margins as margin_search
+from smc_mujoco.robustness.margins import MARGIN_KINDS, Margin
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace

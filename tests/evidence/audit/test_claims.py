@@ -38,7 +38,7 @@ from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.run_key import key
+from smc_mujoco.simulation.run_key import key
 
 GABER = paper("gaber")
 CODE = GABER.claims["14"].evidence.__globals__  # of its claims.py

@@ -20,7 +20,7 @@ from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import REFUTED
 from smc_mujoco.simulation import serialise
-from smc_mujoco.studies.run_key import portable_key
+from smc_mujoco.simulation.run_key import portable_key
 
 DATA = """
 title = "Small"

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.margins import TOLERATED_ERROR
 from smc_mujoco.control.law import law_function
 from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.paper import paper
@@ -23,9 +22,10 @@ from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
 from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.robustness.margins import TOLERATED_ERROR
+from smc_mujoco.simulation.run_key import description
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
-from smc_mujoco.studies.run_key import description
 
 GABER = paper("gaber")
 CODE = GABER.claims["14"].evidence.__globals__  # of its claims.py

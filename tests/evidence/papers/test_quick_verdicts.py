@@ -25,8 +25,8 @@ from smc_mujoco.evidence.audit import runs, search
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.simulation.run_key import key
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.run_key import key
 
 GOLDEN = Path(__file__).parent / "quick_verdicts.json"
 GAINS = {"gaber": "study"}  # its other sets are tuned again and again

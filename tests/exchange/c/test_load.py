@@ -21,7 +21,7 @@ from smc_mujoco.cli import main
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange.c import build
-from smc_mujoco.studies import run_key
+from smc_mujoco.simulation import run_key
 
 pytestmark = needs_compiler
 

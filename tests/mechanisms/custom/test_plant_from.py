@@ -25,8 +25,7 @@ from smc_mujoco.mechanisms.custom.scales import needs
 from smc_mujoco.mechanisms.custom.user_model import UserModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation import serialise
-from smc_mujoco.studies import run_key
+from smc_mujoco.simulation import run_key, serialise
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
 ARRAYS = ("x", "v", "u", "applied", "s", "d", "force", "reaction")

@@ -13,11 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch, Rectangle
 
-from smc_mujoco.analysis.sensitivity import CHANCE, Cut, SobolResult, Space, in_words
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.robustness.sobol import CHANCE, Cut, SobolResult, Space, in_words
 
 ROW_HEIGHT = 0.42  # inches, of an axis
 MIN_HEIGHT = 3.6  # of the panels

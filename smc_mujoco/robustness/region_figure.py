@@ -11,11 +11,11 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.source import restore
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
+from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, Basin
 
 SHADES = 3  # from early to late
 UNDECIDED = "#F4F4F4"

@@ -30,7 +30,6 @@ import numpy as np
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.runs import Runs
-from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.constraints import Boolean, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
@@ -42,6 +41,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import by_group, scale
+from smc_mujoco.robustness.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws

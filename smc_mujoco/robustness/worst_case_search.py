@@ -31,10 +31,10 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.engine.runs import Runs
-from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
 from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.metrics.catalogue import CATALOGUE, arrived
 from smc_mujoco.metrics.conventions import Metric, by_group
+from smc_mujoco.robustness.uncertainty import Member, Members
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Relay

@@ -9,9 +9,9 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
-from smc_mujoco.analysis import region_of_attraction as maps
-from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.control.law import Law
+from smc_mujoco.robustness import region_of_attraction as maps
+from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 
 PENDULUM = smc.plant("inverted_pendulum")
 WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere

@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.run_key import condition, key
+from smc_mujoco.simulation.run_key import condition, key
 
 pytestmark = pytest.mark.quick
 
@@ -161,7 +161,7 @@ def test_another_order_of_a_class_s_definitions_is_no_edit():
 def test_a_key_does_not_depend_on_the_process():
     made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
     code = (
-        "from smc_mujoco import grid; from smc_mujoco.studies.run_key import key; "
+        "from smc_mujoco import grid; from smc_mujoco.simulation.run_key import key; "
         f"print(key({made}))"
     )
     done = python("-c", code, PYTHONHASHSEED="1")

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.bootstrap import LEVEL, Interval, share_interval
-from smc_mujoco.analysis.worst_case.uncertainty import Constant, Member, Members, Uncertainty
 from smc_mujoco.common.aliases import Array, ArrayPair, Pair
 from smc_mujoco.common.constraints import MAX_SEED
+from smc_mujoco.robustness.uncertainty import Constant, Member, Members, Uncertainty
 from smc_mujoco.simulation.scenario import Scenario
 
 RESAMPLES = 499  # of a bootstrap: chosen

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import margins
-from smc_mujoco.analysis.margins import COARSE, FINE
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.robustness import margins
+from smc_mujoco.robustness.margins import COARSE, FINE
 
 BASE = scenarios.scenario("duffing", "observer_free", duration=4.0)
 

@@ -14,10 +14,10 @@ from helpers import reference
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import runs
 from smc_mujoco.analysis.engine.runs import Runs
-from smc_mujoco.analysis.worst_case import search as attack
-from smc_mujoco.analysis.worst_case.search import Search, recorded_force
-from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.robustness import worst_case_search as attack
+from smc_mujoco.robustness.uncertainty import Members, default_class, outside
+from smc_mujoco.robustness.worst_case_search import Search, recorded_force
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.signals import Relay
 

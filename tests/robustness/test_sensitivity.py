@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import sensitivity as module
 from smc_mujoco.analysis.engine import runs
-from smc_mujoco.analysis.worst_case.uncertainty import Members
-from smc_mujoco.studies.sensitivity import default_class, default_points
+from smc_mujoco.robustness import sobol as module
+from smc_mujoco.robustness.sensitivity import default_class, default_points
+from smc_mujoco.robustness.uncertainty import Members
 
 
 def scenario(**fields) -> smc.Scenario:

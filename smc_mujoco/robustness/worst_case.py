@@ -3,8 +3,8 @@ random members.
 
 Sliding mode promises that the error stays small whatever a disturbance does within its bound. A
 median over random seeds does not test this. The user gives the class. The search has no parameters,
-so that no law gets a milder adversary than another. `analysis.worst_case` describes both. The worst
-run that is found is a lower bound of the worst case.
+so that no law gets a milder adversary than another. `uncertainty` describes the class, and
+`worst_case_search` the search. The worst run that is found is a lower bound of the worst case.
 """
 
 import dataclasses
@@ -18,8 +18,6 @@ import numpy as np
 
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.runs import Runs, worth_compiling
-from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown
@@ -28,11 +26,12 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.draw.style import law_colour, law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.simulation import serialise
+from smc_mujoco.robustness.uncertainty import Members, Uncertainty, default_class, outside
+from smc_mujoco.robustness.worst_case_search import Search
+from smc_mujoco.simulation import run_key, serialise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import warn_of_broken
-from smc_mujoco.studies import run_key
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

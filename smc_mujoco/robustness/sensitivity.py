@@ -6,7 +6,7 @@ The uncertainties vary together, each uniformly within its bounds. An axis's fir
 the share of the score's variance that the axis alone explains. Its total index also counts what it
 does together with others, so it is 0 only for an axis that changes nothing. First-order indices add
 up to at most 1, total ones to at least 1, and so do their estimates
-(`analysis.sensitivity.estimates`, `possible`; design by A. Saltelli et al., Computer Physics
+(`robustness.sobol.estimates`, `possible`; design by A. Saltelli et al., Computer Physics
 Communications 181:259, 2010). The variance is that of the score's logarithm if all scores are
 positive, because scores are compared by their ratio. What chance decides, such as the realisation
 of noise, is an axis, too, so that it is not taken for the work of another. Intervals are bootstraps
@@ -28,8 +28,16 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.runs import Runs, worth_compiling
-from smc_mujoco.analysis.margins import TOLERATED_ERROR, rest_share
-from smc_mujoco.analysis.sensitivity import (
+from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.common.text import joined
+from smc_mujoco.draw import style
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.conventions import by_group
+from smc_mujoco.robustness.margins import TOLERATED_ERROR, rest_share
+from smc_mujoco.robustness.sobol import (
     CHANCE,
     Cut,
     Improvement,
@@ -41,15 +49,7 @@ from smc_mujoco.analysis.sensitivity import (
     indices,
     regions,
 )
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, strength
-from smc_mujoco.common.constraints import Seed, Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.progress import bar
-from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import joined
-from smc_mujoco.draw import style
-from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import by_group
+from smc_mujoco.robustness.uncertainty import Uncertainty, strength
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -179,7 +179,7 @@ class Sensitivity(Tables, SobolResult):
         """Draw the indices, and the runs over the two axes that tell most; arguments as in
         `smc.figure`.
         """
-        from smc_mujoco.draw.sensitivity import draw
+        from smc_mujoco.robustness.sensitivity_figure import draw
 
         return draw(self, path, **options)
 

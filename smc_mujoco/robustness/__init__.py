@@ -1,0 +1,1 @@
+"""What a law bears: margins, regions of attraction, worst cases, sensitivity to uncertainty."""
