@@ -58,7 +58,7 @@ def halving(plant: str) -> None:
         runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in laws])
         integrator = runs[0].scenario.resolved.integrator
         found = {}
-        for t, c in zip(runs, smc.fidelity.step_halving(runs, 0), strict=True):
+        for t, c in zip(runs, smc.accuracy.step_halving(runs, 0), strict=True):
             if c.marked:
                 found[t.scenario.law.name] = c
         marked[integrator] += len(found)

@@ -24,7 +24,7 @@ from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.search import RULE, SEARCHES
 from smc_mujoco.common.files import read_json, replacing, to_json
 from smc_mujoco.control import gain_sets
-from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
+from smc_mujoco.simulation.gaber_study import PLANTS
 from smc_mujoco.simulation.scenario import U_MAX
 
 PROCESSES = 2

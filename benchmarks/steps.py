@@ -18,8 +18,8 @@ from smc_mujoco.analysis.differ import differ, relative_range
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import first_order, halved, repetitions
 from smc_mujoco.common.text import number
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import score
+from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario

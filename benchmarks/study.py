@@ -23,7 +23,7 @@ from rich.progress import track
 from speed import plain_batch
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.studies import batches

@@ -1,4 +1,5 @@
-import smc_mujoco.evidence.papers.gaber.scenarios
+import smc_mujoco.simulation.gaber_study
+from smc_mujoco import accuracy as accuracy
 from smc_mujoco import audits as audits
 from smc_mujoco import design as design
 from smc_mujoco import envs as envs
@@ -22,6 +23,8 @@ from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import film as film
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.draw.studio import view as view
+from smc_mujoco.evidence.audit.audit import audit as audit
+from smc_mujoco.evidence.audit.audit import claims as claims
 from smc_mujoco.exchange.law_from import law_from as law_from
 from smc_mujoco.exchange.policy import policy as policy
 from smc_mujoco.identification.identify import identify as identify
@@ -72,4 +75,4 @@ from smc_mujoco.studies.table import Table as Table
 from smc_mujoco.studies.which import which as which
 
 __version__: str
-paper = smc_mujoco.evidence.papers.gaber.scenarios
+paper = smc_mujoco.simulation.gaber_study

@@ -1,4 +1,4 @@
-"""Audits of papers and laws: claims, certificates, orders of accuracy, the whole study."""
+"""Certificates, and the report."""
 
 from smc_mujoco.common import lazy
 

@@ -1,6 +1,5 @@
-"""How far a mechanism departs from its equation, and a run from itself at half the step."""
+"""How far a mechanism departs from its equation."""
 
-from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.mechanisms.fidelity import deviation
 
-__all__ = ["deviation", "step_halving"]
+__all__ = ["deviation"]

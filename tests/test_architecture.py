@@ -64,7 +64,7 @@ STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
 PROTOCOLS = {*vars(Part), *vars(Friction), *vars(Actuator)}
 PROTOCOLS |= {"value", "bounds", "parameters", "edit_on", "placed", "meets"}
 # modules of public names, which anything may import
-SHELVES = {"signals", "hardware", "errors", "design", "audits", "fidelity"}
+SHELVES = {"accuracy", "signals", "hardware", "errors", "design", "audits", "fidelity"}
 PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
@@ -129,7 +129,14 @@ def test_the_package_has_these_rooms_and_no_other():
         # git leaves the folder of a room that moved, with what Python compiled in it
         if path.is_file() or any(path.rglob("*.py")):
             entries.add(path.name)
-    assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "audits.pyi", "py.typed"} == {
+    assert entries - {
+        "__init__.py",
+        "__init__.pyi",
+        "__main__.py",
+        "accuracy.pyi",
+        "audits.pyi",
+        "py.typed",
+    } == {
         *ROOMS,
         *(f"{name}.py" for name in SHELVES),
     }
@@ -168,7 +175,7 @@ trace = smc.run(scenarios)[0]
 smc.figure(trace, "figure.png")
 smc.leaderboard(smc.study(scenarios, "study"))
 smc.plot
-for name in "exchange law_from paper problem".split():
+for name in "exchange law_from claims problem".split():
     try:
         getattr(smc, name)
     except smc.ScenarioError as error:

@@ -14,7 +14,7 @@ HOMES = (
     smc,
     *(
         getattr(smc, name)
-        for name in ("signals", "hardware", "design", "fidelity", "metrics", "exchange", "envs")
+        for name in ("signals", "hardware", "design", "accuracy", "metrics", "exchange", "envs")
     ),
 )
 PUBLIC = {name: getattr(home, name) for home in HOMES for name in home.__all__}

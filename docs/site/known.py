@@ -29,7 +29,8 @@ SHELVES = {  # module of public names -> title of its page
     "signals": "References and disturbances",
     "hardware": "Real mechanisms",
     "design": "Gains from theory, chattering, regions of attraction",
-    "audits": "Audits, certificates, orders of accuracy",
+    "accuracy": "Accuracy",
+    "audits": "Certificates, the report",
     "fidelity": "Fidelity",
     "metrics": "Scores of joints and tips",
     "exchange": "Laws from and to C and FMUs",
@@ -47,7 +48,7 @@ OTHERS = {  # title -> names of modules that are no public names
     studies.which.Advice
     analysis.tuning.result.Tuned
     identification.identify.Identified
-    evidence.accuracy.accuracy.AccuracyTable
+    evidence.accuracy.orders.AccuracyTable
     analysis.chattering.Chattering
     analysis.step_halving.StepChange
     robustness.worst_case.WorstCase
@@ -55,7 +56,7 @@ OTHERS = {  # title -> names of modules that are no public names
     evidence.audit.verdict.Claim
     """,
     "The paper, tests": """
-    evidence.papers.gaber.scenarios
+    simulation.gaber_study
     testing.plugin.step_response
     testing.plugin.smc_golden
     testing.response.StepResponse

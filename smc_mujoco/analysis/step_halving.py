@@ -6,7 +6,7 @@ an integrator of first order half the step has half of the error, so there 2.5 %
 rule holds for every number of scenes, boards and tables of chattering. Boards, whose runs start in
 many places, repeat them at half the step only, and compare medians.
 
-`smc.fidelity.step_halving([trace])[0].marked` says it of the limit cycle of a run, and takes two to
+`smc.accuracy.step_halving([trace])[0].marked` says it of the limit cycle of a run, and takes two to
 four more runs. A number without the mark may still depend on the step, and the range beside a mark
 need not hold the truth: docs/design.md says how often.
 """

@@ -14,6 +14,11 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 NAMES = re.compile(r"^from (\S+) import (\w+) as \2$", re.MULTILINE)
 ALIASES = re.compile(r"^(\w+) = (smc_mujoco\.\S+)$", re.MULTILINE)
 
+MOVED = {  # public modules of versions before the first release
+    "audits": ": see smc.claims, smc.identify and smc.accuracy",
+    "fidelity": ": see smc.accuracy",
+}
+
 
 class LazyModule(NamedTuple):
     """What a package's `__init__.py` defines; `modules` are public modules, by the names that they
@@ -42,7 +47,9 @@ def lazy_module(package: str) -> LazyModule:
     def imported(name: str) -> object:
         """Return a public function, class or module."""
         if name not in origins and name not in modules:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            raise AttributeError(
+                f"module {package!r} has no attribute {name!r}{MOVED.get(name, '')}"
+            )
         gl.mend_gl()
         with delay_ctrl_c():
             what = f"{package.replace('smc_mujoco', 'smc', 1)}.{name}"

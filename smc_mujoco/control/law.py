@@ -147,7 +147,7 @@ def law_function(
       accuracy: "s" and "e" -> theory's order of accuracy: sampled with the control period h, under
         a disturbance that the law's theorem admits, |s| and |e| end below a multiple of h to this
         power. 0: below a bound that h does not change. A number, or a function of the gains, read
-        by attribute; one without a name is for both. `smc.audits.accuracy` measures the orders.
+        by attribute; one without a name is for both. `smc.accuracy.orders` measures the orders.
       admits: "d" and "d'" -> function of the gains, read by attribute, that returns the bound below
         which |d|, N or N m, and |d'| must stay in the law's theorem. `smc.worst_case` says where a
         class goes beyond it.

@@ -45,7 +45,7 @@ def nyquist(
       scenarios: of one plant and one set of conditions, with different laws.
       channel: index of a driven channel.
       cycles, traces: predicted for these scenarios, and run.
-      changes: of the traces, see `smc.fidelity.step_halving`; marked ones get a note.
+      changes: of the traces, see `smc.accuracy.step_halving`; marked ones get a note.
       path: as in `figure`.
     """
     with style.page():

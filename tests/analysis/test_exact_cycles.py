@@ -132,6 +132,6 @@ def test_a_run_whose_cycle_depends_on_the_step_is_marked():
         "duration": 3.0,
     }
     traces = smc.run([smc.Scenario(**common, **fields) for fields in (coarse, {})])
-    wrong, right = smc.fidelity.step_halving(traces)
+    wrong, right = smc.accuracy.step_halving(traces)
     assert (wrong.marked, right.marked) == (True, False)
     assert right.amplitude < 0.02

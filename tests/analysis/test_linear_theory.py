@@ -13,13 +13,13 @@ import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.law import Law
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import steady_error
+from smc_mujoco.simulation import gaber_study
 
 H = 1e-3  # s, control period
 SMALL = 1e-4  # of the plant's x0: there tanh is linear to 1e-8
-PLANTS = [smc.plant(name) for name in scenarios.PLANTS]
+PLANTS = [smc.plant(name) for name in gaber_study.PLANTS]
 each_plant = pytest.mark.parametrize("plant", PLANTS, ids=lambda p: p.name)
 
 

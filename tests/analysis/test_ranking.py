@@ -24,7 +24,7 @@ from smc_mujoco.analysis.ranking import (
     ranks,
 )
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation import run_key
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 

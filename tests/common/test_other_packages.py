@@ -390,7 +390,7 @@ if __name__ == "__main__":
     runs = smc.grid(["sprung_cart"], laws, ["nominal"], 2, "default", 0.1)
     assert pickle.loads(pickle.dumps(runs)) == runs
     print(len(smc.study(runs, "here")), len(smc.study(runs, "here")))
-    print([claim.verdict for claim in smc.audits.claims(paper="my_paper")])
+    print([claim.verdict for claim in smc.claims(paper="my_paper")])
 """
 
 

@@ -9,13 +9,12 @@ import pytest
 
 from smc_mujoco.analysis.tuning import objective, search, search_space
 from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.simulation import grid
+from smc_mujoco.simulation import gaber_study, grid
 from smc_mujoco.simulation.run import run
 
 pytestmark = pytest.mark.quick
 
-SETS = list(itertools.product(gains.OBJECTIVES, scenarios.PLANTS))
+SETS = list(itertools.product(gains.OBJECTIVES, gaber_study.PLANTS))
 
 
 def shipped(gain_set: str, plant: str) -> dict[str, gains.TunedGains]:
@@ -32,14 +31,14 @@ def shipped(gain_set: str, plant: str) -> dict[str, gains.TunedGains]:
 @pytest.mark.slow
 def test_every_general_law_of_a_release_has_gains():
     """Of those that are missing: python benchmarks/gains.py NAME."""
-    assert set(gains.general()) == set(gains.general_laws(scenarios.PLANTS, "tuned"))
+    assert set(gains.general()) == set(gains.general_laws(gaber_study.PLANTS, "tuned"))
 
 
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_set, plant):
     for name, known in shipped(gain_set, plant).items():
         law = gains.law(plant, name, gain_set)
-        scales = search_space.scales(grid.as_plant(plant), scenarios.U_MAX)
+        scales = search_space.scales(grid.as_plant(plant), gaber_study.U_MAX)
         for one in known.sets:
             assert set(one) == set(search_space.box(law, scales)), name
 
@@ -75,7 +74,7 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
     """Set i in the runs of search i."""
     known = gains.tuned("duffing", law, gain_set)
     goal = objective.OBJECTIVES[gains.OBJECTIVES[gain_set]]
-    goal = dataclasses.replace(goal, u_max=scenarios.U_MAX)
+    goal = dataclasses.replace(goal, u_max=gaber_study.U_MAX)
     for i, expected in enumerate(known.objectives[:3]):
         cases = goal.scenarios("duffing", gains.law("duffing", law, gain_set, i), known.seed, i)
         # another processor rounds otherwise, and switching laws under noise magnify it

@@ -19,8 +19,8 @@ from helpers.plants_ab import called, measured
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import ultimate_bound
+from smc_mujoco.simulation import gaber_study as paper
 
 LAWS = pytest.mark.parametrize("name", smc.laws())
 ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])

@@ -41,7 +41,7 @@ def survivors(
     has nothing to lose: there the numbers must change. Claims with `immune` are skipped.
 
     Args:
-      paper, only, gains, quick, threads: as of `smc.audits.audit`.
+      paper, only, gains, quick, threads: as of `smc.audit`.
       report: called with how many rounds are done and how many there are: the law itself is one,
         each mutant another.
     """

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.robustness import margins
 from smc_mujoco.robustness.margins import COARSE, FINE
+from smc_mujoco.simulation import gaber_study
 
-BASE = scenarios.scenario("duffing", "observer_free", duration=4.0)
+BASE = gaber_study.scenario("duffing", "observer_free", duration=4.0)
 
 
 @pytest.fixture(scope="module")
 def found():
     """Every margin of two laws on one plant, coarsely."""
-    bases = [BASE, scenarios.scenario("duffing", "classical", duration=4.0)]
+    bases = [BASE, gaber_study.scenario("duffing", "classical", duration=4.0)]
     return margins.margins_of(bases, resolution=COARSE, threads=2)
 
 
@@ -49,7 +49,7 @@ def pushed(level):
 def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
     bases = {
         "observer_free": BASE,
-        "classical": scenarios.scenario("duffing", "classical", duration=4.0),
+        "classical": gaber_study.scenario("duffing", "classical", duration=4.0),
     }
     closed = [margin for margin in found if not margin.open]
     assert len(closed) > 5
@@ -156,7 +156,7 @@ def test_a_delay_may_be_tolerated_beyond_where_rest_turns_unstable_in_a_small_os
     (margin,) = margins.margins(["inverted_pendulum"], ["observer_free"], ["delay"], "study")
     assert margin.theory is not None
     assert margin.theory - BASE.control_period < margin.value < 1.25 * margin.theory
-    ringing = scenarios.scenario(
+    ringing = gaber_study.scenario(
         "inverted_pendulum", "observer_free", changes={"input_delay": margin.value}
     )
     x = abs(smc.run(ringing).x[:, 0])

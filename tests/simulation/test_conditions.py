@@ -12,7 +12,7 @@ import wild
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation.conditions import NAMED, applicable, find_condition, from_file, parse
 from smc_mujoco.simulation.grid import GRID_SEEDS
 from smc_mujoco.simulation.run_key import condition as reported

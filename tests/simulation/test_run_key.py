@@ -16,10 +16,9 @@ from numba import from_dtype, types
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
 from smc_mujoco.control import joint_law
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import gaber_study, serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run_key import condition, key
 
@@ -28,13 +27,13 @@ pytestmark = pytest.mark.quick
 scenario = functools.partial(runs.scenario, duration=0.05)
 
 
-@pytest.mark.parametrize("plant", scenarios.PLANTS)
+@pytest.mark.parametrize("plant", gaber_study.PLANTS)
 def test_every_condition_is_known_by_its_name(plant):
-    made = grid([plant], ["observer_free"], list(scenarios.CONDITIONS), 2, "study")
+    made = grid([plant], ["observer_free"], list(gaber_study.CONDITIONS), 2, "study")
     assert (
         [condition(s) for s in made[::2]]
         == [condition(s) for s in made[1::2]]
-        == list(scenarios.CONDITIONS)
+        == list(gaber_study.CONDITIONS)
     )
 
 

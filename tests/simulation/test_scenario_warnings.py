@@ -10,8 +10,7 @@ import warnings
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import gaber_study, serialise
 from smc_mujoco.simulation.conditions import find_condition
 
 pytestmark = pytest.mark.quick
@@ -139,7 +138,7 @@ def test_a_run_that_has_been_is_read_without_a_warning():
 def test_the_study_warns_of_nothing():
     """pytest makes errors of warnings; scenes are read by their own tests."""
     for plant in smc.plants():
-        for condition in scenarios.CONDITIONS:
+        for condition in gaber_study.CONDITIONS:
             try:
                 fields = find_condition(condition).on(smc.plant(plant), 5.0)
                 smc.Scenario(

@@ -48,7 +48,7 @@ REFUSED = {
         {"needs": "accurate, robst"},
         {"needs": "two-gains", "laws": "pid"},
     ],
-    smc.audits.accuracy: [
+    smc.accuracy.orders: [
         {"periods": [1e-3]},
         {"periods": [1e-3, 1e-3]},
         {"periods": [1e-3, 0.0]},
@@ -74,7 +74,7 @@ GIVEN = {
     smc.study: {"scenarios": [RUN], "out": "study"},
     smc.which: {"plant": "duffing"},
     smc.compare: {"laws": "classical", "plants": "duffing", "conditions": "nominal"},
-    smc.audits.accuracy: {"laws": "classical", "plants": "duffing"},
+    smc.accuracy.orders: {"laws": "classical", "plants": "duffing"},
     smc.worst_case: {"scenario": RUN},
     smc.Scene: {"title": "Two", "conditions": {"nominal": {"a": RUN}}},
 }

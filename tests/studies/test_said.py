@@ -8,7 +8,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import cache
-from smc_mujoco.evidence.accuracy import accuracy as accuracies
+from smc_mujoco.evidence.accuracy import orders as accuracies
 from smc_mujoco.robustness import worst_case
 from smc_mujoco.robustness.worst_case import WorstCase, default_budget
 from smc_mujoco.simulation import run_key

@@ -9,7 +9,7 @@ from helpers import runs
 from helpers.runs import fails_late
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare

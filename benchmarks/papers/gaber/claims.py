@@ -29,12 +29,12 @@ from smc_mujoco.control.law import law as find_law
 from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import Beside, check, ratio
 from smc_mujoco.evidence.papers.gaber import lyapunov
-from smc_mujoco.evidence.papers.gaber.scenarios import CONTROL_PERIOD, LAWS, U_MAX
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
 from smc_mujoco.robustness.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
+from smc_mujoco.simulation.gaber_study import CONTROL_PERIOD, LAWS, U_MAX
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 

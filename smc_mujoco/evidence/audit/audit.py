@@ -76,7 +76,7 @@ def audit(
     """Audit a paper: measure each claim against its threshold, and keep what every verdict rests
     on.
 
-        smc.audits.audit("./my_paper").save("evidence.json")
+        smc.audit("./my_paper").save("evidence.json")
 
     Args:
       paper: a name of `smc-mujoco claims --papers`, or a folder.

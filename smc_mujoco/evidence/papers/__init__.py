@@ -1,1 +1,1 @@
-"""What the audits in benchmarks/papers share, and the study of Gaber's paper."""
+"""What the audits in benchmarks/papers share."""

@@ -9,7 +9,7 @@ from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.progress import Report, bar
-from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.simulation import gaber_study
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent
@@ -28,8 +28,8 @@ class Plan:
     worst: bool  # whether each law's worst case is searched too
     claims: Names | None = None  # ids of the claims to judge; None for all
     kinds: Names = ("delay", "disturbance", "friction", "mass", "noise")  # of margins
-    scenes: Names = scenarios.PLANTS  # plants whose runs are shown
-    filmed: int = len(scenarios.PLANTS)  # how many of these are filmed
+    scenes: Names = gaber_study.PLANTS  # plants whose runs are shown
+    filmed: int = len(gaber_study.PLANTS)  # how many of these are filmed
     scene: float = 5.0  # duration of traces and films, s
 
 

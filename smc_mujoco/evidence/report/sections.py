@@ -22,7 +22,6 @@ from smc_mujoco.draw import dot_plot, figure
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims, summary
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import page
 from smc_mujoco.evidence.report.page import Section, heading, picture, tables, text
 from smc_mujoco.evidence.report.plan import GAINS, Work
@@ -30,6 +29,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.robustness import margins as margin_search
 from smc_mujoco.robustness.margins import MARGIN_KINDS, Margin
+from smc_mujoco.simulation import gaber_study
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
@@ -271,8 +271,8 @@ def scenes(work: Work) -> list[Markup]:
     if missing:
         parts.append(text(f"There are no films here: {missing}."))
     for k, plant in enumerate(plan.scenes):
-        names = ", ".join(scenarios.LAWS)
-        runs = scenarios.comparison(plant, duration=plan.scene, gains=GAINS)
+        names = ", ".join(gaber_study.LAWS)
+        runs = gaber_study.comparison(plant, duration=plan.scene, gains=GAINS)
         traces = run(list(runs.values()), work.threads)
         if k < plan.filmed and not missing:
             content = filmed(work, plant, traces)
@@ -293,7 +293,7 @@ def filmed(work: Work, plant: str, traces: Sequence[Trace]) -> bytes:
     kept: Any = work.kept
     return kept(
         f"film-{plant}.mp4",
-        [scenarios.LAWS, work.plan.scene, GAINS, FILM_SIZE, FILM_RATE],
+        [gaber_study.LAWS, work.plan.scene, GAINS, FILM_SIZE, FILM_RATE],
         lambda report: traces,
         lambda shown, path: video.film(shown, path, size=FILM_SIZE, fps=FILM_RATE),
         Path.read_bytes,

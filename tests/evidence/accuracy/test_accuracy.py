@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.evidence.accuracy import accuracy
+from smc_mujoco.evidence.accuracy import orders
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
 SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}
@@ -29,7 +29,7 @@ def double_integrator():
 
 
 def defaults(names, **options):
-    return smc.audits.accuracy(names, double_integrator(), gains="default", **SHORT | options)
+    return smc.accuracy.orders(names, double_integrator(), gains="default", **SHORT | options)
 
 
 @smc.law_function(gains={"k": 4.0, "c": 2.5}, accuracy={"s": 1, "e": 1})
@@ -56,7 +56,7 @@ def test_every_law_states_its_order_of_accuracy():
 @pytest.mark.slow
 def test_dry_friction_orders_the_laws_as_textbooks_do():
     laws = ["observer_free", "classical", "super_twisting", "twisting"]
-    table = smc.audits.accuracy(
+    table = smc.accuracy.orders(
         laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1
     )
     assert [row.law for row in table] == [
@@ -121,7 +121,7 @@ def test_laws_that_fail_come_last_and_say_so():
 
 def test_theory_promises_nothing_behind_a_drive():
     drive = smc.condition("slow valve", actuator=smc.Lag(0.02))
-    row = smc.audits.accuracy("twisting", "duffing", (4e-3, 2e-3), drive, seeds=1, duration=10.0)[0]
+    row = smc.accuracy.orders("twisting", "duffing", (4e-3, 2e-3), drive, seeds=1, duration=10.0)[0]
     assert row.e.theory is None
     assert "no promise behind a drive" in row.why
     assert abs(row.e.order) < 0.5, "the lag, not the period, sets the amplitude"
@@ -129,7 +129,7 @@ def test_theory_promises_nothing_behind_a_drive():
 
 def test_every_period_has_every_start():
     fine = smc.condition("fine", physics_step=2.5e-4)
-    setup = accuracy._setup(
+    setup = orders._setup(
         smc.plant("duffing"), fine, "twisting", (4e-3, 2e-3), (3, 5), "tuned", 1.5, None
     )
     runs = []
@@ -145,7 +145,7 @@ def test_every_period_has_every_start():
 
 
 def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
-    table = smc.audits.accuracy(
+    table = smc.accuracy.orders(
         ["hierarchical"], "cart_pole", (4e-3, 2e-3), "nominal", seeds=2, duration=1.0
     )
     assert table[0].gains == "default"

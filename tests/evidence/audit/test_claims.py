@@ -34,9 +34,9 @@ from smc_mujoco.evidence.audit.verdict import (
     verdict,
 )
 from smc_mujoco.evidence.papers.gaber import lyapunov
-from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation.gaber_study import PLANTS
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run_key import key
 

@@ -94,9 +94,7 @@ def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tm
     copy.mkdir(parents=True)
     for file in folder.glob("*.*"):
         (copy / file.name).write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
-    code = (
-        "import sys, smc_mujoco as smc; smc.audits.audit(sys.argv[1], threads=1).save(sys.argv[2])"
-    )
+    code = "import sys, smc_mujoco as smc; smc.audit(sys.argv[1], threads=1).save(sys.argv[2])"
     there = tmp_path / "there.json"
     subprocess.run(
         [sys.executable, "-c", code, str(copy), str(there)],

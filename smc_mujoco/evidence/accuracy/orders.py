@@ -1,6 +1,7 @@
-"""Accuracy: how a law's error falls with the control period, beside the order that theory promises.
+"""Orders of accuracy: how a law's error falls with the control period, beside the order that theory
+promises.
 
-    table = accuracy(["classical", "twisting", "super_twisting"], "duffing", conditions="coulomb")
+    table = orders(["classical", "twisting", "super_twisting"], "duffing", conditions="coulomb")
     print(table)                                  # the most accurate law first
     table[0].e.order, table[0].e.theory           # exponent of the period, measured and promised
 
@@ -117,7 +118,7 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
 
 
 @constrained
-def accuracy(
+def orders(
     laws: str | Law | Template | Sequence[str | Law | Template],
     plants: str | Plant | Sequence[str | Plant],
     periods: Sequence[float] = PERIODS,
