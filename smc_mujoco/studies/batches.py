@@ -1,22 +1,24 @@
-"""Computation of a study's runs, in batches.
+"""Computation of a study's runs, in batches, on threads here or by the workers of an Executor.
 
 A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a
-killed study loses at most two: one is stored while the next one runs. The results do not depend on
-the batch.
+killed study loses at most two: one is stored while the next one runs. The results depend neither on
+the batch nor on the machine.
 """
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
 from smc_mujoco.metrics.catalogue import arrived, score, trends
+from smc_mujoco.simulation import workers
 from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.run import Report, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies import run_key
 
 # of a batch, see `Scenario.work`: 4 to 10 s of a core. It does not depend on the number of threads,
 # so that a study writes the same parts with any
@@ -59,6 +61,38 @@ def run_batch(
     """Return the traces of a batch, in its order."""
     traces = dict(stream(batch, threads, report))
     return [traces[i] for i in range(len(batch))]
+
+
+def compute_elsewhere(
+    batches: Sequence[Batch],
+    executor: Executor,
+    plants: run_key.Hashes,
+    finish: Callable[[Batch, Sequence[ResultColumns]], None],
+    report: Report = lambda steps: None,
+) -> None:
+    """Have the workers of an Executor run batches. They send back result columns, not traces."""
+    calls = []
+    for batch in batches:
+        scenarios = [prepared.scenario for prepared in batch]
+        calls.append((scenarios, [run_key.key(s, plants=plants) for s in scenarios]))
+    for i, columns in workers.called(executor, scored, calls):
+        finish(batches[i], columns)
+        report(sum(prepared.scenario.work for prepared in batches[i]))
+
+
+def scored(scenarios: Sequence[Scenario], keys: Sequence[str]) -> list[ResultColumns]:
+    """Return the result columns of scenarios, on a worker, on one thread.
+
+    Raises:
+      ScenarioError: the key of a scenario is another one here, because its law is.
+    """
+    plants: run_key.Hashes = {}
+    for scenario, key in zip(scenarios, keys, strict=True):
+        if run_key.key(scenario, plants=plants) != key:
+            raise ScenarioError(
+                f"a worker has other code for {scenario.law}: install the same there as here"
+            )
+    return [result_columns(trace) for trace in run_batch(scenarios, 1)]
 
 
 def compute(

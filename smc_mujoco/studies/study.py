@@ -37,6 +37,7 @@ from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.simulation.workers import opened
 from smc_mujoco.studies import batches
 from smc_mujoco.studies import table as tables
 from smc_mujoco.studies.batches import Batch
@@ -44,6 +45,8 @@ from smc_mujoco.studies.table import Table
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from smc_mujoco.simulation.workers import Workers
 
 # One condition of each kind. IDEAL: the paper's. REAL: friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
@@ -183,6 +186,7 @@ def study(
     threads: int | None = None,
     progress: bool = False,
     half_steps: bool = False,
+    executor: "Workers | None" = None,
 ) -> Table:
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return
     it.
@@ -200,10 +204,13 @@ def study(
       half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no
         winner that the step decides: all of them where constraints may act or the integrator is not
         RK4, elsewhere one seed in four.
+      executor: where the runs are computed in place of threads of this process: an Executor of
+        `concurrent.futures`, a dask Client, or a dask scheduler's address, "dask://HOST:PORT". The
+        table has the same bytes.
 
     Raises:
-      ScenarioError: scenarios that cannot be run, or a folder that cannot be written. Finished
-        runs stay.
+      ScenarioError: scenarios that cannot be run, a folder that cannot be written, or an executor
+        that stops. Finished runs stay.
     """
     threads = cores(threads)
     store = Store(Path(out))
@@ -217,7 +224,7 @@ def study(
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
         print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
-    _compute(missing, store, plants, threads, progress)
+    _compute(missing, store, plants, threads, progress, executor)
     changes = {name: run_key.source(s) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():
         changes[name] = changes[name] | {"half_step": scores}
@@ -242,6 +249,7 @@ def _compute(
     plants: run_key.Hashes,
     threads: int,
     progress: bool,
+    executor: "Workers | None",
 ) -> None:
     """Compute runs, given by key, and store their rows as they finish."""
     # made before any run: a law may change its globals
@@ -249,15 +257,23 @@ def _compute(
     for key, scenario in missing.items():
         first[id(scenario)] = {"hash": key}
 
-    def finish(batch: Batch, finished: Sequence[Trace]) -> None:
+    def finish(batch: Batch, columns: Sequence[batches.ResultColumns]) -> None:
         rows = []
-        for prepared, trace in zip(batch, finished, strict=True):
+        for prepared, results in zip(batch, columns, strict=True):
             row = run_key.row(prepared.scenario, plants) | first[id(prepared.scenario)]
-            rows.append(row | batches.result_columns(trace))
+            rows.append(row | results)
         store.add(rows)
 
+    def score(batch: Batch, finished: Sequence[Trace]) -> None:
+        finish(batch, list(map(batches.result_columns, finished)))
+
+    work = batches.batches(missing.values())
     with counter(len(missing), sum(s.work for s in missing.values()), progress) as stepped:
-        batches.compute(batches.batches(missing.values()), threads, finish, stepped)
+        if executor is None:
+            batches.compute(work, threads, score, stepped)
+        else:
+            with opened(executor) as pool:
+                batches.compute_elsewhere(list(work), pool, plants, finish, stepped)
 
 
 def _repeated(
