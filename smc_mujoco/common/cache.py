@@ -3,18 +3,67 @@ twice.
 """
 
 import contextlib
+import dataclasses
 import hashlib
 import json
 import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.files import reading, writable
 from smc_mujoco.common.version import versions
 
 T = TypeVar("T")
+
+
+@dataclasses.dataclass(frozen=True)
+class Kept(Generic[T]):
+    """The file of one result.
+
+    Its name ends in two hashes. One is of `depends` (as JSON), the code and the versions. The other
+    is of the content, so that a changed file is not read. When a file is written, files with other
+    hashes are removed.
+    """
+
+    path: Path
+    depends: object
+    save: Callable[[T, Path], object]
+    load: Callable[[Path], T]
+
+    @property
+    def stem(self) -> str:
+        """The name of the file without the hash of its content and its suffix."""
+        about = [self.depends, fingerprint.package(), versions()]
+        text = json.dumps(about, sort_keys=True, default=str)
+        return f"{self.path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+
+    def read(self) -> T | None:
+        """Return the result, or None if no file has it."""
+        folder = self.path.parent
+        for file in folder.glob(f"{self.stem}-{'?' * 12}{self.path.suffix}"):
+            with contextlib.suppress(
+                Exception
+            ):  # damaged bytes may raise any exception: compute the result again
+                if file.stem.endswith(_seal(folder.glob(f"{file.stem}.*"))):
+                    return self.load(file)
+        return None
+
+    def keep(self, made: T) -> T:
+        """Write the result, and return it as it is read."""
+        path = self.path
+        with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as scratch:
+            self.save(made, Path(scratch, path.name))
+            written = sorted(
+                Path(scratch).iterdir(), key=lambda file: file.suffix == path.suffix
+            )  # the file itself last
+            final = path.with_stem(f"{self.stem}-{_seal(written)}")
+            for old in path.parent.glob(f"{path.stem}-{'?' * 12}-{'?' * 12}.*"):
+                old.unlink()
+            for file in written:
+                file.replace(final.with_suffix(file.suffix))
+        return self.load(final)
 
 
 def cached(
@@ -24,33 +73,12 @@ def cached(
     save: Callable[[T, Path], object],
     load: Callable[[Path], T],
 ) -> T:
-    """Return the result of `make`, from its file if there is one.
-
-    The file's name ends in two hashes. One is of `depends` (as JSON), the code and the versions.
-    The other is of the content, so that a changed file is not read. When a file is written, files
-    with other hashes are removed.
-    """
-    text = json.dumps([depends, fingerprint.package(), versions()], sort_keys=True, default=str)
-    stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    for file in path.parent.glob(f"{stem}-{'?' * 12}{path.suffix}"):
-        with contextlib.suppress(
-            Exception
-        ):  # damaged bytes may raise any exception: compute the result again
-            if file.stem.endswith(_seal(path.parent.glob(f"{file.stem}.*"))):
-                return load(file)
+    """Return the result of `make`, from its file if there is one; see `Kept`."""
+    kept = Kept(path, depends, save, load)
+    if (found := kept.read()) is not None:
+        return found
     writable(path)
-    made = make()
-    with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as scratch:
-        save(made, Path(scratch, path.name))
-        written = sorted(
-            Path(scratch).iterdir(), key=lambda file: file.suffix == path.suffix
-        )  # the file itself last
-        final = path.with_stem(f"{stem}-{_seal(written)}")
-        for old in path.parent.glob(f"{path.stem}-{'?' * 12}-{'?' * 12}.*"):
-            old.unlink()
-        for file in written:
-            file.replace(final.with_suffix(file.suffix))
-    return load(final)
+    return kept.keep(make())
 
 
 def _seal(files: Iterable[Path]) -> str:

@@ -32,9 +32,9 @@ import contextlib
 import dataclasses
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -56,7 +56,7 @@ from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Array, Floats, Names
-from smc_mujoco.common.cache import cached
+from smc_mujoco.common.cache import Kept
 from smc_mujoco.common.constraints import FilePath, Whole, constrained
 from smc_mujoco.common.errors import (
     BrokenLawError,
@@ -65,7 +65,8 @@ from smc_mujoco.common.errors import (
     find,
     users_stacklevel,
 )
-from smc_mujoco.common.progress import bar, told
+from smc_mujoco.common.files import writable
+from smc_mujoco.common.progress import Bar, bar, told
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.custom.scales import falls
@@ -80,6 +81,10 @@ from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max, stepped_by_mujoco
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.simulation.workers import called, opened
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.workers import Workers
 
 Gains = tuple[float, ...]
 SCREENED_SHARE, EVOLVED_SHARE = 1 / 8, 1 / 2  # of the evaluations; the rest descend
@@ -121,6 +126,7 @@ def tune(
     folder: Annotated[AnyPath, FilePath()] | None = None,
     outside_theorem: bool = False,
     device: Device = "cpu",
+    executor: "Workers | None" = None,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
@@ -139,6 +145,8 @@ def tune(
       folder: keeps each search as soon as it ends. After a kill, the same call resumes there.
       outside_theorem: whether gains may miss the conditions of the law's theorem.
       device: on which the fast engine runs candidates, "cpu" or "cuda".
+      executor: where the searches are made side by side, one on each worker, as in `study`; the
+        gains are the same.
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,
@@ -167,20 +175,69 @@ def tune(
     words = f"tuning {task.law.name} for {task.plant.name}"
     if progress:
         told(words, expected(task, searches))
-    codes = None if folder is None else task.codes()
     words += ": evaluation"
     with bar(words, searches * task.size, shown=progress, counted=True) as shown:
-
-        def found(i: int) -> SearchResult:
-            start = time.monotonic()
-            made = task.kept(i, failure, shown.advance, folder, codes)
-            shown.add_piece(time.monotonic() - start, searches - i - 1)
-            shown.reached((i + 1) * task.size, searches * task.size)
-            return made
-
-        tuned = _result(task, tuple(map(found, range(searches))))
+        files = [] if folder is None else task.files(searches, folder)
+        found = {i: made for i, file in enumerate(files) if (made := file.read())}
+        missing = [i for i in range(searches) if i not in found]
+        shown.advance(len(found) * task.size)
+        writable(*(files[i].path for i in missing if files))
+        if executor is None:
+            work = _searched_here(task, missing, failure, shown)
+        else:
+            work = _searched_elsewhere(task, missing, failure, shown, executor)
+        for i, made in work:
+            found[i] = files[i].keep(made) if files else made
+        tuned = _result(task, tuple(found[i] for i in range(searches)))
     _warn_of_result(tuned)
     return tuned.sourced()
+
+
+def _searched_here(
+    task: "Task", missing: Sequence[int], failure: str, shown: Bar
+) -> Iterator[tuple[int, SearchResult]]:
+    """Make searches one after the other, and yield the number and the result of each."""
+    before = shown.done
+    for count, i in enumerate(missing, 1):
+        start = time.monotonic()
+        yield i, task.search(i, failure, shown.advance)
+        shown.add_piece(time.monotonic() - start, len(missing) - count)
+        shown.reached(before + count * task.size, shown.whole)
+
+
+def _searched_elsewhere(
+    task: "Task", missing: Sequence[int], failure: str, shown: Bar, executor: "Workers"
+) -> Iterator[tuple[int, SearchResult]]:
+    """Have workers make searches side by side, and yield the number and the result of each."""
+    made_of = task.plant, task.law, task.goal, task.budget, task.seed
+    codes = task.codes()
+    calls = [(*made_of, task.outside_theorem, i, failure, codes) for i in missing]
+    with opened(executor) as pool:
+        for k, made in called(pool, searched, calls):
+            yield missing[k], made
+            shown.advance(task.size)
+
+
+def searched(
+    plant: Plant,
+    law: Component,
+    goal: Objective,
+    budget: int,
+    seed: int,
+    outside_theorem: bool,
+    i: int,
+    failure: str,
+    codes: Any,
+) -> SearchResult:
+    """Make search i of a task, on a worker, on one thread of its processor.
+
+    Raises:
+      ScenarioError: the law's code is another one here.
+    """
+    task = task_of(plant, law, goal, budget, seed, 1, outside_theorem)
+    if task.codes() != codes:
+        raise ScenarioError(f"a worker has other code for {law.name}: install the same there")
+    return task.search(i, failure, lambda count: None)
 
 
 def expected(task: "Task", searches: int) -> float:
@@ -413,30 +470,23 @@ class Task(NamedTuple):
         ranges = template and (dict(template.gains), dict(template.conditions))
         return code_hashes(self.cases(0)[0], {}), fingerprint.of((self.law.function, ranges))
 
-    def kept(
-        self,
-        i: int,
-        failure: str,
-        report: Report,
-        folder: AnyPath | None,
-        codes: Any,
-    ) -> SearchResult:
-        """Return what search i finds, or has found in an earlier call with this folder."""
-        if folder is None:
-            return self.search(i, failure, report)
-        first, *_ = self.cases(i)
-        depends = (
-            serialise.describe(first),
-            self.goal.describe(),
-            codes,
-            self.budget,
-            self.outside_theorem,
-            list(self.box.items()),
-        )
-        path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}.json"
-        return cached(
-            path, depends, lambda: self.search(i, failure, report), SearchResult.save, load_found
-        )
+    def files(self, searches: int, folder: AnyPath) -> "list[Kept[SearchResult]]":
+        """Return the files of that many searches in a folder."""
+        codes = self.codes()
+        files = []
+        for i in range(searches):
+            first, *_ = self.cases(i)
+            depends = (
+                serialise.describe(first),
+                self.goal.describe(),
+                codes,
+                self.budget,
+                self.outside_theorem,
+                list(self.box.items()),
+            )
+            path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}.json"
+            files.append(Kept(path, depends, SearchResult.save, load_found))
+        return files
 
     def search(self, i: int, failure: str, report: Report) -> SearchResult:
         """Make search i.
