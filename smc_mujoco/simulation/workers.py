@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
-from smc_mujoco.common.extras import package
+from smc_mujoco.common.extras import extra
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component
 
@@ -145,7 +145,7 @@ def opened(executor: Any) -> Iterator[Executor]:
 @contextlib.contextmanager
 def _client(address: str) -> "Iterator[Client]":
     """Yield a client of the dask scheduler at an address."""
-    with package("distributed", f"executor {address!r}"):
+    with extra("cluster", f"executor {address!r}"):
         from distributed import Client  # pyright: ignore[reportMissingImports]
     url = f"tcp://{address.partition('://')[2]}"
     try:
