@@ -13,12 +13,11 @@ from typing import Any
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
 from smc_mujoco.metrics.catalogue import arrived, score, trends
-from smc_mujoco.simulation import workers
+from smc_mujoco.simulation import run_key, workers
 from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.run import Report, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import run_key
 
 # of a batch, see `Scenario.work`: 4 to 10 s of a core. It does not depend on the number of threads,
 # so that a study writes the same parts with any

@@ -15,10 +15,10 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.search import searched, tune
-from smc_mujoco.simulation import workers
+from smc_mujoco.simulation import run_key, workers
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.workers import called, opened
-from smc_mujoco.studies import batches, run_key
+from smc_mujoco.studies import batches
 from smc_mujoco.studies.study import study
 
 pytestmark = pytest.mark.quick
@@ -184,7 +184,7 @@ CLIENT = """
 import math, sys, time
 from pathlib import Path
 import smc_mujoco as smc
-from smc_mujoco.simulation import workers
+from smc_mujoco.simulation import run_key, workers
 from smc_mujoco.studies import batches
 from smc_mujoco.studies.study import Store
 
