@@ -12,7 +12,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.plant import Plant
 
@@ -123,11 +122,17 @@ def driven_names(plant: Plant) -> tuple[str, ...]:
 
 
 @functools.lru_cache(maxsize=32)
+def loaded(plant: Plant) -> mujoco.MjModel:
+    """Return the model of a plant without parts. It is shared, so copy it before a change."""
+    return plant.load()
+
+
+@functools.lru_cache(maxsize=32)
 def channel_names(plant: Plant) -> tuple[str, ...]:
     """Return a name for each channel, (n,): that of its joint, or for a pose such as body_x or
     base_rz.
     """
-    model = compiled(plant.spec())
+    model = loaded(plant)
     names = [model.joint(int(joint)).name for joint in joint_ids(model)]
     if plant.pose:
         return tuple(f"{name}_{place}" for name, place in zip(names, PLACES, strict=True))
@@ -139,7 +144,7 @@ def channel_names(plant: Plant) -> tuple[str, ...]:
 @functools.lru_cache(maxsize=32)
 def all_joints(plant: Plant) -> tuple[str, ...]:
     """Return the names of all hinges and slides of a plant, first those of its channels."""
-    model = compiled(plant.spec())
+    model = loaded(plant)
     names = []
     for joint in range(model.njnt):
         if model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE.value:  # or a hinge
@@ -155,7 +160,7 @@ def moves_alone(plant: Plant) -> bool:
 
     Springs and dampers may join the joints, because their forces are smooth.
     """
-    model = compiled(plant.spec())
+    model = loaded(plant)
     motors = np.all(model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED) and np.all(
         model.actuator_gainprm[:, 0] == 1
     )
@@ -235,3 +240,11 @@ def state_with(
     qpos[model.jnt_qposadr[joints]] = x
     qvel[model.jnt_dofadr[joints]] = v
     return qpos, qvel
+
+
+def posed(model: mujoco.MjModel, x: Any) -> mujoco.MjData:
+    """Return the data of a model with its channels at x, (n,) rad or m, at rest."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = state_with(model, moving_joints(model), x, 0.0)[0]
+    mujoco.mj_kinematics(model, data)
+    return data

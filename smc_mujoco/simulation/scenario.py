@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.hardware.friction import DryFriction, LuGre
 from smc_mujoco.mechanisms.hardware.moments import Torque
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, Part, chains
 from smc_mujoco.mechanisms.hardware.rotors import Rotors, flies
-from smc_mujoco.mechanisms.layout import channel_names, drive_ids, driven_names, moves_alone
+from smc_mujoco.mechanisms.layout import channel_names, drive_ids, driven_names, loaded, moves_alone
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
@@ -557,7 +557,7 @@ class Scenario:
             return -1
         names = driven_names(self.plant)
         if self.plant.pose:
-            model = compiled(self.plant.spec())
+            model = loaded(self.plant)
             names = [model.actuator(i).name for i in drive_ids(model).tolist()]
         return find("actuator of Fault", self.fault.on, dict(zip(names, itertools.count())))
 
@@ -878,7 +878,7 @@ def check_function_of_time(name: str, signal: Signal, cure: str) -> None:
 @functools.lru_cache(maxsize=32)
 def bodies(plant: Plant) -> tuple[str, ...]:
     """Return the names of a plant's bodies."""
-    model = compiled(plant.spec())
+    model = loaded(plant)
     return tuple(name for i in range(1, model.nbody) if (name := model.body(i).name))
 
 
@@ -1022,7 +1022,18 @@ def check_inertia(s: Resolved) -> None:
 
 
 def check_obstacles(s: Resolved) -> None:
-    """Check that a run does not start beyond a stop or in a wall."""
+    """Check that a run does not start beyond a stop or in a wall, nor a user's model inside what
+    it does not start in by itself.
+    """
+    if s.plant.is_user_model and s.x0 != s.plant.x0:
+        from smc_mujoco.mechanisms.custom.clearance import DEPTH, overlap
+
+        inside = overlap(s.plant, s.x0)
+        if inside.depth > max(DEPTH, overlap(s.plant, s.plant.x0).depth):
+            raise ScenarioError(
+                f"x0 {shown(s.x0)} of {s.plant.name} has {inside}: give another x0, or starts "
+                "with less spread"
+            )
     for part in s.contact:
         if met := part.meets(s.plant, s.x0):
             raise ScenarioError(f"x0 of {s.plant.name} has {met}: give another x0, or more room")
@@ -1111,7 +1122,7 @@ def _doubts(s: Resolved) -> Iterator[str]:
         if isinstance(part, LuGre) and (part.stiffness > LuGre.stiffness or s.plant.is_user_model):
             damping = part.damping
             if damping is None:
-                model = compiled(s.plant.spec())
+                model = loaded(s.plant)
                 damping = part.default_damping(model.dof_M0[part.dofs(model)].min())
             if part.stiffness * s.physics_step > MAX_LATENESS * damping:
                 yield (

@@ -8,21 +8,17 @@ is as the model says. "held": other joints with a motor are held there too, by a
 import functools
 import math
 from collections.abc import Collection, Iterable, Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.custom import urdf
 from smc_mujoco.mechanisms.custom.channels import (
     FREE,
     ONE_JOINT,
     UNIT_OF_JOINT,
     Pairs,
     add_motor,
-    goals,
     joints_of,
     starts,
 )
@@ -30,7 +26,6 @@ from smc_mujoco.mechanisms.custom.mjcf import Source
 
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
-DEPTH = 5e-3  # m, chosen: soft feet stand less deep
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE
 
 
@@ -75,50 +70,6 @@ def at_start(
             data.qpos[model.joint(joint).qposadr[0]] = x
     mujoco.mj_forward(model, data)
     return model, data
-
-
-def check_clear(source: Source, channels: Pairs, keyframe: str | None) -> None:
-    """Raise ScenarioError if what the channels move starts or should end inside something."""
-    model, data = at_start(source, channels, keyframe)
-    joints = joints_of(channels)
-    moved = np.zeros(model.nbody, bool)
-    moved[[model.joint(joint).bodyid[0] for joint in joints]] = True
-    for i in range(1, model.nbody):
-        moved[i] |= moved[model.body_parentid[i]]
-    at = mujoco.MjData(model)
-    at.qpos[:] = data.qpos  # the start, of a free body also the goal
-    of_urdf = urdf.read(Path(source.path)) is not None
-    if model.joint(joints[0]).type[0] != FREE:
-        for joint, x in zip(joints, goals(model, joints, keyframe)[0], strict=True):
-            at.qpos[model.joint(joint).qposadr[0]] = x
-    for what in ("goal", "start"):
-        mujoco.mj_fwdPosition(model, at)
-        for contact in at.contact:
-            bodies = model.geom_bodyid[contact.geom]
-            weld = model.body_weldid[bodies]
-            above = model.body_weldid[model.body_parentid[weld.max()]]
-            if of_urdf and weld.min() == above == 0:  # excluded where static links are the world
-                continue
-            if contact.dist < -DEPTH and moved[bodies[0]] != moved[bodies[1]]:
-                first, second = (
-                    model.geom(i).name or model.body(model.geom_bodyid[i]).name or f"geom {i}"
-                    for i in contact.geom.tolist()
-                )
-                if what == "start":
-                    cure = "another x0"
-                elif of_urdf:
-                    cure = "one of these links no <collision> in the file"
-                else:
-                    pair = [model.body(i).name or "GIVE-IT-A-NAME" for i in bodies.tolist()]
-                    cure = (
-                        "a keyframe in which they do not touch, or <exclude "
-                        f'body1="{pair[0]}" body2="{pair[1]}"/> in the <contact> of the file'
-                    )
-                raise ScenarioError(
-                    f"the {what} of {source.label} has {first!r} {-1e3 * contact.dist:.0f} mm "
-                    f"inside {second!r}: give {cure}"
-                )
-        at.qpos[:] = data.qpos
 
 
 def edit(

@@ -36,6 +36,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
+from smc_mujoco.mechanisms.custom.clearance import DEPTH, overlap
 from smc_mujoco.mechanisms.custom.constraints import (
     default_friction,
     smooth,
@@ -44,7 +45,8 @@ from smc_mujoco.mechanisms.custom.constraints import (
 )
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.custom.others import OTHERS, check_clear, limp, ties
+from smc_mujoco.mechanisms.custom.others import OTHERS, limp, ties
+from smc_mujoco.mechanisms.custom.scales import rises
 from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
 from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges
 
@@ -118,10 +120,10 @@ def plant_from(
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.read()
     model = source.compiled(spec)
-    if touches(model):
-        check_clear(source, pairs, keyframe)
     read = urdf.read(Path(source.path))
     doubts = [*(read.notes(source.label) if read else ()), *softness_warnings(source.label, made)]
+    if touches(model):
+        doubts += _overlaps(source.label, made, of_urdf=read is not None)
     _, outside = ((), []) if made.pose else own.goals(model, joints_of(pairs), keyframe)
     for joint in outside:
         doubts.append(
@@ -143,6 +145,34 @@ def plant_from(
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return made
+
+
+def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
+    """Return a sentence on a start inside something from which the robot rises. Raise ScenarioError
+    for a start or a goal inside something from which it does not.
+    """
+    found = {what: overlap(made, x) for what, x in (("start", made.x0), ("goal", made.origin))}
+    deep = {what: inside for what, inside in found.items() if inside.depth > DEPTH}
+    if not deep:
+        return []
+    if all(rises(made, x) for x in dict.fromkeys((made.x0, made.origin))):
+        what, inside = next(iter(deep.items()))
+        return [
+            f"the {what} of {label} has {inside}: it rises from there and stands, so its first "
+            "moments are of that; give a keyframe that stands on the ground"
+        ]
+    what, inside = deep.popitem()  # the goal's, if it has one: another x0 does not help there
+    if what == "start":
+        cure = "another x0"
+    elif of_urdf:
+        cure = "one of these links no <collision> in the file"
+    else:
+        first, second = (name or "GIVE-IT-A-NAME" for name in inside.bodies)
+        cure = (
+            "a keyframe in which they do not touch, or <exclude "
+            f'body1="{first}" body2="{second}"/> in the <contact> of the file'
+        )
+    raise ScenarioError(f"the {what} of {label} has {inside}: give {cure}")
 
 
 def _plant(

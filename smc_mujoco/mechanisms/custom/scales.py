@@ -3,6 +3,7 @@
 Tuning and the default bound on u need them.
 """
 
+import copy
 import functools
 import math
 from typing import NamedTuple
@@ -11,15 +12,27 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Floats
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.mjcb import silence
 from smc_mujoco.mechanisms.custom.channels import ONE_JOINT
-from smc_mujoco.mechanisms.layout import dof_ids, driven_ids, initial_pose, joint_ids
+from smc_mujoco.mechanisms.custom.clearance import DEPTH, TOUCH, deepest, overlap
+from smc_mujoco.mechanisms.layout import (
+    channel_names,
+    dof_ids,
+    driven_ids,
+    initial_pose,
+    joint_ids,
+    loaded,
+    posed,
+)
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant
 
 # All chosen; the need's terms were each missed by a machine that did not arrive without it.
 STEP = 1e-5  # rad or m, and rad/s or m/s, of central differences
 BESIDE = 0.3  # rad or m: how far beside its goal a joint starts by default
 ROOM = 0.6  # of the way to a limit, at most
+HALVINGS = 5  # of this way, where it ends inside something
+FARTHEST = 1.2  # of this way: where the runs of a grid start, which spread by 20 %
 HOLD = 2.0  # s for which a plant on a free base is held; its load is that of the second half
 STIFF = 100.0  # rad/s, of the PD that holds it
 STIFFNESS = 60.0  # 1/s^2, of the inertia, in the need
@@ -42,11 +55,10 @@ class AtGoal(NamedTuple):
     strayed: float  # how far the base moves while it is held, in its own sizes; 0 if it is fixed
 
 
-def _goal(plant: Plant) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    model = plant.load()
-    data = mujoco.MjData(model)
-    data.qpos[:] = initial_pose(model)
-    data.qpos[model.jnt_qposadr[joint_ids(model)]] = plant.origin
+def _at(plant: Plant, x: Floats) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Return a model of one's own, and its data with the channels at x, (n,) rad or m."""
+    model = copy.copy(loaded(plant))
+    data = posed(model, x)
     mujoco.mj_forward(model, data)
     return model, data
 
@@ -62,7 +74,7 @@ def _forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 @functools.lru_cache(maxsize=32)
 def at_goal(plant: Plant) -> AtGoal:
     """Return what moves a user's joints about their default goal."""
-    model, data = _goal(plant)
+    model, data = _at(plant, plant.origin)
     dofs = dof_ids(model)[: plant.driven]
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
@@ -133,6 +145,23 @@ def _held(
     return load, float(np.linalg.norm(data.xpos[base] - first) / size)
 
 
+@functools.lru_cache(maxsize=32)
+def rises(plant: Plant, x: Floats) -> bool:
+    """Return whether a robot on a free base comes out of what it stands in with its channels at x,
+    (n,) rad or m, and stands while its joints are held there.
+    """
+    model, data = _at(plant, x)
+    if not (base := _free_base(model)):
+        return False
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    load = -_forces(model, data)[dof_ids(model)[: plant.driven]]
+    _, strayed = _held(model, data, base, load, M)
+    if strayed > 1.0 or tips_over(model, data):
+        return False
+    return deepest(plant, model, data).depth <= DEPTH
+
+
 def falls(plant: Plant) -> str:
     """Return a sentence if the base of a user's plant falls while its joints are held, or ""."""
     if plant.pose or not plant.is_user_model or at_goal(plant).strayed <= 1.0:
@@ -162,19 +191,40 @@ def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
 
 @functools.lru_cache(maxsize=32)
 def beside_goal(plant: Plant) -> Floats:
-    """Return a start beside the default goal, (n,): the driven joints move towards the limit with
-    more room.
+    """Return a start beside the default goal, (n,): each driven joint moves towards the limit with
+    more room, and less far or the other way where that ends inside something.
+
+    Raises:
+      ScenarioError: it does so wherever the joint moves.
     """
-    x0 = list(plant.origin)
+    x0 = plant.origin
     limits = plant.ranges or (("", -math.inf, math.inf),) * plant.driven
     for i, (_, low, high) in enumerate(limits[: plant.driven]):
-        up = high - x0[i]
-        down = x0[i] - low
-        if up >= down:
-            x0[i] += min(BESIDE, ROOM * up)
-        else:
-            x0[i] -= min(BESIDE, ROOM * down)
-    return tuple(x0)
+        x0 = _clear_start(plant, x0, i, x0[i] - low, high - x0[i])
+    return x0
+
+
+def _clear_start(plant: Plant, x0: Floats, i: int, down: float, up: float) -> Floats:
+    """Return a start in which joint i is moved, the farthest of those that touch nothing; `down`
+    and `up` are the ways to its limits.
+    """
+    sides = [min(BESIDE, ROOM * up), -min(BESIDE, ROOM * down)]
+    if down > up:
+        sides.reverse()
+    ways = sorted((side / 2**k for side in sides for k in range(HALVINGS)), key=abs, reverse=True)
+    at_goal = overlap(plant, plant.origin).depth
+    places: list[Floats] = []
+    for allowed in (max(TOUCH, at_goal), max(DEPTH, at_goal)):
+        for way in ways:
+            places = [(*x0[:i], x0[i] + share * way, *x0[i + 1 :]) for share in (1.0, FARTHEST)]
+            if all(overlap(plant, place).depth <= allowed for place in places):
+                return places[0]
+    joint = channel_names(plant)[i]
+    raise ScenarioError(
+        f"wherever joint {joint!r} of {plant.name} starts beside its goal, that pose has "
+        f"{overlap(plant, places[1])}: say where runs begin, with starts=smc.starts(x0=...) or "
+        "--x0, or give others='held' or 'file' if it is to stand"
+    )
 
 
 @functools.lru_cache(maxsize=32)

@@ -28,12 +28,15 @@ class Urdf(NamedTuple):
     raised: list[str]  # links with an inertia that no body has
 
     def spec(self) -> mujoco.MjSpec:
-        """Return it with its visual shapes, which replace the others in pictures. No link touches
-        the one that carries it, which MuJoCo does not see where that is part of the world.
+        """Return it with its visual shapes, which replace the others in pictures, and with names of
+        shapes by which a sentence tells the link. No link touches the one that carries it, which
+        MuJoCo does not see where that is part of the world.
         """
         assets = {name: file.read_bytes() for name, file in self.meshes.items()}
         spec = mujoco.MjSpec.from_string(self.text, assets=assets)
         for body in spec.bodies:
+            for k, geom in enumerate(body.geoms):
+                geom.name = geom.name or (f"{body.name}:{k}" if k else body.name)
             if not all(geom.contype for geom in body.geoms):
                 for geom in body.geoms:
                     if geom.contype:

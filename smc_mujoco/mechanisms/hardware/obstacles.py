@@ -26,7 +26,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import contact
 from smc_mujoco.mechanisms.hardware.contact import FIRM_IMPEDANCE, Obstacle, solref
 from smc_mujoco.mechanisms.hardware.part import Positive
-from smc_mujoco.mechanisms.layout import OWN, moving_joints, state_with
+from smc_mujoco.mechanisms.layout import OWN, loaded, posed
 from smc_mujoco.mechanisms.plant import Field, Plant
 
 Restitution = Annotated[float, Number(low=0.0, high=contact.MAX_RESTITUTION)]
@@ -75,7 +75,7 @@ class Stops(Obstacle):
 
     def check(self, plant: Plant) -> None:
         """Check that the plant has these joints."""
-        model = _loaded(plant)
+        model = loaded(plant)
         single = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
         known = _names(map(model.joint, np.flatnonzero(np.isin(model.jnt_type, single))))
         for joint in self.limits:
@@ -99,8 +99,8 @@ class Stops(Obstacle):
             yield Field("jnt_range", model.joint(name).id, ends)
 
     def meets(self, plant: Plant, x: Iterable[float]) -> str:
-        model = _loaded(plant)
-        qpos = _posed(model, x).qpos
+        model = loaded(plant)
+        qpos = posed(model, x).qpos
         for name, (low, high) in self.limits.items():
             place = qpos[model.joint(name).qposadr[0]]
             if not low < place < high:
@@ -117,7 +117,7 @@ class OfBody(Obstacle):
 
     def check(self, plant: Plant) -> None:
         """Check that the plant has the body, and that it is met."""
-        model = _loaded(plant)
+        model = loaded(plant)
         moving = (model.body_weldid > 0) & (model.body_geomnum > 0)
         known = _names(map(model.body, np.flatnonzero(moving)))
         find(f"body of {plant.name} in a {type(self).__name__}", self.body, known)
@@ -187,7 +187,7 @@ class Wall(OfBody):
 
     def meets(self, plant: Plant, x: Iterable[float]) -> str:
         model, place, geoms, shape = _placed(self, plant)
-        data = _posed(model, x)
+        data = posed(model, x)
         data.geom_xpos[shape] = place
         away = _distance(model, data, geoms, shape)
         if away > 0.0:
@@ -244,7 +244,7 @@ def _placed(part: OfBody, plant: Plant) -> Placed:
     away, room = part.way(model)
     body = model.body(part.body).id
     shape = model.geom(name).id
-    place = _meeting(model, _posed(model, plant.x0), body, shape, away)
+    place = _meeting(model, posed(model, plant.x0), body, shape, away)
     if place is None:
         raise ScenarioError(
             f"{shown(part)} does not meet its body on the way to the centre of mass: give another "
@@ -268,7 +268,7 @@ def _posts(stops: Stops, plant: Plant) -> list[tuple[str, Array]]:
         body = int(of.bodyid[0])
         before = model.body_parentid[body]
         for end, side in zip(ends, (-1.0, 1.0), strict=True):
-            data = _posed(model, plant.x0)
+            data = posed(model, plant.x0)
             data.qpos[of.qposadr[0]] = end
             mujoco.mj_kinematics(model, data)
             way = data.xaxis[of.id]
@@ -312,20 +312,6 @@ def _geoms(model: mujoco.MjModel, body: int) -> list[int]:
 def _distance(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], other: int) -> float:
     """Return the distance from the nearest of some geoms to another one, m."""
     return min(mujoco.mj_geomDistance(model, data, geom, other, 1e9, None) for geom in geoms)
-
-
-@functools.lru_cache(maxsize=32)
-def _loaded(plant: Plant) -> mujoco.MjModel:
-    """Return the model of a plant without parts."""
-    return plant.load()
-
-
-def _posed(model: mujoco.MjModel, x: Iterable[float]) -> mujoco.MjData:
-    """Return the data of a model with its channels at x, (n,) rad or m."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = state_with(model, moving_joints(model), x, 0.0)[0]
-    mujoco.mj_kinematics(model, data)
-    return data
 
 
 def _names(things: Iterable) -> dict[str, None]:

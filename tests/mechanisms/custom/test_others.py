@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import math
 import re
 import warnings
 
@@ -14,6 +15,7 @@ from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.evaluator import Evaluator
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import ScenarioWarning
+from smc_mujoco.mechanisms import layout
 from smc_mujoco.mechanisms.custom import others, scales
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.metrics.catalogue import arrived
@@ -387,6 +389,68 @@ def test_a_goal_inside_something_is_refused_and_each_cure_works(cure):
     if key:
         with pytest.raises(smc.ScenarioError, match=r"start of .* mm inside .*give another x0"):
             smc.plant_from(text, inside, keyframe=key)
+
+
+# a leg that stands on its floor; with a ski its knee can go nowhere
+LEG = """<mujoco model="leg"><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+<body pos="0 0 .606"><geom type="box" size=".05 .05 .02" mass="5"/><body name="shank" pos="0 0 -.3">
+<joint name="knee" axis="0 1 0" range="{low} 115"/><geom type="capsule" fromto="0 0 0 0 0 -.28"
+size=".02" mass=".5"/><geom name="toe" type="box" size=".08 .02 .01" pos=".05 0 -.295" mass=".1"/>
+{ski}</body></body></worldbody><actuator><motor joint="knee" ctrlrange="-40 40"/></actuator>
+</mujoco>"""
+SKI = '<geom name="ski" type="box" size=".5 .02 .01" pos="0 0 -.295" mass=".1"/>'
+
+
+@pytest.mark.parametrize("low", [-3, -40])
+def test_a_start_that_nobody_chose_is_clear_of_the_floor_too(low):
+    leg = smc.plant_from(LEG.format(low=low, ski=""), ["knee"], others="locked")
+    given = scales.beside_goal(leg)
+    assert -0.3 <= given[0] < 0.0
+    run = smc.grid(leg, PID, seeds=9, duration=0.05)
+    assert len({one.x0 for one in run}) == len(run)
+    for one in run:
+        model = layout.loaded(leg)
+        data = layout.posed(model, one.x0)
+        mujoco.mj_forward(model, data)
+        assert min((contact.dist for contact in data.contact), default=0.0) > -1e-3
+    with pytest.raises(smc.ScenarioError, match=r"x0 \(0.3,\) of leg .*24 mm inside .*another x0"):
+        dataclasses.replace(run[0], x0=0.3)
+
+
+def test_a_joint_that_can_start_nowhere_is_refused_with_its_name():
+    leg = smc.plant_from(LEG.format(low=-40, ski=SKI), ["knee"], others="locked")
+    with pytest.raises(smc.ScenarioError, match=r"'knee' of leg .* mm inside .*starts=smc.starts"):
+        smc.grid(leg, PID)
+
+
+# a robot on four legs, whose keyframe has its feet 18 mm in the floor
+DOG = """<mujoco model="dog"><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+<body name="base" pos="0 0 .12"><freejoint/><geom type="box" size=".2 .1 .03" mass="3"/>{legs}</body>
+</worldbody><actuator>{motors}</actuator><keyframe><key name="home" qpos="0 0 .182 1 0 0 0 0 0 0 0"
+/></keyframe></mujoco>"""
+DOGS_LEG = """<body pos="{x} {y} -.03"><joint name="k{i}" axis="0 1 0" range="-60 60" damping=".2"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".01" mass=".1"/><geom name="foot{i}" size=".02"
+pos="0 0 -.15" mass=".05"/></body>"""
+CORNERS = [(0.2, 0.1), (-0.2, 0.1), (0.2, -0.1), (-0.2, -0.1)]
+
+
+@pytest.mark.parametrize(("mode", "x0"), [("held", None), ("file", 0.2)])
+def test_a_robot_that_rises_from_its_floor_is_taken_and_told(mode, x0):
+    feet = enumerate(CORNERS)
+    legs = "".join(DOGS_LEG.format(i=i, x=x, y=y) for i, (x, y) in feet)
+    servos = [f'<position joint="k{i}" kp="30" kv="1" forcerange="-20 20"/>' for i in range(4)]
+    text = DOG.format(legs=legs, motors="".join(servos))
+    knee = {"k0": smc.Channel(motor=True, x0=x0)}
+    with pytest.warns(
+        ScenarioWarning, match=r"start of dog\.xml has 'floor' \d+ mm inside"
+    ) as said:
+        made = smc.plant_from(text, knee, keyframe="home", others=mode)
+    inside = next(str(one.message) for one in said if "inside" in str(one.message))
+    wanted = 1e3 * (0.15 * math.cos(x0 or 0.0) + 0.05 - 0.182)
+    assert int(re.search(r"(\d+) mm", inside)[1]) == pytest.approx(wanted, abs=1)
+    assert smc.run(smc.Scenario(plant=made, law=PID, duration=0.5)).failure is None
+    with pytest.raises(smc.ScenarioError, match="18 mm inside 'foot0': give a keyframe"):
+        smc.plant_from(text, knee, keyframe="home", others="locked")
 
 
 @pytest.mark.parametrize("mode", ["file", "locked"])

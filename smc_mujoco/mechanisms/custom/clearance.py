@@ -1,0 +1,64 @@
+"""Whether what the channels of a user's model move stands inside something else of the model."""
+
+import functools
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import Array, Floats
+from smc_mujoco.mechanisms.layout import joint_ids, loaded, posed
+from smc_mujoco.mechanisms.plant import Plant
+
+DEPTH = 5e-3  # m, chosen: soft feet stand less deep
+TOUCH = 1e-3  # m, chosen: what touches overlaps by less, so a deeper start begins with a blow
+
+
+class Overlap(NamedTuple):
+    """The deepest overlap at a pose; of depth 0 and without names where nothing touches."""
+
+    depth: float = 0.0  # m
+    geoms: tuple[str, ...] = ()  # two names, of a geom or of the body that carries it
+    bodies: tuple[str, ...] = ()  # of these two; "" for a body without a name in the file
+
+    def __str__(self) -> str:
+        first, second = map(repr, self.geoms)
+        return f"{first} {1e3 * self.depth:.0f} mm inside {second}"
+
+
+@functools.lru_cache(maxsize=1024)
+def overlap(plant: Plant, x: Floats) -> Overlap:
+    """Return the deepest overlap with the channels at x, (n,) rad or m, and all else at the
+    start.
+    """
+    model = loaded(plant)
+    data = posed(model, x)
+    mujoco.mj_fwdPosition(model, data)
+    return deepest(plant, model, data)
+
+
+def deepest(plant: Plant, model: mujoco.MjModel, data: mujoco.MjData) -> Overlap:
+    """Return the deepest overlap of what the channels move and what they do not, among the
+    contacts of `data`.
+    """
+    moved = _moved(plant, model)
+    found = Overlap()
+    for contact in data.contact:
+        geoms = contact.geom.tolist()
+        bodies = model.geom_bodyid[geoms]
+        if min(geoms) >= 0 and moved[bodies[0]] != moved[bodies[1]] and -contact.dist > found.depth:
+            names = tuple(map(model.body, bodies.tolist()))
+            shown = [model.geom(i).name or body.name for i, body in zip(geoms, names, strict=True)]
+            named = [name or f"geom {i}" for name, i in zip(shown, geoms, strict=True)]
+            found = Overlap(-contact.dist, tuple(named), tuple(body.name for body in names))
+    return found
+
+
+def _moved(plant: Plant, model: mujoco.MjModel) -> Array:
+    """Return which bodies the channels move, those that are only measured aside, (nbody,)."""
+    joints = joint_ids(model)[: plant.n - plant.measured]
+    moved = np.zeros(model.nbody, bool)
+    moved[model.jnt_bodyid[joints]] = True
+    for i in range(1, model.nbody):
+        moved[i] |= moved[model.body_parentid[i]]
+    return moved
