@@ -34,6 +34,11 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
+# Without wrappers for Python, which take half the time to compile, and copied by LLVM to where it
+# is called: numba's own `inline="always"` takes twice the time to compile.
+inlined = njit(
+    error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
+)
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 SEAL_SIZE = hashlib.sha256().digest_size
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
@@ -94,6 +99,11 @@ class NotCompilable(Exception):
     """A function cannot be compiled, and is called in Python. The message says why."""
 
 
+def always(value: Any) -> Callable:
+    """Return a compiled function that returns this value, whatever its arguments."""
+    return inlined(lambda *arguments: value)
+
+
 def _at(kind: types.Type) -> Callable:
     """Return a compiled function that turns an address into a pointer of this type."""
 
@@ -143,6 +153,44 @@ def record_at(dtype: Any) -> Callable:
         return record(types.intp, types.intp), codegen
 
     return at
+
+
+def record_in(dtype: Any) -> Callable:
+    """Return a compiled function (pointer, i) -> the record of this dtype at number i behind a
+    pointer to numbers.
+    """
+    record = from_dtype(dtype)
+
+    @intrinsic
+    def at(typingctx, numbers, i):
+        def codegen(context, builder, signature, args):
+            return builder.bitcast(builder.gep(args[0], [args[1]]), context.get_value_type(record))
+
+        return record(numbers, types.intp), codegen
+
+    return at
+
+
+@intrinsic
+def beyond(typingctx, numbers, i):
+    """Return a pointer to number i behind a pointer."""
+
+    def codegen(context, builder, signature, args):
+        return builder.gep(args[0], [args[1]])
+
+    return numbers(numbers, types.intp), codegen
+
+
+@intrinsic
+def store(typingctx, values, address):
+    """Write a NamedTuple of floats at an address, where `loader` finds it."""
+
+    def codegen(context, builder, signature, args):
+        place = builder.inttoptr(args[1], context.get_value_type(values).as_pointer())
+        builder.store(args[0], place)
+        return context.get_dummy_value()
+
+    return types.none(values, types.intp), codegen
 
 
 def _calling(bits: int) -> Callable:

@@ -1,22 +1,19 @@
 """The controller: what the control callback does in one simulation, according to its record.
 
-At the first stage of a control sample, for each channel:
-
-    sensors -> noise -> `read` -> velocity estimator -> law -> saturation -> delay buffer
-
-A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of
-the sample before. At the first stage of a physics step, the command whose delay has passed goes to
-ctrl, or to the drive that a part is. At every stage, disturbance(t) goes to xfrc_applied. Each
-sample is logged with the mean forces since the last one. How signals act is in exogenous.py. At
-every stage the parts act last, see hardware/moments.py: the controller knows none of them.
+The order of a step is that of `step`. Here are its moments for MuJoCo: how they read mjData and
+write into it. The command goes to ctrl, or to the drive that a part is; disturbances go to
+xfrc_applied. Each sample is logged with the mean forces since the last one. How signals act is in
+exogenous.py. At every stage the parts act last, see hardware/moments.py: the controller knows none
+of them.
 
 The controller counts its calls, because mjData.time does not tell the last stage of a step from the
 start of the next: RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
 again. A run that diverges, or whose law raises an exception, is marked in its record and gets no
 more control. The other simulations of the batch continue.
 
-Private functions take the address of the record, the record `sim`, and `data`, the Arrays of its
-mjData. Those that can fail return a failure code of state.py, unless they say otherwise.
+Private functions take a View, or of it the address of the record, the record `sim`, and `data`, the
+Arrays of its mjData. Those that can fail return a failure code of state.py, unless they say
+otherwise.
 """
 
 # pyright: reportCallIssue=false
@@ -26,7 +23,7 @@ from collections import namedtuple
 
 from numba import njit
 
-from smc_mujoco.common.jit import integers, pointer
+from smc_mujoco.common.jit import inlined, integers, pointer, store
 from smc_mujoco.common.mjcb import slots
 from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.mechanisms import rotation
@@ -41,13 +38,10 @@ from smc_mujoco.mechanisms.hardware.moments import (
 )
 from smc_mujoco.simulation import exogenous, parts, philox
 from smc_mujoco.simulation import state as record
-from smc_mujoco.simulation.parts import MAX_CONTROL
-from smc_mujoco.simulation.signals import after_pauses
 from smc_mujoco.simulation.state import log_at
+from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
-# of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
-LAST_STAGE = 1.0 - 1e-8
 OTHER_CALLBACKS = len(slots())
 
 
@@ -59,102 +53,32 @@ Arrays = namedtuple(
     actuator_force qfrc_constraint qfrc_bias qfrc_spring qfrc_passive qfrc_actuator qLDiagInv
     efc_frictionloss efc_aref dof_frictionloss actuator_user body_user""",
 )
+# What the moments see of a run: the address of its record, the record, and the Arrays.
+View = namedtuple("View", ("address", "sim", "data"))
 
 
-@njit(error_model="numpy")
-def control(address, sim, data):  # noqa: PLR0912
-    """Do one callback of one simulation."""
-    calls = sim.calls
-    sim.calls = calls + 1
-    if sim.failure != record.FINE:
-        return
-    stages = sim.stages
-    steps = sim.steps
-    step = calls // stages
-    stage = calls % stages
-    k = step // steps
-    within = step % steps
-    failure = record.FINE
-    parts.clear_joints(sim, data)
-    if sim.reaches != 0:
-        parts.keep_reach(sim.reach, data)
-    sim.stage = stage
-    sim.now = step
-    sim.arrived = 0
-    if stage == 0:
-        _sum_forces(sim, data)
-        if _diverged(sim, data):
-            failure = record.DIVERGED
-        elif k >= sim.samples or _interfered(sim):  # or the simulation is stepped beyond its end
-            failure = record.INTERRUPTED
-        else:
-            failure = _sample(address, sim, data, k, within)
-        _arrive(sim, data, step)
-    if sim.disturbance_count != 0 and failure == record.FINE:
-        if stage == 0:
-            fraction = 0.0
-        else:
-            fraction = LAST_STAGE if stage == 3 else 0.5
-        sample = k if stage + within == 0 else -1
-        t = k * sim.period + (within + fraction) * sim.step
-        failure = exogenous.disturb(address, sim, data, t, sample)
-    if failure == record.FINE:
-        if stage == 0 and within == 0:
-            _log(sim, data, k)
-        if sim.part_count != 0:
-            failure = parts.act(address, sim, data)
-    if failure != record.FINE:
-        sim.failure = failure
-        sim.failed_step = step
-        _zero_inputs(sim, data)
-
-
-@njit(error_model="numpy", inline="always")
-def lateness(sim, k, last):
-    """Return by how many physics steps sample k is late; -1 if it does not run."""
-    if k in (0, last):
-        return 0
-    if sim.missed != 0.0 and philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed:
-        return -1
-    if sim.pause != 0:
-        return after_pauses(k, sim.steps, sim.pause, sim.pause_samples, sim.pause_phase)
-    if sim.jitter == 0:
-        return 0
-    return int(philox.uniform(sim.seed, 0, philox.JITTER, k) * (sim.jitter + 1))
-
-
-@njit(error_model="numpy", inline="always")
-def _sample(address, sim, data, k, within):
-    """Run the law at sample k, if the sample comes in this physics step, `within` steps into its
-    period.
+@inlined
+def _sum_forces(view):
+    """Add the forces of the last physics step on each joint: of the drive, and of friction and
+    contacts.
     """
-    late = lateness(sim, k, sim.samples - 1)
-    if within == 0 and late != 0:
-        _repeat_command(sim, k)
-    if within != late:
-        return record.FINE
-    t = k * sim.period + late * sim.step
-    failure = _measure(address, sim, data, k, t)
-    if failure == record.FINE:
-        failure = update_law(address, sim, k, t)
-    if failure != record.FINE and late != 0:  # some channels may have written into the log
-        _repeat_command(sim, k)
-    return failure
-
-
-@njit(error_model="numpy")
-def _repeat_command(sim, k):
-    """Give sample k the command of the sample before, with its u, s and r in the log."""
-    buffer = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots))
+    _, sim, data = view
     for i in range(sim.n):
-        sample = log_at(sim.log, k * sim.n + i)
-        before = log_at(sim.log, (k - 1) * sim.n + i)
-        sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, before.u
+        channel = channel_at(sim.channels, i)
+        state = state_at(sim.states, i)
+        if channel.force >= 0 and drive_at(sim.drives, i).sums_force == 0.0:
+            state.force += data.actuator_force[channel.force]
+        if channel.gathered >= 0:
+            state.force += data.qfrc_actuator[channel.gathered]
+        state.reaction += data.qfrc_constraint[channel.qvel]
+        if channel.friction_force >= 0:
+            state.reaction += data.actuator_force[channel.friction_force]
 
 
-@njit(error_model="numpy", inline="always")
-def _diverged(sim, data):
+@inlined
+def _diverged(view):
     """Return whether a position or velocity of the mechanism is NaN or above MAX_STATE."""
+    _, sim, data = view
     for i in range(sim.nq):
         if not abs(data.qpos[i]) < MAX_STATE:
             return True
@@ -164,7 +88,15 @@ def _diverged(sim, data):
     return False
 
 
-@njit(error_model="numpy", inline="always")
+@inlined
+def _over(view, k):
+    """Return a failure where the simulation is stepped beyond its end, or other code interferes."""
+    if k >= view.sim.samples or _interfered(view.sim):
+        return record.INTERRUPTED
+    return record.FINE
+
+
+@inlined
 def _interfered(sim):
     """Return whether other code has set a callback of MuJoCo's, perhaps in another thread.
 
@@ -177,38 +109,7 @@ def _interfered(sim):
     return False
 
 
-@njit(error_model="numpy", inline="always")
-def _read_sensor(address, sim, i, k, t, hinge):
-    """Give the reading of channel i at sample k, at t s, its noise, and what the sensor makes of
-    it. Return whether that raised.
-    """
-    reading = sim.reading
-    j = k
-    if sim.readers != 0:
-        reader = reader_at(sim.readers, i)
-        if reader.period != 0.0:
-            j = max(0, math.floor((t - reader.delay) / reader.period + 1e-6))
-    if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
-        z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
-        reading.x += sim.sigma_x * z[0]
-        reading.v += sim.sigma_v * z[1]
-    if sim.readers == 0 or reader_at(sim.readers, i).function.address == 0:
-        return False
-    function = reader_at(sim.readers, i).function
-    sight = sim.sight
-    sight.x = reading.x
-    sight.v = reading.v
-    sight.j = j
-    sight.hinge = hinge
-    sight.chance = philox.uniform(sim.seed, i, philox.DROPOUT, j)
-    if evaluate(function, 0, address + record.AT.sight, address + record.AT.raw):
-        return True
-    reading.x = sim.raw.x
-    reading.v = sim.raw.v
-    return False
-
-
-@njit(error_model="numpy", inline="always")
+@inlined
 def _position(numbers, at, turn):
     """Return a number, or of the quaternion that begins there, number `turn` of its rotation
     vector.
@@ -223,114 +124,209 @@ def _position(numbers, at, turn):
     return vector[1] if turn == 1 else vector[2]
 
 
-@njit(error_model="numpy")
-def _measure(address, sim, data, k, t):
-    """Measure position, and estimate velocity and acceleration, of every channel at sample k, at
-    time t, s.
+@inlined
+def _now(view, k, i):
+    return log_at(view.sim.log, k * view.sim.n + i)
+
+
+@inlined
+def _ring(view, k):
+    sim = view.sim
+    return pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots))
+
+
+@inlined
+def _seen(view):
+    seen = view.sim.seen
+    return pointer(seen.x), pointer(seen.v), pointer(view.sim.a)
+
+
+@inlined
+def _errors(view, t):
+    address, sim, _ = view
+    sim.reading.dt = sim.period
+    return (
+        exogenous.measurement_error(address, sim, sim.position_error, t),
+        exogenous.measurement_error(address, sim, sim.velocity_error, t),
+    )
+
+
+@inlined
+def _sense(view, i):
+    _, sim, data = view
+    channel = channel_at(sim.channels, i)
+    sim.seen.i = i
+    x = _position(data.sensordata, channel.x_sensor, channel.turn)
+    return x, data.sensordata[channel.v_sensor]
+
+
+@inlined
+def _reading(view, i, k, t):
+    sim = view.sim
+    if sim.readers != 0:
+        reader = reader_at(sim.readers, i)
+        if reader.period != 0.0:
+            return max(0, math.floor((t - reader.delay) / reader.period + 1e-6))
+    return k
+
+
+@inlined
+def _read(view, i, j, x, v):
+    address, sim, _ = view
+    if sim.readers == 0 or reader_at(sim.readers, i).function.address == 0:
+        return False, x, v
+    sight = sim.sight
+    sight.x = x
+    sight.v = v
+    sight.j = j
+    sight.hinge = channel_at(sim.channels, i).hinge_body >= 0
+    sight.chance = philox.uniform(sim.seed, i, philox.DROPOUT, j)
+    function = reader_at(sim.readers, i).function
+    raised = evaluate(function, 0, address + record.AT.sight, address + record.AT.raw)
+    return raised, sim.raw.x, sim.raw.v
+
+
+@inlined
+def _estimate(view, i, x, v):
+    address, sim, _ = view
+    sim.reading.x = x
+    sim.reading.v = v
+    raised = evaluate(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate)
+    if sim.other_forces != 0:
+        reaction = state_at(sim.states, i).reaction / sim.steps
+        pointer(sim.other_forces)[i] = _disturbance(view, i) + reaction
+    return raised, sim.estimate.v, sim.estimate.a
+
+
+@inlined
+def _feedforward(view, t):
+    """Return whether it raised, and its value. The model then takes the other forces on each joint
+    for part of the force of the drive.
     """
-    x = pointer(sim.seen.x)
-    v = pointer(sim.seen.v)
-    a = pointer(sim.a)
-    reading = sim.reading
-    estimate = sim.estimate
-    reading.dt = sim.period
-    x_error = exogenous.measurement_error(address, sim, sim.position_error, t)
-    v_error = exogenous.measurement_error(address, sim, sim.velocity_error, t)
-    for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        state = state_at(sim.states, i)
-        reading.x = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
-        reading.v = data.sensordata[channel.v_sensor] + v_error
-        sim.seen.i = i
-        if _read_sensor(address, sim, i, k, t, channel.hinge_body >= 0):
-            return record.RAISED
-        if evaluate(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate):
-            return record.RAISED
-        x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
-        if sim.other_forces != 0:
-            pointer(sim.other_forces)[i] = (
-                generalised_disturbance(data, channel) + state.reaction / sim.steps
-            )
-    return record.FINE
+    address, sim, _ = view
+    sim.instant.t = t
+    for i in range(sim.n if sim.other_forces != 0 else 0):
+        pointer(sim.seen.u)[i] += pointer(sim.other_forces)[i]
+    if sim.feedforward.address == 0:
+        return False, 0.0
+    return exogenous.evaluate_signal(address, sim.feedforward, 0), sim.motion.value
 
 
-@njit(error_model="numpy", inline="always")
+@inlined
+def _refer(view, i, k, t):
+    """Return whether the reference of channel i raised, and its motion."""
+    address, sim, _ = view
+    raised = False
+    if sim.references != 0:
+        raised = exogenous.evaluate_signal(address, function_at(sim.references, i), 0)
+    elif i == 0:
+        raised = exogenous.evaluate_signal(address, sim.reference, 0)
+    motion = sim.motion
+    return raised, motion.value, motion.rate, motion.acceleration
+
+
+@inlined
 def _evaluate_model(address, sim, i):
     """Write nominal f and g of channel i into the record. Return whether the model raised."""
     sim.seen.i = i
     return evaluate(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
 
 
-@njit(error_model="numpy")
-def update_law(address, sim, k, t):  # noqa: PLR0912
-    """Run the law at sample k, at time t, s: once for each driven channel, or once for all.
+@inlined
+def _nominal(view, i):
+    raised = _evaluate_model(view.address, view.sim, i)
+    return raised, view.sim.model.f, view.sim.model.g
 
-    Return a failure code.
 
-    A channel's nominal model may depend on the new commands of the channels before it.
-    """
-    n = sim.n
-    width = sim.width
-    last_u = pointer(sim.seen.u)  # the forces of the drives, as the model knows them
-    v = pointer(sim.seen.v)
-    feedforward = 0.0
-    joint = sim.joint != 0
+@inlined
+def _slide(view, i, y):
+    address, sim, _ = view
+    store(y, address + record.AT.y)
+    raised = evaluate(sim.surface, i, address + record.AT.y, address + record.AT.sliding)
+    return raised, sim.sliding.s, sim.sliding.v_eq
+
+
+@inlined
+def _law(view, i, y):
+    address, sim, _ = view
+    store(y, address + record.AT.y)
+    law = sim.law
+    if sim.laws != 0:
+        law = function_at(sim.laws, i)
     commands = pointer(sim.commands)
-    y = sim.joint if joint else address + record.AT.y
-    buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
-    sim.instant.t = t
-    for i in range(n if sim.other_forces != 0 else 0):
-        # what the model takes for the force on each joint
+    return evaluate(law, i, address + record.AT.y, sim.commands), commands[0], commands[1]
+
+
+@inlined
+def _commanded(view, i, u):
+    """Tell the nominal model the force of a drive: that of a later channel may depend on it."""
+    sim = view.sim
+    drive = drive_at(sim.drives, i)
+    last_u = pointer(sim.seen.u)
+    last_u[i] = drive.gain * u - drive.drag * pointer(sim.seen.v)[i]
+    if sim.other_forces != 0:
         last_u[i] += pointer(sim.other_forces)[i]
-    if sim.feedforward.address != 0:
-        if exogenous.evaluate_signal(address, sim.feedforward, 0):
-            return record.RAISED
-        feedforward = sim.motion.value
-    for first in range(0, sim.driven, width):
-        if joint:
-            failure = _measure_joints(address, sim, k, t)
-        else:
-            failure = _measure_channel(address, sim, k, t, first)
-        if failure != record.FINE:
-            return failure
-        if sim.laws == 0:
-            law = sim.law
-        else:
-            law = function_at(sim.laws, first)
-        if evaluate(law, first, y, sim.commands):
-            return record.LAW_RAISED
-        for j in range(min(width, sim.driven)):
-            i = first + j
-            drive = drive_at(sim.drives, i)
-            limit = drive.limit
-            command = commands[j] + feedforward
-            s = commands[width + j]
-            sample = log_at(sim.log, k * n + i)
-            u = min(max(command, -limit), limit)
-            if not (
-                math.isfinite(command)
-                and math.isfinite(s)
-                and abs(u) * max(1.0, drive.scale) < MAX_CONTROL
-            ):
-                sim.seen.i = i
-                return record.NOT_FINITE
-            buffer[i], sample.u, sample.s = u, u, s
-            last_u[i] = drive.gain * u - drive.drag * v[i]
-            if sim.other_forces != 0:
-                last_u[i] += pointer(sim.other_forces)[i]
+
+
+@njit(error_model="numpy")
+def _asked(view, k):
+    """Write commands and references of the channels that are only measured."""
+    sim = view.sim
+    buffer = _ring(view, k)
+    last_u = pointer(sim.seen.u)
     if sim.mixer != 0:
         _mix(sim, last_u, buffer)
-    for i in range(sim.driven, n):  # only measured
-        sample = log_at(sim.log, k * n + i)
+    for i in range(sim.driven, sim.n):
+        sample = _now(view, k, i)
         buffer[i], sample.u, sample.s = 0.0, 0.0, 0.0
         if sim.referenced <= i:
             sample.r = 0.0
-        elif not joint and exogenous.write_reference(address, sim, k, i):
-            return record.RAISED
-    for i in range(n if sim.other_forces != 0 else 0):
+        elif sim.joint == 0:
+            if _refer(view, i, k, 0.0)[0]:
+                return record.RAISED
+            sample.r = sim.motion.value
+    for i in range(sim.n if sim.other_forces != 0 else 0):
         drive = drive_at(sim.drives, i)
-        last_u[i] = drive.gain * log_at(sim.log, k * n + i).u - drive.drag * v[i]
+        last_u[i] = drive.gain * _now(view, k, i).u - drive.drag * pointer(sim.seen.v)[i]
     return record.FINE
+
+
+@inlined
+def _apply(view, i, u):
+    channel = channel_at(view.sim.channels, i)
+    if channel.ctrl >= 0:
+        view.data.ctrl[channel.ctrl] = drive_at(view.sim.drives, i).scale * u
+
+
+@inlined
+def _arrived(view):
+    view.sim.arrived = 1
+
+
+@inlined
+def _disturb(view, t, k):
+    address, sim, data = view
+    if sim.disturbance_count == 0:
+        return record.FINE
+    return exogenous.disturb(address, sim, data, t, k)
+
+
+@inlined
+def _truth(view, i):
+    _, sim, data = view
+    channel = channel_at(sim.channels, i)
+    return _position(data.qpos, channel.qpos, channel.turn), data.qvel[channel.qvel]
+
+
+@inlined
+def _applied(view, i):
+    held = channel_at(view.sim.channels, i).ctrl >= 0
+    return state_at(view.sim.states, i).delayed if held else 0.0
+
+
+@inlined
+def _disturbance(view, i):
+    return generalised_disturbance(view.data, channel_at(view.sim.channels, i))
 
 
 @njit(error_model="numpy")
@@ -350,71 +346,10 @@ def _mix(sim, u, controls):
     )
 
 
-@njit(error_model="numpy", inline="always")
-def _measure_channel(address, sim, k, t, i):
-    """Write what the law of channel i reads.
-
-    The force in its nominal model is that of the drive, gain u - drag v.
-    """
-    if exogenous.write_reference(address, sim, k, i):
-        return record.RAISED
-    y = sim.y
-    x = pointer(sim.seen.x)
-    v = pointer(sim.seen.v)
-    a = pointer(sim.a)
-    motion = sim.motion
-    model = sim.model
-    drive = drive_at(sim.drives, i)
-    y.t = t
-    y.dt = sim.period
-    y.r = motion.value
-    y.dr = motion.rate
-    y.ddr = motion.acceleration
-    y.q = 0.0
-    y.dq = 0.0
-    y.fq = 0.0
-    y.gq = 0.0
-    if sim.partners != 0:  # a joint without actuator moves with channel i
-        partner = i + sim.driven
-        if _evaluate_model(address, sim, partner):
-            return record.RAISED
-        y.q = x[partner]
-        y.dq = v[partner]
-        y.fq = model.f - drive.drag * v[i] * model.g
-        y.gq = drive.gain * model.g
-    if _evaluate_model(address, sim, i):
-        return record.RAISED
-    y.f = model.f - drive.drag * v[i] * model.g
-    y.g = drive.gain * model.g
-    if sim.other_forces != 0:
-        y.f += pointer(sim.other_forces)[i] * model.g
-    if drive.accelerates != 0.0:  # u is the acceleration x''
-        y.gq /= y.g
-        y.fq -= y.gq * y.f
-        y.f = 0.0
-        y.g = 1.0
-    y.x = x[i]
-    y.v = v[i]
-    y.e = y.x - y.r
-    y.de = y.v - y.dr
-    y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
-    y.limit = drive.limit
-    y.model = sim.uses_model
-    y.has_surface = 0.0
-    y.s = 0.0
-    y.v_eq = 0.0
-    if sim.surface.address != 0:
-        if evaluate(sim.surface, i, address + record.AT.y, address + record.AT.sliding):
-            return record.RAISED
-        y.has_surface = 1.0
-        y.s = sim.sliding.s
-        y.v_eq = sim.sliding.v_eq
-    return record.FINE
-
-
 @njit(error_model="numpy")
-def _measure_joints(address, sim, k, t):
+def _measure_joints(view, k, t):
     """Write what a law of many joints reads at sample k, at time t, s."""
+    address, sim, _ = view
     seen = sim.seen
     motion = sim.motion
     dynamics = 0
@@ -422,8 +357,9 @@ def _measure_joints(address, sim, k, t):
         dynamics = address + record.AT.handle
     y = begin_measurement(sim.joint, t, sim.period, sim.uses_model, dynamics, sim.n, sim.driven)
     for i in range(sim.n):
-        if exogenous.write_reference(address, sim, k, i):
+        if _refer(view, i, k, t)[0]:
             return record.RAISED
+        _now(view, k, i).r = motion.value
         put_channel(
             y,
             i,
@@ -491,32 +427,7 @@ def _separate_equations(address, sim, y):
     return record.FINE
 
 
-@njit(error_model="numpy", inline="always")
-def _arrive(sim, data, step):
-    """Give the actuators, or the drives, the command whose delay has passed at this physics step,
-    if there is one.
-    """
-    past = step - sim.delay
-    sent = past // sim.steps
-    arrives = past >= 0 and past % sim.steps == lateness(sim, sent, sim.samples - 1)
-    faulty = step >= sim.fault_step
-    if faulty and sim.stuck != 0 and sim.failing < 0:
-        return
-    if arrives or step == sim.fault_step:  # a fault begins on what is held
-        sim.arrived = 1
-        buffer = pointer(sim.delay_buffer + 8 * sim.n * (sent % sim.delay_slots))
-        for i in range(sim.n):
-            state = state_at(sim.states, i)
-            u = buffer[i] if arrives else state.delayed
-            if faulty and (sim.failing < 0 or sim.failing == i):
-                u = state.delayed if sim.stuck != 0 else sim.fault_gain * u + sim.fault_bias
-            state.delayed = u
-            channel = channel_at(sim.channels, i)
-            if channel.ctrl >= 0:
-                data.ctrl[channel.ctrl] = drive_at(sim.drives, i).scale * u
-
-
-@njit(error_model="numpy", inline="always")
+@inlined
 def _zero_inputs(sim, data):
     """Set all commands and disturbances to 0."""
     exogenous.clear(sim, data)
@@ -526,37 +437,98 @@ def _zero_inputs(sim, data):
             data.ctrl[ctrl] = 0.0
 
 
-@njit(error_model="numpy", inline="always")
-def _sum_forces(sim, data):
-    """Add the forces of the last physics step on each joint: of the drive, and of friction and
-    contacts.
-    """
-    for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        state = state_at(sim.states, i)
-        if channel.force >= 0 and drive_at(sim.drives, i).sums_force == 0.0:
-            state.force += data.actuator_force[channel.force]
-        if channel.gathered >= 0:
-            state.force += data.qfrc_actuator[channel.gathered]
-        state.reaction += data.qfrc_constraint[channel.qvel]
-        if channel.friction_force >= 0:
-            state.reaction += data.actuator_force[channel.friction_force]
+@njit(error_model="numpy")
+def _ask_joints(view, k, t, i):
+    """Ask a law of many joints once, for all channels."""
+    sim = view.sim
+    commands = pointer(sim.commands)
+    if i == 0:
+        failure = _measure_joints(view, k, t)
+        if failure != record.FINE:
+            return failure, 0.0, 0.0
+        if evaluate(sim.law, 0, sim.joint, sim.commands):
+            return record.LAW_RAISED, 0.0, 0.0
+    sim.seen.i = i
+    return record.FINE, commands[i], commands[sim.width + i]
 
 
-@njit(error_model="numpy", inline="always")
-def _log(sim, data, k):
-    """Write sample k of every channel into the log, except u, s and r, which are there already."""
-    for i in range(sim.n):
-        channel = channel_at(sim.channels, i)
-        state = state_at(sim.states, i)
-        sample = log_at(sim.log, k * sim.n + i)
-        sample.x = _position(data.qpos, channel.qpos, channel.turn)
-        sample.v = data.qvel[channel.qvel]
-        sample.applied = state.delayed if channel.ctrl >= 0 else 0.0
-        sample.d = generalised_disturbance(data, channel)
-        sample.force = state.force / sim.steps
-        sample.reaction = state.reaction / sim.steps
-        sample.held = state.held
-        state.force = 0.0
-        state.reaction = 0.0
-        state.held = 0.0
+@inlined
+def _ask(view, k, t, i):
+    if view.sim.joint != 0:
+        return _ask_joints(view, k, t, i)
+    return _ask_channel(view, k, t, i)
+
+
+MOMENTS = Moments(
+    n=inlined(lambda view: view.sim.n),
+    driven=inlined(lambda view: view.sim.driven),
+    settings=inlined(lambda view: view.sim),
+    late=inlined(lambda view, k: lateness(view.sim, k, view.sim.samples - 1)),
+    now=_now,
+    before=inlined(lambda view, k, i: _now(view, k - 1, i)),
+    state=inlined(lambda view, i: state_at(view.sim.states, i)),
+    drive=inlined(lambda view, i: drive_at(view.sim.drives, i)),
+    ring=_ring,
+    seen=_seen,
+    errors=_errors,
+    sense=_sense,
+    reading=_reading,
+    read=_read,
+    estimate=_estimate,
+    feedforward=_feedforward,
+    ask=_ask,
+    commanded=_commanded,
+    asked=_asked,
+    apply=_apply,
+    arrived=_arrived,
+    sum_forces=_sum_forces,
+    diverged=_diverged,
+    over=_over,
+    disturb=_disturb,
+    truth=_truth,
+    applied=_applied,
+    disturbance=_disturbance,
+)
+_ask_channel = asking(
+    MOMENTS,
+    Asked(
+        partners=inlined(lambda view: view.sim.partners != 0),
+        knows=inlined(lambda view: view.sim.other_forces != 0),
+        refer=_refer,
+        nominal=_nominal,
+        slides=inlined(lambda view: view.sim.surface.address != 0),
+        slide=_slide,
+        law=_law,
+    ),
+)
+BEGIN, BETWEEN = order(MOMENTS)
+
+
+@njit(error_model="numpy")
+def control(address, sim, data):
+    """Do one callback of one simulation."""
+    calls = sim.calls
+    sim.calls = calls + 1
+    if sim.failure != record.FINE:
+        return
+    step = calls // sim.stages
+    stage = calls % sim.stages
+    k = step // sim.steps
+    within = step % sim.steps
+    view = View(address, sim, data)
+    parts.clear_joints(sim, data)
+    if sim.reaches != 0:
+        parts.keep_reach(sim.reach, data)
+    sim.stage = stage
+    sim.now = step
+    sim.arrived = 0
+    if stage == 0:
+        failure = BEGIN(view, k, within, step)
+    else:
+        failure = BETWEEN(view, k, within, stage)
+    if failure == record.FINE and sim.part_count != 0:
+        failure = parts.act(address, sim, data)
+    if failure != record.FINE:
+        sim.failure = failure
+        sim.failed_step = step
+        _zero_inputs(sim, data)

@@ -12,7 +12,7 @@ import math
 from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
-from smc_mujoco.mechanisms.hardware.moments import channel_at, evaluate, function_at
+from smc_mujoco.mechanisms.hardware.moments import channel_at, evaluate
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.state import disturbance_at, log_at
 
@@ -37,18 +37,6 @@ def measurement_error(address, sim, signal, t):
     if evaluate_signal(address, signal, 0):
         return math.nan
     return sim.motion.value
-
-
-@njit(error_model="numpy", inline="always")
-def write_reference(address, sim, k, i):
-    """Write the reference of channel i into the record and the log. Return whether it raised."""
-    if sim.references != 0:
-        if evaluate_signal(address, function_at(sim.references, i), 0):
-            return True
-    elif i == 0 and evaluate_signal(address, sim.reference, 0):
-        return True
-    log_at(sim.log, k * sim.n + i).r = sim.motion.value
-    return False
 
 
 @njit(error_model="numpy")

@@ -19,9 +19,9 @@ from smc_mujoco.mechanisms.hardware.moments import (
     torque,
 )
 from smc_mujoco.simulation import state as record
+from smc_mujoco.simulation.step import MAX_CONTROL
 
 PART_BYTES = PART.itemsize
-MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
 @njit(error_model="numpy", inline="always")

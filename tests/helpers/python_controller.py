@@ -17,7 +17,6 @@ from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.plant import Dynamics, Values
 from smc_mujoco.simulation import philox
-from smc_mujoco.simulation.controller import MAX_CONTROL
 from smc_mujoco.simulation.prepare import known_values, references
 from smc_mujoco.simulation.python_functions import (
     USER_EXCEPTIONS,
@@ -29,6 +28,7 @@ from smc_mujoco.simulation.python_functions import (
     failure_of,
 )
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.step import MAX_CONTROL
 
 
 class Controller:

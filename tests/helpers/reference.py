@@ -23,13 +23,14 @@ from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
+from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.prepare import pause_phase
 from smc_mujoco.simulation.python_functions import Failure, evaluate, failure_of
 from smc_mujoco.simulation.run import DISTURBANCE_NOT_FINITE, PLANT_DIVERGED
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push, Signal
 from smc_mujoco.simulation.state import LOG
+from smc_mujoco.simulation.step import LAST_STAGE
 from smc_mujoco.simulation.trace import Trace, from_log
 
 

@@ -40,8 +40,9 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.drives import kept_at
 from smc_mujoco.mechanisms.hardware.moments import JointState, Sight
 from smc_mujoco.simulation import philox
-from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE, lateness
+from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.state import DIVERGED, FINE, NOT_FINITE, RAISED
+from smc_mujoco.simulation.step import LAST_STAGE, lateness
 
 Compiler = Callable[[Any], Any]
 

@@ -28,8 +28,8 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import export
 from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.controller import MAX_CONTROL
 from smc_mujoco.simulation.model import mixer
+from smc_mujoco.simulation.step import MAX_CONTROL
 
 MAX_DOUBLE = sys.float_info.max  # stands for infinity, because not every importer reads INF
 

@@ -376,7 +376,8 @@ def advanced(factors, state, u, v):
 # What a joint keeps of its drives: both states of DriveStep, and the rise of the force from the
 # middle of a step of RK4 to its last stage.
 factors_at = record_at(floats(DriveStep._fields))
-kept_at = record_at(floats(("first", "second", "rise")))
+KEPT = floats(("first", "second", "rise"))
+kept_at = record_at(KEPT)
 
 
 @frozen_data
