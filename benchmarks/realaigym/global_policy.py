@@ -40,7 +40,7 @@ from realaigym.simulator import (
     stepped,
 )
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_1, TORQUE_LIMIT
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -102,7 +102,7 @@ def minute(scenario: Scenario, seed: int) -> Run:
     """
     machine, (times, goals) = Machine(scenario), resets(seed)
     run = Run(np.zeros((STEPS + 1, 4)), np.zeros((STEPS, 2)))
-    with delay_ctrl_c():  # numba may compile it now
+    with delay_signals():  # numba may compile it now
         raised = _minute(
             *machine.start(),
             machine.driven,

@@ -32,7 +32,7 @@ from numba import njit
 
 from realaigym.scoring import shoulder_first
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, accelerations
@@ -258,7 +258,7 @@ class Machine:
             pulse += amplitude * np.exp(-0.5 * ((t - centre) / width) ** 2)
         states = np.zeros((STEPS + 1, 4))
         torque = np.zeros(STEPS)
-        with delay_ctrl_c():  # numba may compile it now
+        with delay_signals():  # numba may compile it now
             raised = _simulate(
                 *self.start(),
                 tuple(true.values()),

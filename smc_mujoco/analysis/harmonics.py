@@ -21,6 +21,7 @@ import numpy as np
 
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
 from smc_mujoco.common.aliases import Array, ArrayPair, Floats, Pair
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
@@ -207,7 +208,7 @@ class Loop:
             answers = answers * np.exp(-1j * omega * sensor.delay)
         return passed @ answers
 
-    @functools.cached_property
+    @cached_property
     def s_of_one_count(self) -> float:
         """The largest |s| after the reading of x has moved by one count of the encoder at rest; 0
         without one.

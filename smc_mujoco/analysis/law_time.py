@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.attended import attended
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.simulation import callback, cfunctions, state
@@ -72,12 +73,15 @@ def _measured(scenario: Scenario) -> Array:
     seen = []
     with callback.installed():
         batch = ScenarioBatch([prepare(short)], threads=1)
-        batch.endless = False  # no thread for each sample: the law has returned in earlier runs
-        for k in range(short.samples):
-            batch.advance_to((k + 1) * short.steps)
-            if batch.records["failure"][0] != state.FINE:
-                break
-            seen.append(batch.records["y"][0].item())
+
+        def measure() -> None:
+            for k in range(short.samples):
+                batch.advance_to((k + 1) * short.steps)
+                if batch.records["failure"][0] != state.FINE:
+                    break
+                seen.append(batch.records["y"][0].item())
+
+        attended([measure], batch.stop)  # one thread, not one for each sample
     return np.array(seen)
 
 

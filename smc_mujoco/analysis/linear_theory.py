@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Pair
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Finite, Natural, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.design import DIFFERENCE_STEP
@@ -53,7 +54,7 @@ class Linear:
     damping: float
     stiffness: Array
 
-    @functools.cached_property
+    @cached_property
     def modes(self) -> Array:
         """The stiffnesses of the modes, (n,), smallest first; a negative one is unstable by
         itself.

@@ -87,9 +87,7 @@ def _showing_once() -> Callable[..., None]:
 
 
 def _end(*_: object) -> None:
-    """End as Ctrl-C does, also where that is ignored, as in a shell's background job; and at once
-    where it is delayed.
-    """
+    """End as Ctrl-C does, also where that is ignored, as in a shell's background job."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.raise_signal(signal.SIGINT)
     raise KeyboardInterrupt

@@ -29,6 +29,7 @@ from importlib.metadata import EntryPoint
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, words
 
 NAME = operator.attrgetter("name")
@@ -93,7 +94,7 @@ class Added(Generic[T_co]):
             raise ScenarioError(str(entry)) from entry.__cause__
         return entry
 
-    @functools.cached_property
+    @cached_property
     def _loaded(self) -> T_co | ScenarioError:
         """The first result of `_load`, so that a failing package is imported only once."""
         return self._load()

@@ -1,28 +1,37 @@
-"""Ctrl-C, delayed while something must not stop halfway: a library that loads, numba that
-compiles.
+"""Signals, such as Ctrl-C, delayed while something must not stop halfway: a library that loads, a
+thread that is waited for.
 """
 
 import contextlib
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 
 @contextlib.contextmanager
-def delay_ctrl_c() -> Iterator[None]:
-    """Delay Ctrl-C to the end of a with block.
+def delay_signals() -> Iterator[Callable[[], None]]:
+    """Delay what Python does at a signal to the end of a with block.
 
-    Other threads never receive it, so they delay nothing.
+    Yield a function that does now what has been delayed so far; it raises what a handler raises.
+    Other threads never receive a signal, so they delay nothing.
     """
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
-        return
-    pressed = []
-    signal.signal(signal.SIGINT, lambda number, frame: pressed.append((number, frame)))
+    handlers = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in signal.valid_signals():
+            if callable(handler := signal.getsignal(number)):
+                handlers[number] = handler
+    arrived = []
+
+    def deliver() -> None:
+        while arrived:
+            number, frame = arrived.pop(0)
+            handlers[number](number, frame)
+
     try:
-        yield
+        for number in handlers:
+            signal.signal(number, lambda *arguments: arrived.append(arguments))
+        yield deliver
     finally:
-        signal.signal(signal.SIGINT, handler)
-        if pressed:
-            handler(*pressed[-1])
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        deliver()

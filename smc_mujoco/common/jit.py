@@ -28,9 +28,9 @@ from numba import TypingError, from_dtype, njit, typeof, types
 from numba.extending import intrinsic
 
 from smc_mujoco.common import numba_internals as internals
+from smc_mujoco.common.attended import attended
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import replacing
-from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
@@ -307,7 +307,7 @@ class Key(NamedTuple):
 
 
 def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
-    """Return numba's CFunc of a function. Ctrl-C is delayed to the end, as numba may lose it.
+    """Return numba's CFunc of a function.
 
     With a key it is loaded from the disk, or written there.
     """
@@ -315,8 +315,7 @@ def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
     made = internals.CFunc(body, (signature.args, signature.return_type), {}, options)
     if key is not None:
         made._cache = Cache(key)  # pyright: ignore[reportAttributeAccessIssue] numba's own
-    with _compiling():
-        made.compile()
+    _in_thread(made.compile)
     return made
 
 
@@ -324,8 +323,20 @@ def compile_for(made: Any, arguments: tuple[Any, ...], key: Key | None) -> None:
     """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
     if key is not None:
         made._cache = Cache(key)
-    with _compiling():
-        made.compile(tuple(map(typeof, arguments)))
+    _in_thread(made.compile, tuple(map(typeof, arguments)))
+
+
+def _in_thread(work: Callable, *arguments: Any) -> None:
+    """Let numba compile in a thread of its own, as it may lose Ctrl-C halfway, or break at it.
+
+    The thread goes on after Ctrl-C, and leaves its result on the disk.
+    """
+
+    def compiling() -> None:
+        with _compiling():
+            work(*arguments)
+
+    attended([compiling], bool)
 
 
 @contextlib.contextmanager
@@ -333,7 +344,7 @@ def _compiling() -> Iterator[None]:
     """Let numba compile in the block, with this package's numbers, and arrays written in place
     within their bounds.
     """
-    with delay_ctrl_c(), NUMBERS.given():
+    with NUMBERS.given():
         _load_numba()
         from numba.np import npyimpl
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from smc_mujoco.common import annexes, gl
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 NAMES = re.compile(r"^from (\S+) import (\w+) as \2$", re.MULTILINE)
 ALIASES = re.compile(r"^(\w+) = (smc_mujoco\.\S+)$", re.MULTILINE)
@@ -51,7 +51,7 @@ def lazy_module(package: str) -> LazyModule:
                 f"module {package!r} has no attribute {name!r}{MOVED.get(name, '')}"
             )
         gl.mend_gl()
-        with delay_ctrl_c():
+        with delay_signals():
             what = f"{package.replace('smc_mujoco', 'smc', 1)}.{name}"
             module = annexes.module(modules.get(name) or origins[name], what)
         value = module if name in modules else getattr(module, name)

@@ -1,12 +1,12 @@
 """Laws that are written out as text: straight Python without loops, compiled like any other law."""
 
 import dataclasses
-import functools
 import linecache
 from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
@@ -22,7 +22,7 @@ class WrittenLaw:
 
     name: str
 
-    @functools.cached_property
+    @cached_property
     def text(self) -> str:
         """The law in Python: a function `controller`."""
         raise NotImplementedError
@@ -40,7 +40,7 @@ class WrittenLaw:
         """Pickle the fields. The function is written out again."""
         return type(self), tuple(getattr(self, field.name) for field in dataclasses.fields(self))  # pyright: ignore[reportArgumentType] see the class
 
-    @functools.cached_property
+    @cached_property
     def py_func(self) -> Any:
         """The compiled text, as a plain function of Python."""
         text = self.text
@@ -64,7 +64,7 @@ class StateFeedback(WrittenLaw):
         """The number of channels that it reads."""
         return len(self.K[0]) // 2
 
-    @functools.cached_property
+    @cached_property
     def text(self) -> str:
         """The law in Python."""
         n = self.joints

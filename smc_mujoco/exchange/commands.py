@@ -8,7 +8,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 
 def export(
@@ -94,12 +94,12 @@ def export(
     of_fmu = "surface", "velocity", "period", "u_max", "model", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
     options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.control import from_text
     chosen = from_text.law(
         laws[0] if laws else out.stem, **from_text.parsed_gains(gains, "--gains")
     )
-    with delay_ctrl_c():
+    with delay_signals():
         if out.suffix == ".c":
             from smc_mujoco.common.files import replacing
             from smc_mujoco.exchange.c.export import law_to_c

@@ -12,7 +12,6 @@ which is compiled and exported like any other law.
 """
 
 import dataclasses
-import functools
 import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -21,6 +20,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import Array, Floats, Names
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
@@ -61,7 +61,7 @@ class LinearLaw(WrittenLaw):
     discrete: bool  # whether the matrices give the step of one control period
     control_period: float | None  # s, of the run for which that step is; None for any
 
-    @functools.cached_property
+    @cached_property
     def text(self) -> str:
         """The law in Python."""
         lines = [f"w{j} = {INPUTS[name]}" for j, name in enumerate(self.inputs)]

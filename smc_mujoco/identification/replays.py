@@ -15,7 +15,6 @@ other points with longer steps.
 """
 
 import dataclasses
-import functools
 import itertools
 import math
 import warnings
@@ -25,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data, Fields, Numbers
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.identification import inverse_dynamics, records
@@ -113,7 +113,7 @@ class Slopes:
         point = Point(self.point.values + step, self.point.states + np.array(moves))
         return dataclasses.replace(self, point=point, residuals=rows)
 
-    @functools.cached_property
+    @cached_property
     def cost(self) -> float:
         """Sum of the squared residuals."""
         return cost(self.residuals)

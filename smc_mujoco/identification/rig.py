@@ -20,6 +20,7 @@ import numpy as np
 
 from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
 from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, find, number
@@ -338,7 +339,7 @@ class Rig:
         joints = dict(zip(self.columns.x, scenario.plant.units, strict=False))
         return joints | {self.columns.u: scenario.efforts[0]}
 
-    @functools.cached_property
+    @cached_property
     def period(self) -> float | None:
         """The control period of closed-loop records, s; None for records of an open loop, whose
         rate is their own.

@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import printable
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 
 def enter(
@@ -59,7 +59,7 @@ def enter(
 
     Example: smc-mujoco enter entries/soft_relay --site
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.problems import enter as entering
         from smc_mujoco.problems import pages
         from smc_mujoco.problems.results import TITLES

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data, Floats, Names, Numbers
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
 from smc_mujoco.control import gain_sets
@@ -73,7 +74,7 @@ class Problem:
     version: int
     rules: str
 
-    @functools.cached_property
+    @cached_property
     def _values(self) -> Data:
         """The rules' values for the plant and the condition."""
         of = rules(self.version)
@@ -85,7 +86,7 @@ class Problem:
         """Whether an adversary chooses the runs of each law."""
         return self.condition in _attacks(self.version)
 
-    @functools.cached_property
+    @cached_property
     def _frozen(self) -> Data:
         """The levels of each measure, and the oracle's numbers; {} before they are frozen."""
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})

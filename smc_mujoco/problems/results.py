@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Fields, Names, Numbers
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
@@ -141,12 +142,12 @@ class Result:
         """The entry's name."""
         return self.about["entry"]["name"]
 
-    @functools.cached_property
+    @cached_property
     def runs(self) -> runs.Runs:
         """The table of the runs."""
         return runs.Runs(self.table)
 
-    @functools.cached_property
+    @cached_property
     def medians(self) -> dict[str, dict[str, float]]:
         """Problem -> measure -> the median over its instances, see `Runs.medians`."""
         return self.runs.medians()

@@ -13,7 +13,7 @@ import ctypes
 import functools
 import os
 import sys
-import threading
+import time
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Annotated, Any, overload
@@ -21,7 +21,8 @@ from typing import Annotated, Any, overload
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import fingerprint, guard
+from smc_mujoco.common import guard
+from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Flag, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel
 from smc_mujoco.common.progress import bar
@@ -46,8 +47,7 @@ SLICE_STEPS = 50_000  # physics steps times channels in a slice, about .2 s of a
 # physics steps in a slice of a user's model, which takes 0.1 s and more a step with contacts once
 # it has diverged
 USER_MODEL_STEPS = 200
-PYTHON_STEPS = 20_000  # in a slice where a function is called in Python
-PATIENCE = 5.0  # s that a slice may still take after Ctrl-C; chosen: it lasts about .2 s of a core
+SLICE_TIME = 0.2  # s: a slice that takes longer is followed by shorter ones
 FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 DRY_FRICTION = "dof_frictionloss", "tendon_frictionloss"  # fields of a model
 LOST_CONTACTS = (
@@ -110,8 +110,8 @@ def run(
 
     MuJoCo's eight callbacks are global to the process. During a run no other callback is called,
     and a run fails if other code sets one, or takes its control callback away. Ctrl-C ends
-    the call within seconds. A compiled law that never returns cannot be stopped: it keeps
-    one core busy until Python ends.
+    the call within a second. A compiled law that never returns cannot be stopped: it keeps
+    one core busy until Python ends, with exit code 130.
     """
     shown_bar = Flag()("progress", progress)
     prepared = list(map(prepare, one_or_several(scenarios)))
@@ -302,8 +302,6 @@ class ScenarioBatch:
         self.fields: dict[str, Array] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
         self.calls = 0  # callbacks that each simulation should have had by now
-        # whether a law may never return: a user's, compiled
-        self.endless = not (python or prepared[0].why_not or all(map(_of_package, scenarios)))
         self.set_parameters(0, range(count))
 
     def may_have_constraints(self) -> bool:
@@ -416,14 +414,15 @@ class ScenarioBatch:
         first = self.scenarios[0]
         channels = len(self.scenarios) * first.plant.n
         slice_steps = max(1, SLICE_STEPS // channels)
-        if self.packed[0].python:
-            slice_steps = min(slice_steps, PYTHON_STEPS)
         if first.plant.is_user_model:
             slice_steps = min(slice_steps, USER_MODEL_STEPS)
         while steps:
             count = min(steps, slice_steps)
             step = functools.partial(self.batch.step, nstep=count)
+            begin = time.perf_counter()
             self.run_alive(step, count * first.stages)
+            if (taken := time.perf_counter() - begin) > SLICE_TIME:
+                slice_steps = max(1, int(count * SLICE_TIME / taken))
             report(count * channels)
             steps -= count
 
@@ -441,15 +440,13 @@ class ScenarioBatch:
             called += packed.python
         check_arithmetic()
         try:
-            if self.endless:
-                self.apply_in_thread(action, alive)
-            elif called:
+            if called:
                 from smc_mujoco.simulation import python_functions
 
                 with python_functions.hearing_ctrl_c(called):
                     action(alive)
             else:
-                action(alive)
+                attended([functools.partial(action, alive)], self.stop)
         except SimulationError as error:
             for i in error.ids:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
@@ -467,32 +464,9 @@ class ScenarioBatch:
         records["failure"][interrupted] = state.INTERRUPTED
         records["failed_step"][interrupted] = before // self.scenarios[0].stages
 
-    def apply_in_thread(self, action: Callable[[Array], None], alive: Array) -> None:
-        """Apply an action in a thread, so that Ctrl-C is heard while a law computes for ever.
-
-        That thread cannot be stopped: it computes until the process ends, in the memory of this
-        batch, which is then never freed.
-        """
-        batch = ctypes.py_object(self)
-        raised = []
-        done = threading.Event()
-
-        def apply() -> None:
-            try:
-                action(alive)
-            except Exception as error:
-                raised.append(error)
-            done.set()
-
-        ctypes.pythonapi.Py_IncRef(batch)
-        try:
-            threading.Thread(target=apply, daemon=True).start()
-            done.wait()
-        finally:
-            if done.wait(PATIENCE):
-                ctypes.pythonapi.Py_DecRef(batch)
-        for error in raised:
-            raise error
+    def stop(self) -> None:
+        """Let the callback do nothing more: it calls no law, and the slice soon ends."""
+        self.records["failure"] = state.INTERRUPTED
 
     def trace(self, i: int) -> Trace:
         """Return the Trace of simulation i."""
@@ -582,8 +556,3 @@ class ScenarioBatch:
             return ""
         u, sliding = commands[:, channel % width].tolist()
         return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {channel}"
-
-
-def _of_package(scenario: Scenario) -> bool:
-    """Return whether the law's functions are of this package."""
-    return all(fingerprint.ours(part.function) for part in scenario.law.parts)

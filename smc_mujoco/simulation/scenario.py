@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, suggesting
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.mjcb import compiled
@@ -304,7 +305,7 @@ class Scenario:
         # a copy resolves again
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
 
-    @functools.cached_property
+    @cached_property
     def resolved(self) -> "Resolved":
         """This scenario with the defaults that depend on other fields."""
         resolved = object.__new__(Resolved)
@@ -392,7 +393,7 @@ class Scenario:
 
         return held_by_noslip(self.plant, REALISTIC_STEP)
 
-    @functools.cached_property
+    @cached_property
     def exact_parts(self) -> tuple[Part, ...]:
         """The parts that do this; () without `exact_friction`."""
         dry = [part.exact for part in self.friction if not part.smooth]
@@ -413,7 +414,7 @@ class Scenario:
                 return ()
         return exact
 
-    @functools.cached_property
+    @cached_property
     def acting(self) -> tuple[tuple[Part, str], ...]:
         """The parts that the callback simulates, in the order in which they act, with what they do:
         "act", "force", "brake" or "stage_force", see hardware/moments.py.
@@ -435,14 +436,14 @@ class Scenario:
                     acting.append((part, kind))
         return (*acting, *((part, "stage_force") for part in self.exact_parts))
 
-    @functools.cached_property
+    @cached_property
     def chains(self) -> list[tuple[Actuator, ...]]:
         """The actuators of each driven channel, in series."""
         if not self.actuator:
             return [()] * self.plant.driven
         return chains(self.actuator, driven_names(self.plant))
 
-    @functools.cached_property
+    @cached_property
     def motors(self) -> list[Actuator]:
         """The motor of each driven channel whose u is no force; else an Actuator that does
         nothing.
@@ -484,7 +485,7 @@ class Scenario:
                 efforts[i] = f"{self.plant.units[i]}/s^2"
         return tuple(efforts)
 
-    @functools.cached_property
+    @cached_property
     def limits(self) -> tuple[float, ...]:
         """The bound on |u| of each driven channel, in the unit of u: the lesser of u_max and the
         motor's limit.
@@ -518,17 +519,17 @@ class Scenario:
             return tuple(range(self.plant.n))
         return self.plant.scored_channels
 
-    @functools.cached_property
+    @cached_property
     def steps(self) -> int:
         """Physics steps per control period."""
         return round(self.control_period / self.resolved.physics_step)
 
-    @functools.cached_property
+    @cached_property
     def samples(self) -> int:
         """K, the number of control periods; a trace has K + 1 samples."""
         return math.floor(self.duration / self.control_period + 1e-6)
 
-    @functools.cached_property
+    @cached_property
     def stages(self) -> int:
         """Callbacks per physics step: one for each stage of the integrator."""
         return 4 if self.resolved.integrator == "RK4" else 1
@@ -539,7 +540,7 @@ class Scenario:
         step = self.resolved.physics_step
         return max((sensor.readings(step, self.plant.n) for sensor in self.sensors), default=0)
 
-    @functools.cached_property
+    @cached_property
     def delay_steps(self) -> int:
         """The input delay in physics steps."""
         return round(self.input_delay / self.resolved.physics_step)
@@ -598,7 +599,7 @@ class Scenario:
         random = [d.random for d in self.disturbance]
         return PROCESS + sum(random[:i]) if random[i] else 0
 
-    @functools.cached_property
+    @cached_property
     def nominal_drives(self) -> list[NominalDrive]:
         """The actuator of each channel, (n,), in the nominal model: its force is gain u - drag
         v.

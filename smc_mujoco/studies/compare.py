@@ -1,7 +1,6 @@
 """Comparison of laws on plants in conditions, in one call: gains, runs, tables and verdicts."""
 
 import dataclasses
-import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.common.aliases import AnyPath, Fields
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
@@ -82,7 +82,7 @@ class Compared(Tables):
             found[plant] = {candidate.law.name: candidate.law for candidate in candidates}
         return found
 
-    @functools.cached_property
+    @cached_property
     def traces(self) -> list[Trace]:
         """The traces of the first seed: of each plant, in each condition, of each law; computed
         when first used.

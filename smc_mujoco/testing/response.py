@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.aliases import Numbers, Pair
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import slug
 from smc_mujoco.common.tabular import Tabular
@@ -58,17 +59,17 @@ class StepResponse:
         """Why the run ended early, in a sentence, or None."""
         return self.trace.failure
 
-    @functools.cached_property
+    @cached_property
     def metrics(self) -> Numbers:
         """Every metric by name. Raises ScenarioError if the run failed."""
         return score(self.trace)
 
-    @functools.cached_property
+    @cached_property
     def scores(self) -> Mapping[str, Numbers]:
         """Group of channels -> metric -> value. Raises as `metrics`."""
         return scores(self.trace)
 
-    @functools.cached_property
+    @cached_property
     def values(self) -> Numbers:
         """`metrics`, and those of each group of channels if there are several, with names such as
         "free peak".

@@ -23,7 +23,6 @@ from smc_mujoco.cli import main, tables, terminal
 from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
-from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.metrics.catalogue import metrics, score
 from smc_mujoco.simulation import run as runs
 
@@ -608,13 +607,6 @@ def test_being_told_to_end_is_ctrl_c_also_where_that_is_ignored(handler, words):
     finally:
         signal.signal(signal.SIGINT, before)
     assert str(ended.value) == words
-
-
-def test_being_told_to_end_waits_for_nothing_that_delays_ctrl_c():
-    went_on = []
-    with pytest.raises(KeyboardInterrupt), delay_ctrl_c():
-        went_on.append(main._end())
-    assert went_on == []
 
 
 @pytest.mark.parametrize("duration", [0.1, 0.3])

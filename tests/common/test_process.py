@@ -10,7 +10,7 @@ import pytest
 
 from smc_mujoco.common.catalogue import Files, discover, modules, subclasses
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.process import TimedOut, timed
 
 pytestmark = pytest.mark.quick
@@ -46,16 +46,16 @@ def test_ctrl_c_waits_for_the_end_of_the_block(monkeypatch):
     reached = False
     try:
         with pytest.raises(KeyboardInterrupt):  # noqa: PT012
-            with delay_ctrl_c():
+            with delay_signals():
                 signal.raise_signal(signal.SIGINT)
                 reached = True
             raise AssertionError("it came to nothing")
         assert reached
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        with delay_ctrl_c():
+        with delay_signals():
             pass
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        with delay_ctrl_c():
+        with delay_signals():
             assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
@@ -65,7 +65,7 @@ def test_other_threads_need_no_delay():
     seen = []
 
     def work():
-        with delay_ctrl_c():
+        with delay_signals():
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=work)

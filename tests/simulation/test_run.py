@@ -2,12 +2,12 @@
 
 # pyright: reportOperatorIssue=false, reportOptionalOperand=false
 import dataclasses
+import functools
 import json
 import math
 import re
 import signal
 import sys
-import threading
 import time
 
 import mujoco
@@ -17,6 +17,8 @@ from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine.group import Group
+from smc_mujoco.common import attended
 from smc_mujoco.common.jit import integers
 from smc_mujoco.simulation import callback
 from smc_mujoco.simulation import run as runs
@@ -397,6 +399,43 @@ def test_a_callback_that_was_installed_is_put_back():
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
+@pytest.mark.parametrize("engine", ["MuJoCo", pytest.param("the equation", marks=pytest.mark.slow)])
+def test_ctrl_c_calls_a_slow_law_no_more_and_leaves_no_thread(engine):
+    calls = np.zeros(2, np.int64)
+    at = calls.ctypes.data
+
+    def slow(y, gains, memory):
+        integers(at)[0] += 1
+        for _ in range(1_000_000):  # a ms or more
+            memory[0] += 1.0
+        return 0.0, 0.0
+
+    def interrupt(signum, frame):
+        if calls[0]:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            raise KeyboardInterrupt
+
+    case = scenario(made(slow, memory=1), duration=20.0)
+    if engine == "MuJoCo":
+        started = functools.partial(smc.run, [case] * 2)
+    else:
+        started = functools.partial(Group([case] * 2, ("itae",)).scored, "cpu", 2)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            started()
+        made_until_then = calls[0]
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    time.sleep(0.1)
+    assert 0 < made_until_then == calls[0]
+    assert not attended._running
+    assert smc.run(scenario()).failure is None
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
 def test_ctrl_c_is_heard_while_a_compiled_law_computes_for_ever(monkeypatch):
     shared = np.zeros(2, np.int64)  # whether the law is to stop, and whether it has begun
     at = shared.ctypes.data
@@ -412,25 +451,19 @@ def test_ctrl_c_is_heard_while_a_compiled_law_computes_for_ever(monkeypatch):
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             raise KeyboardInterrupt
 
-    def slowly(thread):
-        start(thread)
-        time.sleep(9.0)  # on a busy machine the law may begin before `start` returns
-
-    start = threading.Thread.start
-    monkeypatch.setattr(threading.Thread, "start", slowly)
-    monkeypatch.setattr(runs, "PATIENCE", 0.1)
+    monkeypatch.setattr(attended, "PATIENCE", 0.1)
     before = signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
     try:
         with pytest.raises(KeyboardInterrupt):
             smc.run(scenario(made(endless, memory=1)))
+        (thread,) = attended._running
         assert smc.run(scenario()).failure is None
     finally:
         shared[0] = 1
         signal.signal(signal.SIGALRM, before)
-        for thread in threading.enumerate():
-            if thread.name.endswith("(apply)"):
-                thread.join()
+    thread.join()
+    assert not attended._running
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 # pyright: reportCallIssue=false
 import functools
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,12 @@ from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_place
 from smc_mujoco.analysis.engine.loop import simulation
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.attended import attended
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import Key, compile_for, jit, pointer
 from smc_mujoco.simulation.state import address
 
-# in a call of compiled code, which Ctrl-C waits for: .05 s of a core, or .15 with dry friction
+# in a call of compiled code: .05 s of a core, or .15 with dry friction
 PIECE_STEPS = 500_000
 
 
@@ -58,7 +58,7 @@ def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None
     `logs` is (runs, K + 1, n, 6) and gets `form.LOGGED`, if the rows say `logging`.
     """
     made = compiled(form)
-    rows = np.ascontiguousarray(rows)
+    rows = np.array(rows, order="C")  # a copy, in which `stop` writes
     scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)
     if logs is None:
         logs = np.zeros((len(rows), 0))
@@ -68,16 +68,16 @@ def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None
         arrays = rows[part], tables, work, scores[part], logs[part]
         made(len(rows[part]), *map(address, arrays), logs[part].strides[0])
 
-    parts = list(_pieces(form, rows, threads))
-    if threads == 1 or len(parts) == 1:
-        for part in parts:
+    def share() -> None:
+        for part in parts:  # each thread takes the next piece that none has begun
             piece(part)
-    else:
-        pool = ThreadPoolExecutor(threads)
-        try:
-            list(pool.map(piece, parts))
-        finally:  # Ctrl-C waits for the pieces that run
-            pool.shutdown(cancel_futures=True)
+
+    def stop() -> None:
+        rows[:, row_places(form).at["step"]] = np.nan  # a run ends where its state is not finite
+
+    pieces = list(_pieces(form, rows, threads))
+    parts = iter(pieces)
+    attended([share] * min(threads, len(pieces)), stop)
     return scores
 
 

@@ -9,7 +9,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def tune(
 
     Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.analysis.tuning import search
 
     options.check_files(out)
@@ -141,7 +141,7 @@ def margins(
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
@@ -234,7 +234,7 @@ def worst(
     Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --bound
     payload=0:2
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.control.source import in_words
         from smc_mujoco.draw.page import files
         from smc_mujoco.robustness.worst_case import WorstCases, worst_case
@@ -293,7 +293,7 @@ def sensitivity(
     Example: smc-mujoco sensitivity duffing --law super_twisting --bound delay=0:0.02,mass=0.7:1.3
     --out breaks.png
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.robustness.sensitivity import sensitivity
@@ -392,7 +392,7 @@ def chatter(
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out
     chatter
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.analysis.chattering import chattering, rows
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables

@@ -9,7 +9,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import annexes
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", "conditions", "metrics")
 C_TIME = 10.0  # s, that compiler and trial of a law in C may take, each; chosen
@@ -61,12 +61,12 @@ def list_(
     options.only_for(ctx, ("needs", "plant"), name is None, "lists: leave out NAME")
     terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
-        with delay_ctrl_c():
+        with delay_signals():
             loader = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {name},")
         lines = loader.check(Path(name), None, None, "smc_law", (), C_TIME)
         terminal.print(*lines, sep="\n", soft_wrap=True)
     elif name is not None and name not in KINDS:
-        with delay_ctrl_c():
+        with delay_signals():
             from smc_mujoco.cli import law_pages
             from smc_mujoco.mechanisms.plant import catalogue as plants
             from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -77,7 +77,7 @@ def list_(
         else:
             law_pages.print_pages(name, terminal)
     elif needs is not None or plant is not None:
-        with delay_ctrl_c():
+        with delay_signals():
             from smc_mujoco.cli import law_pages
         law_pages.print_suitable(options.names(needs), plant, terminal)
     else:
@@ -89,7 +89,7 @@ def _print_all(terminal: Terminal, kind: str) -> None:
     """Print a line about each plant, law, surface, estimator, scene and condition, about each of a
     kind, or about what has this name, which may be a metric's.
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.metrics.catalogue import metrics

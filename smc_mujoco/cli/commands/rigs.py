@@ -11,7 +11,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 
 def rig(
@@ -128,7 +128,7 @@ def rig(
 
 def _list(terminal: Terminal) -> None:
     """List the rigs."""
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli import tables
         from smc_mujoco.identification.rig import catalogue
 
@@ -150,7 +150,7 @@ def _fit(
     terminal: Terminal,
 ) -> dict[str, Any]:
     """Find quantities of a rig, print them, and return them as JSON data."""
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli import rig_tables
         from smc_mujoco.identification.identify import identify as find
         from smc_mujoco.identification.records import load
@@ -190,7 +190,7 @@ def _repeat(
     terminal: Terminal,
 ) -> None:
     """Show a record beside the runs of the rig's twins."""
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli import rig_tables
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.files import with_ending, writable

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 
 def run(
@@ -48,7 +48,7 @@ def run(
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli.scene import perform
         from smc_mujoco.simulation.trace import formats
         from smc_mujoco.studies import scene as scenes
@@ -82,7 +82,7 @@ def show(
 
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.analysis.step_halving import UNTRIED, repeats_all
         from smc_mujoco.cli import tables
         from smc_mujoco.common.text import capital
@@ -157,7 +157,7 @@ def view(
 
     Example: smc-mujoco view arm.xml:shoulder+elbow --law adrc
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.draw import studio
 
     shown = machine

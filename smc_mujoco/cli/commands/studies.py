@@ -9,7 +9,7 @@ from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def which(
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn:
     sensor=Encoder(counts=4096)" --needs accurate
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.studies.which import which as advise
 
     terminal = Terminal(json)
@@ -161,7 +161,7 @@ def compare(
     Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex
     arm.tex
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.common.files import with_ending
         from smc_mujoco.studies.compare import compare as run
         from smc_mujoco.studies.leaderboard import METRICS

@@ -8,7 +8,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import capital
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def certify(
 
     Example: smc-mujoco certify --check duffing.json
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.evidence.certificates.certificate import Certificate
         from smc_mujoco.evidence.commands import tables
 

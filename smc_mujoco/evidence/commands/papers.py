@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 
 def claims(
@@ -73,7 +73,7 @@ def claims(
         options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
         _papers(papers, new, check, Terminal(json))
         return
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli.tables import catalogue
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
@@ -105,7 +105,7 @@ def claims(
 
 def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Terminal) -> None:
     """Begin a paper of one's own, check evidence, or list the papers."""
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.cli import tables
         from smc_mujoco.evidence.audit import evidence, paper
 

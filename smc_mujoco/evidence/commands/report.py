@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common.errors import printable
-from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.interrupts import delay_signals
 
 
 def report(
@@ -35,7 +35,7 @@ def report(
 
     Example: smc-mujoco report --quick --out look
     """
-    with delay_ctrl_c():
+    with delay_signals():
         from smc_mujoco.evidence.report import report as make
 
     path = make(out, quick, seeds, threads, progress=True, laws=options.names(law))

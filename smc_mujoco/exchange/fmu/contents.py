@@ -13,13 +13,13 @@ because FMPy's `simulate_fmu` takes no inputs of several shapes. The elements fo
 the array of variables, so C reads them as an array.
 """
 
-import functools
 import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import named_data
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
@@ -113,7 +113,7 @@ class ExportedLaw:
         parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
         return {kind: part for kind, part in parts.items() if part is not None}
 
-    @functools.cached_property
+    @cached_property
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
         code = {kind: export.translated(part) for kind, part in self.parts.items() if kind != "law"}

@@ -1,0 +1,90 @@
+"""Threads for code that may outlive its caller: MuJoCo calling a user's law, or a compiler.
+
+    attended([work], stop)    # as work(), but Ctrl-C ends it within PATIENCE
+
+Code in a thread cannot be ended from outside, and crashes if Python ends meanwhile. So such code
+has one owner. It waits for its threads with signals delayed, asks them to stop where a signal's
+handler raises, and lets no process end as usual while one of them runs.
+"""
+
+import atexit
+import contextlib
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from smc_mujoco.common.interrupts import delay_signals
+
+PATIENCE = 1.0  # s that threads have to end after they were asked to stop: chosen
+POLL = 0.05  # s between looks at the signals
+ENDED_BY_CTRL_C = 130  # the exit code of a shell's command that Ctrl-C ended
+
+_running: dict[threading.Thread, Callable[[], None]] = {}  # thread -> what asks it to stop
+
+
+def attended(jobs: Iterable[Callable[[], Any]], stop: Callable[[], Any]) -> None:
+    """Do jobs at the same time, each in a thread of its own, and wait for all.
+
+    `stop` asks them to end soon. It is called where the handler of a signal raises; the exception
+    goes on when they have ended, or after PATIENCE. A job that does not end by then runs on, and
+    keeps alive what it and `stop` refer to.
+    """
+    if threading.current_thread() in _running:
+        for job in jobs:
+            job()
+        return
+    raised: list[BaseException] = []
+
+    def work(job: Callable[[], Any]) -> None:
+        _running[threading.current_thread()] = stop
+        try:
+            job()
+        except BaseException as error:
+            raised.append(error)
+        finally:
+            del _running[threading.current_thread()]
+
+    threads = [threading.Thread(target=work, args=(job,), daemon=True) for job in jobs]
+    with delay_signals() as deliver:
+        try:
+            for thread in threads:
+                thread.start()
+            while alive := _alive(threads):
+                alive[0].join(POLL)
+                deliver()
+        except BaseException:
+            stop()
+            _wait(threads)
+            raise
+    if raised:
+        raise raised.pop()
+
+
+def _alive(threads: Iterable[threading.Thread]) -> list[threading.Thread]:
+    return [thread for thread in threads if thread.is_alive()]
+
+
+def _wait(threads: Iterable[threading.Thread]) -> None:
+    """Wait until threads have ended, at most for PATIENCE."""
+    last = time.monotonic() + PATIENCE
+    while (alive := _alive(threads)) and (rest := last - time.monotonic()) > 0.0:
+        alive[0].join(rest)
+
+
+@atexit.register  # when this is imported, so that it is called after the handlers of others
+def _end_with_python() -> None:
+    """End the process at once if one of the threads does not end: it would crash in a Python that
+    is half gone.
+    """
+    for stop in list(_running.values()):
+        stop()
+    threads = list(_running)
+    _wait(threads)
+    if _alive(threads):
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(Exception):
+                stream.flush()
+        os._exit(ENDED_BY_CTRL_C)
