@@ -125,7 +125,7 @@ def in_contact(trace: Trace) -> Array:
     places = parts[0].model.jnt_qposadr[joint_ids(parts[0].model)]
     tables = [_channels(shape.model) for shape in parts]
     if any(hits for hits, _ in tables):
-        reacting = (trace.reaction != 0.0).any(axis=1)
+        reacting = (trace.holding != 0.0).any(axis=1)
     else:
         reacting = np.zeros(len(trace.t), bool)
     moved = None
@@ -171,7 +171,7 @@ def flanks(trace: Trace) -> Array:
     towards larger x.
     """
     alone = not (trace.scenario.friction or trace.scenario.contact)
-    return np.sign(np.nan_to_num(trace.reaction if alone else trace.force))
+    return np.sign(np.nan_to_num(trace.holding if alone else trace.force))
 
 
 def extended(on: Array, t: Array, hold: float) -> Array:

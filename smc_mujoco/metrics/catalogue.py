@@ -341,7 +341,7 @@ def stick_time(trace: Trace) -> float:
     rest = conventions.at_rest(
         trace
     )  # a sample's reaction is the mean over the control period before it
-    return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
+    return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.holding[1:] != 0.0))).max()
 
 
 @metric("{force}", realistic=True)

@@ -26,7 +26,7 @@ from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.layout import channel_names, column_ends
 from smc_mujoco.mechanisms.plant import EFFORT
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import damping, serialise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.state import LOGGED
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import xarray  # pyright: ignore[reportMissingImports]
 
 ARRAYS = ("t", *LOGGED)
+OPTIONAL = ("held", "damping")
 PLANT_DIVERGED = "the plant diverged"  # how the failure of such a run begins
 MAX_FAILURE = 500  # characters; chosen
 MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
@@ -62,15 +63,17 @@ class Trace:
         m.
       r: reference, (K + 1, n); free joints have none, and get the plant's goal.
       force: of the actuator on the joint, or on the rotor of a Backlash, (K + 1, n), N or N m.
-      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. So that
-        no blow is missed, force and reaction are means over the physics steps of the control period
-        that ends at t_k; at t = 0 they are 0.
+      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m, with
+        the damping of Viscous and of your own file's joint. So that no blow is missed, force and
+        reaction are means over the physics steps of the control period that ends at t_k; at t = 0
+        they are 0.
       scenario: the Scenario of the run.
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
       held: time for which dry friction held the joint in the control period that ends at t_k, (K +
         1, n), s, by the friction's own state, if the scenario has `exact_friction`; None where dry
         friction is MuJoCo's, or none.
+      damping: the part of `reaction` that damping exerts, (K + 1, n), N or N m; None without any.
 
     Of a free body x is its position, in the world's axes, and the rotation vector of its attitude;
     v its velocity in the world's axes, and its angular velocity in its own. u, d, force and
@@ -92,6 +95,7 @@ class Trace:
     diverged_at: float | None = None
     failure: str | None = None
     held: Array | None = None
+    damping: Array | None = None
 
     def __post_init__(self):
         for array in self.arrays().values():
@@ -103,11 +107,14 @@ class Trace:
         return self.scenario.plant.errors(self.x, self.r)
 
     def arrays(self) -> dict[str, Array]:
-        """Return the arrays by name; `held` only if it is not None."""
-        arrays = {name: getattr(self, name) for name in ARRAYS}
-        if self.held is None:
-            return arrays
-        return arrays | {"held": self.held}
+        """Return the arrays by name; `held` and `damping` only if they are not None."""
+        arrays = {name: getattr(self, name) for name in (*ARRAYS, *OPTIONAL)}
+        return {name: array for name, array in arrays.items() if array is not None}
+
+    @property
+    def holding(self) -> Array:
+        """The reaction without damping, (K + 1, n), N or N m: what can hold a joint at rest."""
+        return self.reaction if self.damping is None else self.reaction - self.damping
 
     def __setstate__(self, fields: dict) -> None:  # so that the arrays of a copy are read-only, too
         vars(self).update(fields)
@@ -401,6 +408,10 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
             values[end:] = np.nan
         diverged_at = failed_step * scenario.resolved.physics_step
         failure = f"{one_line(failure, MAX_FAILURE)}, at t = {diverged_at:.6g} s"
+    damped = damping.forces(scenario, arrays["x"])
+    if damped.any():
+        arrays["damping"] = damped
+        arrays["reaction"] += damped
     return Trace(
         **arrays,
         t=t,
@@ -434,10 +445,8 @@ def load(path: AnyPath) -> Trace:
             f"{path} holds no scenario ({words(error)}): give a file that a run wrote"
         ) from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
-        if "held.npy" in archive.namelist():
-            names = (*ARRAYS, "held")
-        else:
-            names = ARRAYS
+        found = archive.namelist()
+        names = (*ARRAYS, *(name for name in OPTIONAL if f"{name}.npy" in found))
         arrays = {name: _checked_array(archive, name, scenario) for name in names}
     return Trace(**arrays, scenario=scenario, **end)
 

@@ -42,10 +42,12 @@ class Run:
     reaction: np.ndarray
     scenario: SimpleNamespace
     held: None = None
+    damping: None = None
     diverged_at: float | None = None
     failure: str | None = None
     plant_diverged = Trace.plant_diverged
     arrays = Trace.arrays
+    holding = Trace.holding
 
 
 def run(
