@@ -35,7 +35,8 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import AbstractContextManager
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -61,6 +62,7 @@ from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation import state
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.workers import opened
 
 OBSERVERS = ("adrc", "pd_observer")
 RIVALS = (*OBSERVERS, "pid", "lqi")
@@ -188,9 +190,6 @@ def _rms_before(form: Form, at: int) -> tuple[Any, Any]:
     return take, own(lambda row, work: math.sqrt(work[at]))
 
 
-METRICS["rms_before"] = _rms_before
-
-
 def sums_of(trace: smc.Trace, window: int) -> list[float]:
     """Return the same five sums of a run by MuJoCo; `window` in samples."""
     if trace.failure is not None:
@@ -210,6 +209,7 @@ class Bench:
     """The runs of a job: for each instance those of J, then those of the conditions."""
 
     def __init__(self, job: Job):
+        METRICS["rms_before"] = _rms_before  # in each process
         self.job = job
         self.plant = plant_of(job.plant)
         self.task: Task = task_of(self.plant, smc.law(job.law), GOAL, BUDGET, 0, 1)
@@ -692,10 +692,12 @@ def fronts(
     model: str,
     sets: int | None,
     device: str,
-    processes: int,
+    executor: Executor,
     lot: int | None = None,
 ) -> list[dict]:
-    """Return the points of the fronts of some laws on a plant."""
+    """Return the points of the fronts of some laws on a plant, which workers search side by
+    side.
+    """
     conditions, levels = (CONDITIONS, LEVELS) if lot is None else by_lot(lot, plant)
     made = plant_of(plant)
     wc = bandwidth(made)
@@ -705,23 +707,29 @@ def fronts(
         print(f"{plant} is run by MuJoCo: {by_mujoco}")
     sets = sets or (SETS_BY_MUJOCO if by_mujoco else SETS)
     jobs = [Job(plant, law, model, wc, conditions, sets, device) for law in laws]
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        searched = list(pool.map(search, jobs))
-        J = np.concatenate([its.J for its in searched])
-        if np.isnan(J).all():
-            raise SystemExit(f"no set of gains costs less than {CAP:g} s²: give more --sets")
-        least = float(np.nanmin(J))
-        work = [
-            pool.submit(told, job, its, levels, least)
-            for job, its in zip(jobs, searched, strict=True)
-        ]
-        found = []
-        for one in work:
-            found += one.result()
+    searched = list(executor.map(search, jobs))
+    J = np.concatenate([its.J for its in searched])
+    if np.isnan(J).all():
+        raise SystemExit(f"no set of gains costs less than {CAP:g} s²: give more --sets")
+    least = float(np.nanmin(J))
+    work = [
+        executor.submit(told, job, its, levels, least)
+        for job, its in zip(jobs, searched, strict=True)
+    ]
+    found = []
+    for one in work:
+        found += one.result()
     settings = {"lot": lot, "wc": wc, "least": least, "sets": sets}
     settings["loads"] = [condition._asdict() for condition in conditions]
     print(f"{plant}: wc {wc:.3g} rad/s, least J {least:.3g}, {sets} sets a law")
     return [point | {"settings": settings} for point in found]
+
+
+def workers(processes: int, address: str | None) -> AbstractContextManager[Executor]:
+    """Return the workers of a dask scheduler, or that many processes of this machine."""
+    if address:
+        return opened(address)
+    return ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
 
 
 def main() -> None:
@@ -735,6 +743,7 @@ def main() -> None:
     parser.add_argument("--sets", type=int, help=f"sets of gains a law, {SETS} by default")
     parser.add_argument("--device", default="cpu", choices=("cpu", "cuda"))
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--executor", metavar="dask://HOST:PORT", help="in place of processes")
     parser.add_argument("--lot", type=int, metavar="SEED", help="draw loads and prices")
     parser.add_argument("--read", nargs="+", type=Path, default=[], help="points of earlier calls")
     parser.add_argument("--figure", type=Path)
@@ -743,18 +752,13 @@ def main() -> None:
     asked = parser.parse_args()
     points = [point for path in asked.read for point in json.loads(path.read_text())]
     read = len(points)
-    for plant in asked.plants:
-        points += fronts(
-            plant,
-            asked.law,
-            asked.model,
-            asked.sets,
-            asked.device,
-            asked.processes,
-            asked.lot,
-        )
-        if asked.out:
-            asked.out.write_text(json.dumps(points[read:]))
+    with workers(asked.processes, asked.executor) as executor:
+        for plant in asked.plants:
+            points += fronts(
+                plant, asked.law, asked.model, asked.sets, asked.device, executor, asked.lot
+            )
+            if asked.out:
+                asked.out.write_text(json.dumps(points[read:]))
     print(f"| {HEADS.replace(', ', ' | ')} |", *map(line, points), *summary(points), sep="\n")
     if asked.keep:
         sides = (side for _, *both in compared(points) for side in both if side)

@@ -22,9 +22,11 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.constraints import Constraint
+from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.version import versions
@@ -32,8 +34,6 @@ from smc_mujoco.control.component import Component
 
 if TYPE_CHECKING:
     from distributed import Client  # pyright: ignore[reportMissingImports]
-
-    Workers = Executor | Client | str  # where calls are made, see `opened`
 
 Result = TypeVar("Result")
 MAX_SENT = 1000  # calls with the workers at once; chosen
@@ -122,24 +122,46 @@ def software() -> dict[str, str]:
     return {"Python": python, **versions(), "code": fingerprint.package()[:8]}
 
 
-@contextlib.contextmanager
-def opened(executor: Any) -> Iterator[Executor]:
-    """Yield an Executor: the one given, or one for a dask Client or for a scheduler's address."""
-    distributed = sys.modules.get("distributed")
-    if distributed is not None and isinstance(executor, distributed.Client):
-        yield _Dask(executor)
-    elif distributed is not None and isinstance(executor, distributed.cfexecutor.ClientExecutor):
-        yield _Dask(executor._client)
-    elif isinstance(executor, Executor):
-        yield executor
-    elif isinstance(executor, str) and ADDRESS.fullmatch(executor):
-        with _client(executor) as client:
-            yield _Dask(client)
-    else:
+@named_data
+class Where(Constraint):
+    """An Executor, a dask Client, or the address of a dask scheduler."""
+
+    def __call__(self, what: str, value: Any) -> Any:
+        if isinstance(value, Executor) or _dask_client(value) is not None:
+            return value
+        if isinstance(value, str) and ADDRESS.fullmatch(value):
+            return value
         raise ScenarioError(
-            f"executor is {shown(executor)}: give a concurrent.futures.Executor, a dask Client or "
+            f"{what} is {shown(value)}: give a concurrent.futures.Executor, a dask Client or "
             "'dask://HOST:PORT'"
         )
+
+
+Workers = Annotated["Executor | Client | str", Where()]  # where calls are made
+
+
+@contextlib.contextmanager
+def opened(where: Any) -> Iterator[Executor]:
+    """Yield an Executor: the one given, or one for a dask Client or for a scheduler's address."""
+    if (client := _dask_client(where)) is not None:
+        yield _Dask(client)
+    elif isinstance(where, str):
+        with _client(where) as client:
+            yield _Dask(client)
+    else:
+        yield where
+
+
+def _dask_client(thing: object) -> "Client | None":
+    """Return the dask Client that a thing is or belongs to, if any."""
+    distributed = sys.modules.get("distributed")
+    if distributed is None:
+        return None
+    if isinstance(thing, distributed.Client):
+        return thing
+    if isinstance(thing, distributed.cfexecutor.ClientExecutor):
+        return thing._client
+    return None
 
 
 @contextlib.contextmanager

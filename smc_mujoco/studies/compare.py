@@ -30,6 +30,7 @@ from smc_mujoco.simulation.conditions import Condition, applicable, find_conditi
 from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
@@ -246,6 +247,7 @@ def compare(
     progress: bool = True,
     seed: DrawSeed = 0,
     device: Device = "cpu",
+    executor: Workers | None = None,
 ) -> Compared:
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better
     and how certain that is.
@@ -281,6 +283,8 @@ def compare(
         call, with any number of threads.
       device: on which the fast engine searches gains and worst cases, "cpu" or "cuda". All numbers
         of the tables are MuJoCo's.
+      executor: where searches and runs are made side by side, in place of threads of this process,
+        as in `study`. The numbers are the same.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
@@ -310,6 +314,7 @@ def compare(
         gain_set=gains,
         seed=seed,
         device=device,
+        executor=executor,
     )
     chosen: dict[str, list[Law | Template]] = {}
     if laws is None:

@@ -39,6 +39,7 @@ from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
@@ -138,6 +139,7 @@ class Trial(NamedTuple):
     seed: int = 0  # another one draws other instances, noise and starts
     brief: bool = False  # whether searches have BRIEF as objective
     device: str = "cpu"  # on which the fast engine searches
+    executor: Workers | None = None  # where searches and runs are made
 
     def seeds(self, count: int) -> range:
         """Return the seeds of that many runs, which are also the numbers of unseen instances."""
@@ -292,6 +294,7 @@ class Trial(NamedTuple):
                     searches=self.searches,
                     folder=folder / "searches",
                     device=self.device,
+                    executor=self.executor,
                 )
 
         try:
@@ -325,7 +328,14 @@ class Trial(NamedTuple):
             self.duration,
             self.starts,
         )
-        return study(runs, self.folder, True, self.threads, self.progress, half_steps=half_steps)
+        return study(
+            runs,
+            self.folder,
+            threads=self.threads,
+            progress=self.progress,
+            half_steps=half_steps,
+            executor=self.executor,
+        )
 
     def holdout(
         self, candidates: Mapping[str, Sequence[Candidate]], count: int

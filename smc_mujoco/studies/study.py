@@ -37,7 +37,7 @@ from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.simulation.workers import opened
+from smc_mujoco.simulation.workers import Workers, opened
 from smc_mujoco.studies import batches
 from smc_mujoco.studies import table as tables
 from smc_mujoco.studies.batches import Batch
@@ -46,7 +46,6 @@ from smc_mujoco.studies.table import Table
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from smc_mujoco.simulation.workers import Workers
 
 # One condition of each kind. IDEAL: the paper's. REAL: friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
@@ -186,7 +185,7 @@ def study(
     threads: int | None = None,
     progress: bool = False,
     half_steps: bool = False,
-    executor: "Workers | None" = None,
+    executor: Workers | None = None,
 ) -> Table:
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return
     it.
@@ -249,7 +248,7 @@ def _compute(
     plants: run_key.Hashes,
     threads: int,
     progress: bool,
-    executor: "Workers | None",
+    executor: Workers | None,
 ) -> None:
     """Compute runs, given by key, and store their rows as they finish."""
     # made before any run: a law may change its globals

@@ -30,6 +30,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
+from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.compare import DrawSeed
 from smc_mujoco.studies.fair_gains import BRIEF, Laws, Trial, law_or_template
@@ -142,6 +143,7 @@ def which(
     relevant: Relevant = RELEVANT,
     seed: DrawSeed = 0,
     device: Device = "cpu",
+    executor: Workers | None = None,
 ) -> Advice:
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
     how certain the answer is.
@@ -160,7 +162,7 @@ def which(
         model also a shorter objective, and by default the laws of the report's first page. There
         one search and six runs in each condition come first, and the best five laws go on.
       defaults: whether a law may win over rivals whose gains are their defaults.
-      starts, relevant, threads, progress, seed, device: as in `compare`.
+      starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
@@ -187,6 +189,7 @@ def which(
         seed=seed,
         brief=brief,
         device=device,
+        executor=executor,
     )
     if quick:
         trial = trial._replace(searches=QUICK_SEARCHES, budget=QUICK_BUDGET)

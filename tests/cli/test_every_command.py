@@ -38,7 +38,9 @@ CALLS = {
     "--worst --quick --metrics itae "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
     "--figure f "
-    "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda": ["studies.compare.compare"],
+    "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda --executor dask://h:1": [
+        "studies.compare.compare"
+    ],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": [
@@ -53,9 +55,8 @@ CALLS = {
     "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
-    "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2 --device cuda": [
-        "studies.which.which"
-    ],
+    "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2 --device cuda "
+    "--executor dask://h:1": ["studies.which.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],

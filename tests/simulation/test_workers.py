@@ -168,9 +168,8 @@ def test_a_law_without_a_module_is_sent_by_value(monkeypatch, refused):
 
 @pytest.mark.parametrize("name", ["ray", "dask://", "dask://host", "dask://host:port", 3])
 def test_an_executor_that_there_is_not_is_one_sentence(name, refused):
-    with opened(Elsewhere(1)) as pool:
-        assert isinstance(pool, Elsewhere)
-    refused(lambda: opened(name).__enter__(), name, "dask://HOST:PORT")
+    call = smc.compare, "pid", "duffing", "nominal"
+    refused(lambda: call[0](*call[1:], executor=name), name, "dask://HOST:PORT")
 
 
 def test_without_dask_the_sentence_says_what_to_install(monkeypatch, refused):

@@ -34,7 +34,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -81,10 +81,7 @@ from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max, stepped_by_mujoco
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.simulation.workers import called, opened
-
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.workers import Workers
+from smc_mujoco.simulation.workers import Workers, called, opened
 
 Gains = tuple[float, ...]
 SCREENED_SHARE, EVOLVED_SHARE = 1 / 8, 1 / 2  # of the evaluations; the rest descend
@@ -126,7 +123,7 @@ def tune(
     folder: Annotated[AnyPath, FilePath()] | None = None,
     outside_theorem: bool = False,
     device: Device = "cpu",
-    executor: "Workers | None" = None,
+    executor: Workers | None = None,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
@@ -206,7 +203,7 @@ def _searched_here(
 
 
 def _searched_elsewhere(
-    task: "Task", missing: Sequence[int], failure: str, shown: Bar, executor: "Workers"
+    task: "Task", missing: Sequence[int], failure: str, shown: Bar, executor: Workers
 ) -> Iterator[tuple[int, SearchResult]]:
     """Have workers make searches side by side, and yield the number and the result of each."""
     made_of = task.plant, task.law, task.goal, task.budget, task.seed

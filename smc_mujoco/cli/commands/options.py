@@ -184,6 +184,13 @@ Threads = Annotated[
     int | None, typer.Option(min=1, help="Number of parallel simulations; default: one per core.")
 ]
 Device = Annotated[str, typer.Option(help="Where searches run: cpu, or cuda for an NVIDIA card.")]
+Executor = Annotated[
+    str | None,
+    typer.Option(
+        metavar="dask://HOST:PORT",
+        help="Scheduler of dask whose workers make searches and runs; default: threads here.",
+    ),
+]
 X0 = Annotated[
     float | None,
     typer.Option("--x0", help="Initial position, rad or m; default: the plant's."),

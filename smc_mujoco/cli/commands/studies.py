@@ -47,6 +47,7 @@ def which(
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
+    executor: options.Executor = None,
 ) -> None:
     """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
     choice is.
@@ -81,6 +82,7 @@ def which(
         relevant=relevant,
         seed=seed,
         device=device,
+        executor=executor,
     )
     terminal.print(advice)
     _finish(advice.table, out, terminal)
@@ -141,6 +143,7 @@ def compare(
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
+    executor: options.Executor = None,
 ) -> None:
     """Compare control laws on plants in conditions. Tune laws that have no gains, run every law,
     and report which law is best and how certain that is.
@@ -184,11 +187,11 @@ def compare(
     }
     if rig is not None:
         own = (plants, condition, worst, quick, not tune, figure, latex, seed)
-        if any(own) or gains != "tuned" or device != "cpu":
+        if any(own) or gains != "tuned" or device != "cpu" or executor:
             raise ScenarioError(
                 "--rig brings its own plant, parameter sets and gains: leave out the plants, "
-                "--condition, --gains, --worst, --quick, --no-tune, --figure, --latex, --seed "
-                "and --device"
+                "--condition, --gains, --worst, --quick, --no-tune, --figure, --latex, --seed, "
+                "--device and --executor"
             )
         from smc_mujoco.identification import ensemble
         from smc_mujoco.identification.rig import rig as find_rig
@@ -216,6 +219,7 @@ def compare(
         quick=quick,
         seed=seed,
         device=device,
+        executor=executor,
         **shared,
     )
     terminal.print(comparison)
