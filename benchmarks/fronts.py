@@ -45,9 +45,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine import scores
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.group import Group, why_not
-from smc_mujoco.analysis.engine.scores import METRICS, own
+from smc_mujoco.analysis.engine.scores import own
 from smc_mujoco.analysis.ranking import interval
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import with_gains
@@ -209,7 +210,7 @@ class Bench:
     """The runs of a job: for each instance those of J, then those of the conditions."""
 
     def __init__(self, job: Job):
-        METRICS["rms_before"] = _rms_before  # in each process
+        scores.METRICS["rms_before"] = _rms_before  # in each process
         self.job = job
         self.plant = plant_of(job.plant)
         self.task: Task = task_of(self.plant, smc.law(job.law), GOAL, BUDGET, 0, 1)
