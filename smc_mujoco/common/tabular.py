@@ -14,6 +14,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from smc_mujoco.common import html
 from smc_mujoco.common.data import named_data
 
 if TYPE_CHECKING:
@@ -159,8 +160,6 @@ class Tabular:
         return [Text(_wrapped(whole, width)), *texts]
 
     def _repr_html_(self) -> str:
-        from smc_mujoco.common import html
-
         lines = [list(map(_html, row)) for row in self.rows]
         note = html.Html("<br>".join(map(html.text, self.notes)))
         numbers = range(self.left, len(self.headings))
@@ -320,8 +319,6 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
 
 def _html(cell: Cell | str) -> str:
     """Return a cell as HTML, with the lines below in smaller letters."""
-    from smc_mujoco.common import html
-
     cell = _cell(cell)
     text = html.strong(cell.text) if cell.strong else html.text(cell.text)
     lines = [*cell.below.splitlines(), *cell.alarm.splitlines()]

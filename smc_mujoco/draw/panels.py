@@ -24,6 +24,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
+from smc_mujoco.metrics.tip import contacts, knows_contacts, tip_error
 from smc_mujoco.simulation.trace import Trace
 
 LAST_SAMPLES = 60  # control samples in the close-up of u
@@ -91,15 +92,11 @@ REFERENCE = "reference"  # id of a reference's lines
 
 def off_path(trace: Trace) -> Array:
     """Return how far an arm's tip is off its path, (K+1, 1) mm."""
-    from smc_mujoco.metrics.tip import tip_error
-
     return peaks(1e3 * tip_error(trace), trace)
 
 
 def contact_force(trace: Trace) -> Array:
     """Return the force of a contact of an arm's tip, (K+1, 1) N."""
-    from smc_mujoco.metrics.tip import contacts
-
     return contacts(trace).force[:, None]
 
 
@@ -203,8 +200,6 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     if quantity == "tip":
         return [panels[0]._replace(traces=traces)] if all(s.plant.tip for s in scenarios) else []
     if quantity == "contact":
-        from smc_mujoco.metrics.tip import knows_contacts
-
         return [panels[0]._replace(traces=traces)] if all(map(knows_contacts, scenarios)) else []
     if quantity in ("x", "e", "v"):
         return panels

@@ -14,6 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.mechanisms.custom.channels import Channel
+from smc_mujoco.mechanisms.custom.others import OTHERS
+from smc_mujoco.mechanisms.custom.plant_from import plant_from
 from smc_mujoco.mechanisms.plant import Plant, plant
 
 MODEL = re.compile(
@@ -69,9 +72,6 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
                 "give FILE.xml:joint, of a xacro what xacro FILE > FILE.urdf writes"
             )
         return plant(text, **values)
-    from smc_mujoco.mechanisms.custom.others import OTHERS
-    from smc_mujoco.mechanisms.custom.plant_from import plant_from
-
     rest, _, others = text.rpartition("+")
     if others.strip() in OTHERS:
         return from_text(rest, folder, **{"others": others.strip()} | values)
@@ -90,8 +90,6 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
 
 def _channel(text: str) -> tuple[str, Any]:
     """Return a joint and its Channel from a text such as "lift(motor,u_max=30)"."""
-    from smc_mujoco.mechanisms.custom.channels import Channel
-
     read = JOINT.fullmatch(text)
     if read is None:
         raise ScenarioError(

@@ -63,7 +63,9 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import first_paragraph, number
+from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.simulation.python_functions import evaluate
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
@@ -122,8 +124,6 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
 
 def reference_rates(trace: Trace) -> Array:
     """Return r' of all channels, (K+1, n); NaN where r is."""
-    from smc_mujoco.simulation.python_functions import evaluate
-
     rates = np.where(np.isnan(trace.r), np.nan, 0.0)
     for i, signal in enumerate(trace.scenario.references):
         rates[:, i] += [evaluate(signal, t)[1] for t in trace.t.tolist()]
@@ -342,8 +342,6 @@ def leans(trace: Trace) -> bool:
     plant = trace.scenario.plant
     if not plant.is_user_model or plant.pose:
         return False
-    from smc_mujoco.mechanisms.custom.scales import falls
-
     limits = np.array(trace.scenario.limits)
     u = trace.u[last_part(trace)]
     if len(limits) != u.shape[1]:  # a group of some channels

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
+from smc_mujoco.analysis.law_time import law_time
 from smc_mujoco.common import guard
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.cache import cached
@@ -144,8 +145,6 @@ def worker(job: Data, report: Callable[[str], None]) -> Fields:
 
     Return how runs failed, and the law's time a sample, see `law_time`.
     """
-    from smc_mujoco.analysis.law_time import law_time
-
     report("reading its folder")
     entry = entries.read(job["folder"])
     files = sorted(filter(Path.is_file, Path(job["folder"]).glob("*")))

@@ -30,6 +30,8 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law, known_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
+from smc_mujoco.robustness.uncertainty import Uncertainty
+from smc_mujoco.robustness.worst_case import worst_case
 from smc_mujoco.simulation.grid import Starts, case
 from smc_mujoco.simulation.model import mixer
 from smc_mujoco.simulation.scenario import Scenario
@@ -198,9 +200,6 @@ class Problem:
 
     def _worst(self, scenario: Scenario) -> Scenario:
         """Return the worst run that an adversary finds for the scenario's law."""
-        from smc_mujoco.robustness.uncertainty import Uncertainty
-        from smc_mujoco.robustness.worst_case import worst_case
-
         within = Uncertainty(**self._values["conditions"][self.condition])
         found = worst_case(scenario, within=within, budget=self.budget, seed=scenario.seed)
         return found.scenario.named(self.condition)

@@ -38,7 +38,9 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
+from smc_mujoco.analysis.engine.form import SCORES
 from smc_mujoco.analysis.engine.group import Group, why_not
+from smc_mujoco.analysis.engine.outcome import NAME, over_samples
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
@@ -267,8 +269,6 @@ class _Grid:
 
     def by_engine(self, device: str) -> Callable:
         """Return the same by the fast engine, on a device."""
-        from smc_mujoco.analysis.engine.form import SCORES
-        from smc_mujoco.analysis.engine.outcome import NAME
 
         def run(shortened: Scenario, states: Array, final: bool) -> Array:
             made = Group([shortened], (NAME,))
@@ -291,8 +291,6 @@ def verdict_of(trace: Trace, x: Array, v: Array, final: bool) -> int | None:
     """Return what the module's rule says of a run, for a grid x, v: 1, 0 or -1, or None if it needs
     a longer run.
     """
-    from smc_mujoco.analysis.engine.outcome import over_samples
-
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
     samples = len(trace.t) - 1

@@ -3,6 +3,7 @@
 from typing import Any
 
 from smc_mujoco.common import fingerprint
+from smc_mujoco.mechanisms.custom.mjcf import digest_of
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -43,8 +44,6 @@ def _plant_codes(plant: Plant) -> list[str]:
             for thing in (plant.fields, plant.nominal, *builds)
             if _of_a_user(thing)
         ]
-    from smc_mujoco.mechanisms.custom.mjcf import digest_of
-
     functions = plant.build, plant.fields, plant.nominal, builds
     return [*(fingerprint.of(thing) for thing in functions), digest_of(plant.spec())]
 

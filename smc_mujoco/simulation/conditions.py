@@ -47,6 +47,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
+from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Obstacle
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
@@ -57,7 +58,10 @@ from smc_mujoco.mechanisms.hardware.stepper import of_rig
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
-from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation import (
+    coerce,
+    time_series,  # noqa: F401
+)
 from smc_mujoco.simulation.scenario import (
     NOT_OF_FREE_BODIES,
     U_MAX,
@@ -336,9 +340,6 @@ def _kinds() -> dict[str, Any]:
 
     If two have one name, the suite's is returned.
     """
-    from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
-    from smc_mujoco.simulation import time_series  # noqa: F401
-
     kinds: list[type] = [Noise, Jump, Fault, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))

@@ -43,6 +43,7 @@ from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law, checked_name, known_laws
+from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, catalogue
@@ -96,8 +97,6 @@ class Starts:
         if self.x0 is not None:
             scenario = dataclasses.replace(scenario, x0=self.x0)
         elif not self.by and _at_goal(scenario):
-            from smc_mujoco.mechanisms.custom.scales import beside_goal
-
             scenario = dataclasses.replace(scenario, x0=beside_goal(scenario.plant))
         if seed == 0 and not scenario.plant.pose:
             return dataclasses.replace(scenario, seed=0)

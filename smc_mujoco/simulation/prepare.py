@@ -28,7 +28,7 @@ from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import cfunctions, philox, state
+from smc_mujoco.simulation import cfunctions, philox, python_functions, state
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
@@ -284,8 +284,6 @@ class Functions(state.Buffer):
         if not self.called:
             with contextlib.suppress(NotCompilable):
                 return compiler(thing)
-        from smc_mujoco.simulation import python_functions
-
         self.python.append(getattr(python_functions, caller)(thing, *arguments))
         return self.python[-1]
 

@@ -17,6 +17,7 @@ from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -158,8 +159,6 @@ def _restore_plant(data: dict) -> Plant:
     name = plant.pop("name")
     module = plant.pop("module")
     if mjcf := plant.pop("mjcf", None):
-        from smc_mujoco.mechanisms.custom.plant_from import restored
-
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
     if module != find_plant(name).build.__module__:

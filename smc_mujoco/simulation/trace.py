@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib import format as npy
 
+from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Names
 from smc_mujoco.common.errors import (
     ScenarioError,
@@ -133,8 +134,6 @@ class Trace:
 
     def _repr_html_(self) -> str:
         """Return what was run, how it failed if it did, and the range of x and u in each unit."""
-        from smc_mujoco.common import html
-
         s = self.scenario
         rows = {
             "plant": s.plant.name,

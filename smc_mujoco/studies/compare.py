@@ -26,6 +26,8 @@ from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.robustness.uncertainty import Uncertainty
+from smc_mujoco.robustness.worst_case import DURATION, WorstCase, WorstCases
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
@@ -40,9 +42,6 @@ from smc_mujoco.studies.table import Table
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure
-
-    from smc_mujoco.robustness.uncertainty import Uncertainty
-    from smc_mujoco.robustness.worst_case import WorstCase
 
 QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
 # plants times conditions that have a table each; if there are more, each plant has one table
@@ -69,7 +68,7 @@ class Compared(Tables):
     # than 12 blocks
     leaderboard: Boards
     # plant -> law -> its `worst_case`; empty if it was not searched
-    worst: Mapping[str, Mapping[str, "WorstCase"]]
+    worst: Mapping[str, Mapping[str, WorstCase]]
     # plant -> law -> time of its compiled code a sample, on this machine; in no file
     times: Mapping[str, Mapping[str, LawTime]]
 
@@ -142,8 +141,6 @@ class Compared(Tables):
         """The tables that are the same in every call: of the `leaderboard`, and of worst cases."""
         tables = self.leaderboard.tables
         if self.worst:
-            from smc_mujoco.robustness.worst_case import WorstCases
-
             for cases in self.worst.values():
                 tables += WorstCases(cases.values()).tables
         return tables
@@ -231,7 +228,7 @@ def compare(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = SEARCHES,
     tune: Boolean = True,
-    worst: "bool | Uncertainty" = False,
+    worst: bool | Uncertainty = False,
     *,
     out: Annotated[AnyPath, FilePath()] = "compared",
     metrics: Sequence[str] = METRICS,
@@ -361,12 +358,10 @@ def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:
             arrived[:] = arrived & ((plant, law) in fine)
 
 
-def _class(worst: object) -> "Uncertainty | None":
+def _class(worst: object) -> Uncertainty | None:
     """Return the class in which worst cases are searched, None for the default one."""
     if isinstance(worst, bool):
         return None
-    from smc_mujoco.robustness.uncertainty import Uncertainty
-
     if not isinstance(worst, Uncertainty):
         raise ScenarioError(
             f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1)"
@@ -377,12 +372,10 @@ def _class(worst: object) -> "Uncertainty | None":
 def _worst_cases(
     trial: Trial,
     candidates: Mapping[str, Sequence[Candidate]],
-    within: "Uncertainty | None",
+    within: Uncertainty | None,
     duration: float | None,
-) -> "dict[str, dict[str, WorstCase]]":
+) -> dict[str, dict[str, WorstCase]]:
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
-    from smc_mujoco.robustness.worst_case import DURATION
-
     found: dict[str, dict[str, WorstCase]] = {}
     for plant in trial.plants:
         found[plant.name] = {}

@@ -14,10 +14,11 @@ import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
@@ -34,6 +35,8 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.robustness.uncertainty import Uncertainty
+from smc_mujoco.robustness.worst_case import WorstCase, cached_worst_case
 from smc_mujoco.simulation import coerce, run_key
 from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names
@@ -43,11 +46,6 @@ from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
-
-if TYPE_CHECKING:
-    from smc_mujoco.analysis.tuning.result import Tuned
-    from smc_mujoco.robustness.uncertainty import Uncertainty
-    from smc_mujoco.robustness.worst_case import WorstCase
 
 # what gains for a machine of one's own are searched by for a first answer; chosen
 BRIEF = Objective(conditions=(NAMED["nominal"], NAMED["noise"], NAMED["heavy"]), duration=2.0)
@@ -217,8 +215,6 @@ class Trial(NamedTuple):
         """Return how long an evaluation takes, s, and how many one search of each law makes at
         most, in all.
         """
-        from smc_mujoco.analysis.tuning import search
-
         goal = self._goal(plant, starts)
         return search.expected_of(plant, laws, goal, self.budget, self.threads)
 
@@ -249,8 +245,6 @@ class Trial(NamedTuple):
 
     def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
         """Return why a law cannot be tuned on a plant, or ""."""
-        from smc_mujoco.analysis.tuning import search
-
         return search.why_not(plant, law, self._goal(plant, starts))
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
@@ -266,8 +260,6 @@ class Trial(NamedTuple):
         """Return a law with gains that searches find, or found in an earlier call, or with its
         defaults if it cannot be tuned.
         """
-        from smc_mujoco.analysis.tuning import result, search
-
         goal = self._goal(plant, starts)
         default = coerce.law(law)
         if isinstance(law, Template):
@@ -277,7 +269,7 @@ class Trial(NamedTuple):
         ranges = template and (dict(template.gains), dict(template.conditions))
         folder = self.folder / "gains"
 
-        def searched() -> "Tuned":
+        def searched() -> result.Tuned:
             with warnings.catch_warnings():  # the remark says so
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
                 warnings.filterwarnings(
@@ -361,23 +353,19 @@ class Trial(NamedTuple):
         return found
 
     def attack(
-        self, name: str, scenario: Scenario, within: "Uncertainty | None", budget: int | None = None
-    ) -> "WorstCase":
+        self, name: str, scenario: Scenario, within: Uncertainty | None, budget: int | None = None
+    ) -> WorstCase:
         """Return the worst case of a scenario, which the folder keeps under a name."""
-        from smc_mujoco.robustness.worst_case import cached_worst_case
-
         file = self.folder / "worst" / f"{name}.json"
         return cached_worst_case(
             file, scenario, within, budget, self.threads, self.progress, self.device
         )
 
 
-def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
+def candidate_of(default: Component, tuned: result.Tuned) -> Candidate:
     """Return a law with the gains of each search, or with those that it had if no search found
     better ones.
     """
-    from smc_mujoco.analysis.tuning import search_space
-
     found = tuned.law.source
     if tuned.before < tuned.objective:
         if default.source.kind == source.DEFAULT:

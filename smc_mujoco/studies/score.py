@@ -2,17 +2,16 @@
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine.runs import Runs
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, find, has, items_of, shown
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-
-if TYPE_CHECKING:
-    from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.table import Table
 
 CHUNK = 20_000  # scenarios in memory at once
 METRICS = ("settling_time", "itae")
@@ -26,14 +25,14 @@ def score(
     metrics: Sequence[str] = METRICS,
     device: str = "cpu",
     threads: int | None = None,
-) -> "Table": ...
+) -> Table: ...
 @constrained
 def score(
     runs: Any,
     metrics: Sequence[str] = METRICS,
     device: Device = "cpu",
     threads: int | None = None,
-) -> "dict[str, float] | Table":
+) -> dict[str, float] | Table:
     """Score one trace, or many scenarios without keeping their traces.
 
     Metrics that compare channels are for networks only. For a cart with a pole, times and
@@ -63,9 +62,6 @@ def score(
     for name in names:
         find("metric", name, catalogue.CATALOGUE)
     import pyarrow as pa
-
-    from smc_mujoco.analysis.engine.runs import Runs
-    from smc_mujoco.studies.table import Table
 
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
     columns |= {"seed": pa.int64()} | dict.fromkeys((*names, "diverged_at"), pa.float64())

@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
@@ -190,8 +191,6 @@ class Table:
         return f"Table({len(self)} runs: {', '.join(counts)}{checked and '; '}{checked})"
 
     def _repr_html_(self) -> str:
-        from smc_mujoco.common import html
-
         names = []
         for name in PREVIEW:
             if name in self.data.column_names:

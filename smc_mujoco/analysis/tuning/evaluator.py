@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.tuning import equation
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective
 from smc_mujoco.common.aliases import Array, Floats, Pair
 from smc_mujoco.control.component import Component
@@ -64,8 +65,6 @@ class Evaluator:
         slots: int = 1,
         device: str = "cpu",
     ):
-        from smc_mujoco.analysis.tuning import equation
-
         self.goal = goal
         self.cases = list(cases)
         self.names = tuple(names)

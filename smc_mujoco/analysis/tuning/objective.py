@@ -29,6 +29,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import halved as halved_step
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
@@ -227,8 +228,6 @@ class Objective:
         """
         if self.chattering is None:
             return 0.0
-        from smc_mujoco.analysis.chattering import predict
-
         cycle = predict(case, ranges=False)
         # the largest possible if none is predicted
         if cycle:

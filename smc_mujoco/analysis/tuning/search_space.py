@@ -48,6 +48,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.mechanisms.custom import scales as at_start
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import SPREAD, START_CURE
 
@@ -121,8 +122,6 @@ def scales(
     else:
         X = reach
     if plant.is_user_model and per_u is not None:
-        from smc_mujoco.mechanisms.custom import scales as at_start
-
         # a bound far beyond what the joint needs is no scale
         u_max = min(u_max, at_start.MOST * max(at_start.needs(plant)) / per_u)
         g = min(at_start.mobility(plant, u_max * per_u, X))

@@ -20,6 +20,7 @@ from PIL import Image, ImageDraw, ImageFilter
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
+from smc_mujoco.draw.film.flight import straight
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
 from smc_mujoco.metrics.conventions import Group, groups
 from smc_mujoco.simulation import model as models
@@ -257,8 +258,6 @@ def path(
     anchor = data.xanchor[mount.joint]
     owner = model.jnt_bodyid[mount.joint]
     if arrow.way is not None:
-        from smc_mujoco.draw.film.flight import straight
-
         unit = MAX_SWEEP * mount.radius or mount.unit
         width = BENT_WIDTH * mount.radius or mount.thick
         force = min(arrow.high, MAX_BLOW) * arrow.way

@@ -24,7 +24,7 @@ from PIL import Image, ImageDraw
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
-from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.film import arrows, flight
 from smc_mujoco.draw.film.caption import fitted
 from smc_mujoco.draw.panels import Panel
 from smc_mujoco.metrics.conventions import SETTLING_BAND, last_exit, scale
@@ -93,8 +93,6 @@ class Charts:
                 point = DPI * scale / 72
                 room = ax.get_window_extent().width
                 if panel.quantity == "path":
-                    from smc_mujoco.draw.film import flight
-
                     artists += flight.paths(ax, panel, colours)
                     flown = functools.partial(flight.flights, ax, panel.traces)
                     continue

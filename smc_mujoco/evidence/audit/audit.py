@@ -14,18 +14,17 @@ import dataclasses
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
 from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.version import __version__
+from smc_mujoco.evidence.audit import search
 from smc_mujoco.evidence.audit.paper import Entry, Paper, failed
 from smc_mujoco.evidence.audit.paper import paper as find_paper
+from smc_mujoco.evidence.audit.runs import Result, Runs, Used, of_table
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
-
-if TYPE_CHECKING:
-    from smc_mujoco.evidence.audit.runs import Result, Runs, Used
-    from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.table import Table
 
 DEFAULT_PAPER = "gaber"  # the paper that the suite was built for
 CURE = "return measure -> number, or measure -> {case: number}"
@@ -93,8 +92,6 @@ def audit(
       ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the
         paper.
     """
-    from smc_mujoco.evidence.audit.runs import Runs, of_table
-
     if isinstance(paper, Paper):
         audited = paper
     else:
@@ -179,8 +176,6 @@ def measure(entry: Entry, runs: Runs) -> Evidence:
     other laws have the gains of another set in its search.
     """
     if entry.over and entry.rivals in ("", runs.gains):
-        from smc_mujoco.evidence.audit import search
-
         return search.decisive(entry, runs, lambda at: _measured(entry, at))
     return _measured(entry, runs)
 

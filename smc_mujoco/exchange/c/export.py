@@ -15,6 +15,7 @@ from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
 from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
+from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import body, build
 from smc_mujoco.exchange.c.translate import (
     JOINTS,
@@ -191,8 +192,6 @@ def _in_q15(law: Component) -> Component:
 
 def _fixed_point(law: Component) -> str:
     """Return the C of the fixed-point law, with its table and the words of its gains."""
-    from smc_mujoco.control.laws import observer_free_q15 as q15
-
     gains = law.gains
     word = q15.word.py_func
     words = {
