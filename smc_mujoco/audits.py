@@ -1,4 +1,4 @@
-"""Certificates, and the report."""
+"""The report."""
 
 from smc_mujoco.common import lazy
 

@@ -111,7 +111,6 @@ LINES = {  # command -> its shortest right lines, "?" for what is always odd
     "export": ["pid out.c", "pid out.fmu --no-binary", "? out.c", "?"],
     "enter": ["?", "folder", "a.py", "pid --suite ?", "pid --against ?"],
     "claims": ["--papers", "?", "--paper ?", "--check ?", "1 --gains ?"],
-    "certify": ["?", "--check ?", "duffing --gains ?", "duffing --law ?", "duffing --condition ?"],
     "report": ["--law ?"],
     "rig": ["?", "emps ?", "emps a.csv", "emps a.csv --fit", "duffing ? --fit"],
 }
@@ -182,18 +181,22 @@ def commands(random: Random, sentence: Callable[[str], None]) -> str:
 
 
 SHORT = smc.Scenario(plant="duffing", law="classical", duration=0.01)
-WITHIN = smc.Uncertainty(disturbance=1.0)
 # function -> its right arguments, which cost little; ... for what is always odd
 CALLS: dict[Callable, dict[str, Any]] = {
     smc.tune: {"plant": ..., "law": "pid", "budget": 1, "searches": 1, "objective": "balanced"},
     smc.compare: {"laws": ..., "plants": "duffing", "conditions": "nominal", "seeds": 1},
     smc.which: {"plant": "duffing", "needs": ..., "laws": "pid", "conditions": "nominal"},
     smc.margins: {"plants": "duffing", "laws": "pid", "kinds": ..., "gains": "default"},
-    smc.worst_case: {"scenario": SHORT, "metric": "peak", "within": WITHIN, "budget": 1, "seed": 0},
+    smc.worst_case: {
+        "scenario": SHORT,
+        "metric": "peak",
+        "within": smc.Uncertainty(disturbance=1.0),
+        "budget": 1,
+        "seed": 0,
+    },
     smc.sensitivity: {"scenario": SHORT, "metric": "peak", "points": ..., "seed": 0},
     smc.design.basin: {"plant": "duffing", "law": ..., "points": (2, 2), "duration": 0.1},
     smc.design.chattering: {"law": SHORT, "channel": 0},
-    smc.audits.certify: {"scenario": ..., "within": WITHIN},
     smc.grid: {"plants": "duffing", "laws": "pid", "conditions": "nominal", "seeds": 1},
     smc.study: {"scenarios": [SHORT], "out": ...},
     smc.leaderboard: {"table": ..., "metrics": ["itae"]},

@@ -30,7 +30,7 @@ SHELVES = {  # module of public names -> title of its page
     "hardware": "Real mechanisms",
     "design": "Gains from theory, chattering, regions of attraction",
     "accuracy": "Accuracy",
-    "audits": "Certificates, the report",
+    "audits": "The report",
     "fidelity": "Fidelity",
     "metrics": "Scores of joints and tips",
     "exchange": "Laws from and to C and FMUs",
@@ -42,7 +42,6 @@ OTHERS = {  # title -> names of modules that are no public names
     studies.compare.Compared
     studies.scene.Outcome
     draw.film.film.Frames
-    evidence.certificates.certificate.Certificate
     identification.rig.Rig
     envs.flight_env.FlightEnv
     studies.which.Advice

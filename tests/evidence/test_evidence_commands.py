@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.arguments import reported
-from helpers.certificates import certificate
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
@@ -52,7 +51,7 @@ CLAIMS = Claims(
             read="abstract",
             over="some",
             instead="It rests.",
-            shown_by="smc-mujoco certify",
+            shown_by="smc-mujoco claims 3",
         ),
         Claim(
             id="4",
@@ -171,9 +170,6 @@ def repeated(name):
 
 
 STUBS = {  # of each command: the functions replaced, and what they give
-    "certify": {
-        "evidence.certificates.maker.certify": lambda scenario, within: certificate(),
-    },
     "claims": {
         "evidence.audit.audit.audit": audited,
         "evidence.audit.paper.new": [Path("mine/paper.toml"), Path("mine/claims.py")],
@@ -205,27 +201,6 @@ AXIS = (
 )
 AXIS += ("viscous is at the end of its range", "offset may as well be 0")
 GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces aside
-    "certify duffing --disturbance 2 --out d.json": (
-        0,
-        [
-            "certify(Scenario(plant duffing, law observer_free, gains of kind shipped, u_max=6.0",
-            "Uncertainty(disturbance=2.0, slope=None",
-            "theorem condition holds margin",
-            "saturated PD damping no -0.250 N s/m",
-            "restoring yes 0.125",
-            "0.666 m",
-            "0.300 m",
-            "|d| <= 2 N",
-            "wrote d.json",
-        ],
-    ),
-    "certify duffing --law pid --condition noise --gains default": (
-        0,
-        [
-            "law pid(kp=10, ki=5, kd=6, tau=0.005, tt=0.5), gains of kind default",
-            "condition='noise'), None)",
-        ],
-    ),
     "claims 3 --gains study,tuned --quick --threads 2": (
         0,
         [
@@ -238,7 +213,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "✗ largest step of u",
             "1.25 <= 1",
             "TV rate 12.5",
-            "instead It rests. (smc-mujoco certify)",
+            "instead It rests. (smc-mujoco claims 3)",
             "○ 1 refuted; depend on the gains: 1",
             "quick: coarser grids",
         ],

@@ -1,4 +1,4 @@
-"""Tables of the commands on claims and certificates."""
+"""Tables of the commands on claims."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from smc_mujoco.cli.tables import plain, titled
-from smc_mujoco.common.text import capital, number
+from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measured
-from smc_mujoco.evidence.certificates.certificate import Certificate
 
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
 # questions have their own.
@@ -21,22 +20,6 @@ COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim", "d
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REFUTED])}
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
-
-
-def certificate(made: Certificate) -> Table:
-    """Return a certificate's conditions with their margins, and from where it holds and how far."""
-    columns = ["theorem", "condition", "holds", Column("margin", justify="right"), "asks"]
-    table = titled(f"{made.law} on {made.plant}", *columns, pad_edge=False)
-    for row in made.conditions:
-        if row.holds:
-            mark = Text("yes", style="blue")
-        else:
-            mark = Text("no", style="red")
-        margin = f"{number(row.margin)} {row.unit}".strip()
-        table.add_row(row.theorem, row.name, mark, margin, row.asks)
-    for theorem, what, value, unit in made.ranges:
-        table.add_row(theorem, what, "", f"{number(value)} {unit}", "")
-    return table
 
 
 def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
