@@ -208,7 +208,7 @@ def batches(random: Random) -> str:
 @functools.cache
 def world() -> None:
     """Write right files into the folder of this process, once."""
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.2)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.2)
     trace = smc.run(scenario)
     trace.save("trace.npz")
     trace.export("a.csv")

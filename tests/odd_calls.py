@@ -119,7 +119,7 @@ LINES = {  # command -> its shortest right lines, "?" for what is always odd
 @functools.cache
 def world() -> smc.Trace:
     """Write the files that commands are given, once, and return a trace."""
-    trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.02))
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.02))
     trace.save("trace.npz")
     Path("a.csv").write_text("t,x\n0,1\n1,nan\n")
     Path("a.json").write_text('{"x": [1, null]}')
@@ -180,7 +180,7 @@ def commands(random: Random, sentence: Callable[[str], None]) -> str:
     return "refused" if code else "ran"
 
 
-SHORT = smc.Scenario(plant="duffing", law="classical", duration=0.01)
+SHORT = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01)
 # function -> its right arguments, which cost little; ... for what is always odd
 CALLS: dict[Callable, dict[str, Any]] = {
     smc.tune: {"plant": ..., "law": "pid", "budget": 1, "searches": 1, "objective": "balanced"},

@@ -103,7 +103,7 @@ def test_a_case_is_the_same_again():
 
 
 def test_a_trace_with_a_number_that_was_not_computed_is_found():
-    trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01))
     attack.sound(trace)
     for name in ("x", "applied", "reaction"):
         array = getattr(trace, name).copy()

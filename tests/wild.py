@@ -231,7 +231,7 @@ MADE: list[Callable[[], Any]] = [  # made again for each use
     lambda: smc.Coulomb(0.1),
     lambda: smc.Lag(0.1),
     lambda: smc.hardware.Contact("none"),
-    lambda: smc.Scenario(plant="duffing", law="classical", duration=0.01),
+    lambda: smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01),
 ]
 FIXED = [NUMBERS, TEXTS, ARRAYS, SEVERAL, OTHERS]
 

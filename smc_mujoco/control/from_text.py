@@ -19,12 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common import annexes
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.files import read_json, reading
 from smc_mujoco.common.scripts import execute
-from smc_mujoco.control import serialise
+from smc_mujoco.control import gain_sets, serialise
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 
 # pid(kp=50,ki=50,kd=8)
 NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
@@ -37,8 +39,16 @@ FILE_AND_TUNING = re.compile(r"(?P<file>[^()]+\.\w+)\s*\((?P<tuning>[^()=]+\.jso
 UNREADABLE = SyntaxError, ValueError, RecursionError, MemoryError
 
 
-def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
+def law(
+    text: str | Law | Template,
+    /,
+    plant: Plant | str | None = None,
+    **gains: float | Sequence[float],
+) -> Law:
     """Return a law from a text, with these gains.
+
+        smc.law("pid", kp=30.0)          # the other gains are its defaults
+        smc.law("pid", plant="duffing")  # the gains that searches found for this plant
 
     `smc.law(...).named("slow")` gives it another name.
 
@@ -47,12 +57,20 @@ def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
         "pid(kp=50,ki=50,kd=8)"; or a file with one law: FILE.json that `smc-mujoco tune` wrote,
         FILE.py, FILE.c or FILE.fmu, also with its tuning, as "FILE.py(FILE.json)". Or your own law
         itself.
+      plant: a Plant or the name of one. The gains that are not given are then those that the
+        package ships for a law of the library on it, of the search with the least J.
       gains: one number for all channels, or a sequence with one for each driven channel.
 
     Raises:
-      ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with
-        several.
+      ScenarioError: an unknown law or gain, a gain out of range, a file without a law or with
+        several, or a plant for which no gains of the law are shipped.
+
+    Warns:
+      GainWarning: gains that violate a condition of the law's theorem.
+      ScenarioWarning: a plant whose parameters are not those for which gains were tuned.
     """
+    if plant is not None:
+        return _shipped(text, as_plant(plant), gains)
     if isinstance(text, Template) and text.kind == "law":
         return _with_gains(text(), gains)
     if isinstance(text, Law) and text.kind == "law":
@@ -63,6 +81,20 @@ def law(text: str | Law | Template, /, **gains: float | Sequence[float]) -> Law:
         raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
     first = found[0]
     return _with_gains(known_laws()[first]() if isinstance(first, str) else first, gains)
+
+
+def _shipped(text: object, plant: Plant, gains: Mapping[str, float | Sequence[float]]) -> Law:
+    """Return a law of the library with these gains, and the others as shipped for a plant."""
+    if not isinstance(text, str):
+        raise ScenarioError(
+            f"law {shown(text)} is none of the library by its name: leave plant={plant.name!r} out"
+        )
+    head, given = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
+    made = gain_sets.law(plant, head)
+    warn_once(gain_sets.of_other_parameters(plant))
+    if not (given or gains):
+        return made
+    return known_laws()[head].bind({**made.gains, **given, **gains}, warn=True)
 
 
 def laws(text: object) -> list[str | Law]:

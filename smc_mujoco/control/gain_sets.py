@@ -28,7 +28,7 @@ from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control import source
-from smc_mujoco.control.component import Component
+from smc_mujoco.control.component import Component, gain_text
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.named import as_plant
@@ -109,6 +109,34 @@ def law(
         base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()}
     )
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
+
+
+def said(plant: Plant, law: Component) -> str:
+    """Return a sentence on a law that was given by its name, and has shipped gains."""
+    gains = ", ".join(f"{name}={gain_text(value)}" for name, value in law.gains.items())
+    text = (
+        f"law {law.name!r} by its name alone has its shipped gains on {plant.name}, {gains}: give "
+        f"smc.law({law.name!r}, plant={plant.name!r}) to say so, smc.law({law.name!r}) for its "
+        "defaults"
+    )
+    return f"{text}; {doubt}" if (doubt := of_other_parameters(plant)) else text
+
+
+def of_other_parameters(plant: Plant, gains: str = "tuned") -> str:
+    """Return a sentence on a plant that has not the parameters for which gains were tuned, or
+    "".
+    """
+    standard = plants_known().get(plant.name)
+    if standard is None or plant.parameters == standard.parameters:
+        return ""
+    changed = []
+    for name, value in plant.parameters.items():
+        if value != standard.parameters[name]:
+            changed.append(f"{name} = {value:g}")
+    return (
+        f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and "
+        f"this one has {', '.join(changed)}: tune the law on it, or give the law's gains yourself"
+    )
 
 
 def general() -> Names:

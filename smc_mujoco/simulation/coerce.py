@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smc_mujoco.common.aliases import Floats, Numbers
-from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, warn_once
 from smc_mujoco.common.text import counted, joined, stated
-from smc_mujoco.control import from_text
+from smc_mujoco.control import from_text, gain_sets
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
@@ -67,8 +67,21 @@ def laws(name: str, value: Laws | None, s: Any) -> Law:
     if value is None:
         value = s.plant.suggested.get("law")
     if not isinstance(value, Mapping | list | tuple):
-        return law(value)  # pyright: ignore[reportArgumentType]
-    return by_channel([law(item) for item in one_per_channel(name, value, s.plant)])  # pyright: ignore[reportArgumentType]
+        return _of_plant(value, s)
+    return by_channel([_of_plant(item, s) for item in one_per_channel(name, value, s.plant)])
+
+
+def _of_plant(value: Any, s: Any) -> Law:
+    """Return a law. One given by its name has the gains that are shipped for the plant, if there
+    are some and the scenario has the model, the surface and the goal for which they were tuned.
+    """
+    made = law(value)
+    model = "nominal" if made.requires_model else "none"
+    as_tuned = s.model in (None, model) and s.surface is None and s.tracks == "position"
+    if value == made.name and as_tuned and gain_sets.in_set(s.plant, made.name, "tuned"):
+        made = gain_sets.law(s.plant, made.name)
+        warn_once(gain_sets.said(s.plant, made))
+    return made
 
 
 def surface(name: str, value: object, s: Any) -> Any:

@@ -46,7 +46,7 @@ from smc_mujoco.control.law import Law, checked_name, known_laws
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.named import as_plant
-from smc_mujoco.mechanisms.plant import Plant, catalogue
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
@@ -343,19 +343,8 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
         return checked_name(coerce.law(law))
     gains = "default" if law == "none" else gains
     with_gains = sets.law(plant, law, gains, seed)
-    standard = catalogue().get(plant.name)
-    if gains != "default" and standard is not None and plant.parameters != standard.parameters:
-        changed = []
-        for name, v in plant.parameters.items():
-            if v != standard.parameters[name]:
-                changed.append(f"{name} = {v:g}")
-        warnings.warn(
-            f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and "
-            f"this one has {', '.join(changed)}: tune the law on it, or give the law's gains "
-            "yourself",
-            ScenarioWarning,
-            users_stacklevel(),
-        )
+    if gains != "default" and (doubt := sets.of_other_parameters(plant, gains)):
+        warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return with_gains
 
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import (
@@ -45,7 +46,9 @@ def lagging(law, mu, **fields):
         "x0": 0.0,
         "v0": 1e-3,
     }
-    return smc.Scenario(plant=smc.plant("duffing", **INTEGRATOR), law=law, **(given | fields))
+    return smc.Scenario(
+        plant=smc.plant("duffing", **INTEGRATOR), law=at_defaults(law), **(given | fields)
+    )
 
 
 def measured(trace, part=0.4):
@@ -177,7 +180,7 @@ def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
     gear = smc.Backlash(gap, rotor_inertia=5e-3)
     scenario = smc.Scenario(
         plant="duffing",
-        law=law,
+        law=at_defaults(law),
         x0=0.02,
         duration=6.0,
         actuator=(smc.Lag(0.01), gear),
@@ -196,7 +199,7 @@ def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
 def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     scenario = smc.Scenario(
         plant="duffing",
-        law="super_twisting",
+        law=smc.law("super_twisting"),
         actuator=smc.Lag(0.01),
         sensor=smc.Encoder(counts),
         duration=5.0,
@@ -267,7 +270,7 @@ SLOWLY = {"velocity": smc.estimator("filtered_difference", tau=0.01)}  # 1.5 tim
 def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, fields):
     scenario = smc.Scenario(
         plant=plant,
-        law=law,
+        law=at_defaults(law),
         x0=0.02,
         duration=6.0,
         **fields,
@@ -281,7 +284,7 @@ def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, fields):
 def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
     scenario = smc.Scenario(
         plant="inverted_pendulum",
-        law="power_rate",
+        law=smc.law("power_rate"),
         actuator=smc.DCMotor(),
         x0=0.02,
         duration=3.0,
@@ -329,7 +332,7 @@ def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
 def test_a_cycle_that_the_samples_alone_hold_is_within_its_ranges_and_called_so():
     scenario = smc.Scenario(
         plant="duffing",
-        law="power_rate",
+        law=smc.law("power_rate"),
         x0=0.02,
         duration=2.0,
     )
@@ -346,12 +349,12 @@ def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
         "friction": {"friction": smc.Coulomb(0.1)},
         "sensor": {"encoder": smc.Encoder(counts=4096)},
     }
-    plain = _assumptions(Loop(smc.Scenario(plant="inverted_pendulum", law="classical")))
+    plain = _assumptions(Loop(smc.Scenario(plant="inverted_pendulum", law=smc.law("classical"))))
     for field, kinds in parts.items():
         for word, part in kinds.items():
             run = smc.Scenario(
                 plant="inverted_pendulum",
-                law="classical",
+                law=smc.law("classical"),
                 physics_step=2.5e-4,
                 **{field: part},
             )

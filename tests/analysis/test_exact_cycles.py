@@ -126,7 +126,7 @@ def test_a_run_whose_cycle_depends_on_the_step_is_marked():
     free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
     common = {
         "plant": free,
-        "law": "twisting",
+        "law": smc.law("twisting"),
         "actuator": smc.Lag(0.001),
         "x0": 0.02,
         "duration": 3.0,

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.quick
 def test_the_law_is_given_what_it_measures_in_its_run():
     scenario = smc.Scenario(
         plant="pendulum_network",
-        law="pid",
+        law=smc.law("pid"),
         model="nominal",
         velocity="filtered_difference",
         noise=smc.Noise(position=0.01),

@@ -380,7 +380,9 @@ HASHES = re.compile(r"-[0-9a-f]{12}-[0-9a-f]{12}")  # in names of kept results
 
 @pytest.fixture
 def trace(folder):
-    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.05)).save(folder / "one.npz")
+    smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.05)).save(
+        folder / "one.npz"
+    )
 
 
 @pytest.mark.usefixtures("trace", "coarse_grid")

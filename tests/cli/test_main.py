@@ -103,7 +103,7 @@ def undrawn(monkeypatch):
 @pytest.fixture
 def trace(folder) -> Path:
     fault = smc.Fault(at=0.1, gain=0.5)
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.2, fault=fault)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.2, fault=fault)
     return smc.run(scenario).save(folder / "one.npz")
 
 

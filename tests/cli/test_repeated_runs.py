@@ -42,7 +42,7 @@ def test_scores_are_apart_by_more_than_five_percent_of_what_matters(values, leas
 def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():
     scenario = smc.Scenario(
         plant="duffing",
-        law="classical",
+        law=smc.law("classical"),
         noise=smc.Noise(position=0.01),
         x0=1.0,
     )
@@ -62,7 +62,7 @@ def test_what_starts_at_its_goal_is_not_nudged_off_it():
 
 
 def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
-    stuck = smc.Scenario(plant="inverted_pendulum", law="adaptive", duration=1.0)
+    stuck = smc.Scenario(plant="inverted_pendulum", law=smc.law("adaptive"), duration=1.0)
     trace = smc.run(stuck)
     larger = dataclasses.replace(trace, x=1.5 * trace.x)
     (table,) = tables.scores(
@@ -83,7 +83,7 @@ def test_a_score_that_changes_by_less_is_marked_without_rk4_alone(integrator):
     trace = smc.run(
         smc.Scenario(
             plant="duffing",
-            law="adaptive",
+            law=smc.law("adaptive"),
             integrator=integrator,
             duration=1.0,
         )
@@ -105,7 +105,7 @@ def cells(table) -> list[str]:
 
 
 def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
-    fine = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.1))
+    fine = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.1))
     lost = dataclasses.replace(fine, diverged_at=0.05)
     runs = {"a": fine, "b": lost, "c": lost}
     again = {

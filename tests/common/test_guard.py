@@ -225,7 +225,7 @@ def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
 @pytest.mark.skipif(os.uname().machine != "x86_64", reason="the number of the mode is that of x86")
 def test_a_run_is_refused_where_other_code_has_set_the_rounding():
     """It would change every run of the process in silence."""
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.01)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01)
     smc.run(scenario)
     library = guard.Arithmetic().library
     library.fesetround(0x800)

@@ -297,7 +297,7 @@ def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monke
     two = [
         smc.Scenario(
             plant="duffing",
-            law="classical",
+            law=smc.law("classical"),
             duration=0.02,
             seed=seed,
         )
@@ -334,7 +334,7 @@ def lets_touch(model, data, one, other):
 @pytest.mark.parametrize("name", ["passive", "sensor", "act_dyn", "contactfilter"])
 def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkeypatch):
     """Such a callback would change the forces of a run in silence."""
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.2)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.2)
     given = (lets_touch if name == "contactfilter" else native).ctypes
     asked = itertools.count()
     monkeypatch.setattr(runs, "SLICE_STEPS", 20)

@@ -133,7 +133,7 @@ def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
         {"laws": {"lazy_law": "lazy_laws:lazy_law"}},
         lazy_laws=LAW.replace("NAME", "lazy_law"),
     )
-    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
+    smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01))
     assert "lazy_law" in law.known_laws()
     assert "lazy_laws" not in sys.modules
     smc.law("lazy_law")

@@ -4,10 +4,13 @@ run has its own.
 
 import dataclasses
 import itertools
+import warnings
 
 import pytest
 
+import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import objective, search, search_space
+from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.simulation import gaber_study, grid
 from smc_mujoco.simulation.run import run
@@ -49,6 +52,42 @@ def test_every_shipped_set_is_within_its_laws_theorem(gain_set, plant):
     for name, known in shipped(gain_set, plant).items():
         for i in range(len(known.sets)):
             assert not gains.law(plant, name, gain_set, i).source.outside, (name, i)
+
+
+def test_a_law_by_its_name_alone_has_its_shipped_gains_and_a_number_given_is_the_users(refused):
+    shipped = gains.law("duffing", "pid")
+    assert shipped.gains != smc.law("pid").gains
+    with pytest.warns(ScenarioWarning, match="'pid' by its name alone .* duffing, kp=") as said:
+        by_name = smc.Scenario(plant="duffing", law="pid")
+    assert len(said) == 1
+    assert by_name.law == smc.law("pid", plant="duffing") == shipped
+    assert by_name.law.source.kind == "shipped"
+    own = smc.law("pid", plant="duffing", kp=50.0)
+    assert own.gains == dict(shipped.gains) | {"kp": 50.0}
+    assert own.source.kind == "yours"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for given in (smc.law("pid"), smc.law("pid").template, "pid(kp=9)"):
+            made = smc.Scenario(plant="duffing", law=given).law
+            assert dict(made.gains) | {"kp": 0.0} == dict(smc.law("pid").gains) | {"kp": 0.0}
+        # tuned without a model, without a surface, for positions
+        for fields in ({"model": "nominal"}, {"surface": "linear(c=3)"}, {"tracks": "speed"}):
+            made = smc.Scenario(plant="duffing", law="classical", **fields).law
+            assert made.gains == smc.law("classical").gains
+        made = smc.Scenario(plant="cart_pole", law="hierarchical").law
+        assert made == smc.law("hierarchical")
+    network = smc.Scenario(plant="pendulum_network", law=["pid", smc.law("pid")] + ["pid"] * 3)
+    assert network.law.of_channel(0) == gains.law("pendulum_network", "pid")
+    assert network.law.of_channel(1) == smc.law("pid")
+    heavy = smc.plant("inverted_pendulum", m=0.7)
+    for make in (
+        lambda: smc.Scenario(plant=heavy, law="pid"),
+        lambda: smc.law("pid", plant=heavy),
+        lambda: grid.grid(heavy, "pid"),
+    ):
+        with pytest.warns(ScenarioWarning, match="default parameters, and this one has m = 0.7"):
+            make()
+    refused(lambda: smc.law("pid", plant="cart_pole"), "pid", "cart_pole", "tune")
 
 
 def test_run_i_of_a_law_has_gain_set_i():

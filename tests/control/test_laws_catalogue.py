@@ -15,6 +15,7 @@ import zlib
 import numpy as np
 import pytest
 from helpers.plants_ab import called, measured
+from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
@@ -60,7 +61,7 @@ def traces():
         found[name] = [
             smc.Scenario(
                 plant=plant,
-                law=name,
+                law=at_defaults(name),
                 model=model,
                 duration=8.0 if plant in SLOW else 6.0,
                 **common,
@@ -136,7 +137,7 @@ def swings():
         scenarios.append(
             smc.Scenario(
                 plant=plant,
-                law=name,
+                law=at_defaults(name),
                 x0=(0.5, 0.0, -0.5),
                 duration=0.1,
             )

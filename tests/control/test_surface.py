@@ -235,7 +235,7 @@ def test_memory_of_a_surface_belongs_to_a_channel_and_a_run():
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
     scenario = smc.Scenario(
         plant=plant,
-        law="classical",
+        law=smc.law("classical"),
         surface="integral",
         x0=(0.5, 0.0, -0.5),
         duration=0.5,

@@ -38,7 +38,7 @@ TEN += ("twisting", "terminal")
 def one() -> smc.Trace:
     scenario = smc.Scenario(
         plant="duffing",
-        law="classical",
+        law=smc.law("classical"),
         duration=1.5,
         reference=smc.Step(0.5, time=0.3),
     )
@@ -81,7 +81,7 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
     trace = smc.run(
         smc.Scenario(
             plant=plant,
-            law="classical",
+            law=smc.law("classical"),
             duration=0.3,
             x0=0.2,
             reference=smc.Step(0.3),

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 from helpers import arms
+from helpers.runs import at_defaults
 from helpers.sketch import failed, made
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
@@ -57,7 +58,7 @@ def switching(trace: smc.Trace, size: float) -> smc.Trace:
 
 
 def duffing(law: str, **fields) -> smc.Trace:
-    return made(smc.Scenario(plant="duffing", law=law, **{"duration": 1.2} | fields))
+    return made(smc.Scenario(plant="duffing", law=at_defaults(law), **{"duration": 1.2} | fields))
 
 
 def machines() -> list[smc.Trace]:
@@ -76,7 +77,8 @@ def machines() -> list[smc.Trace]:
 def network() -> list[smc.Trace]:
     plant = smc.plant("pendulum_network", n=11)
     return [
-        made(smc.Scenario(plant=plant, law=law, duration=0.3)) for law in ("classical", "adaptive")
+        made(smc.Scenario(plant=plant, law=at_defaults(law), duration=0.3))
+        for law in ("classical", "adaptive")
     ]
 
 
@@ -136,7 +138,7 @@ def balance():
     }
     scenarios = []
     for law in ("super_twisting", "observer_free"):
-        scenarios.append(smc.Scenario(law=law, **lag))
+        scenarios.append(smc.Scenario(law=at_defaults(law), **lag))
     cycle = Chattering(
         amplitude=0.2,
         amplitude_x=0.01,
@@ -309,7 +311,7 @@ PANELS = {  # what is run -> labels that a figure of it has, and parts of labels
 @pytest.mark.parametrize("kind", PANELS)
 def test_a_figure_has_the_panels_that_its_mechanism_has_in_their_units_and_no_others(kind):
     fields, labels, absent = PANELS[kind]
-    trace = made(smc.Scenario(**{"law": "classical", "duration": 0.2} | fields))
+    trace = made(smc.Scenario(**{"law": smc.law("classical"), "duration": 0.2} | fields))
     if "friction" not in fields and trace.scenario.plant.name != "furuta":
         trace = dataclasses.replace(trace, reaction=0.0 * trace.reaction)
     if trace.scenario.law.name == "none":
@@ -478,7 +480,7 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
 
 
 ONE, OTHER = (
-    made(smc.Scenario(plant=name, law="classical", duration=0.01))
+    made(smc.Scenario(plant=name, law=smc.law("classical"), duration=0.01))
     for name in ("duffing", "van_der_pol")
 )
 REFUSED = {  # call -> arguments, and what replaces them

@@ -14,7 +14,7 @@ from smc_mujoco.draw import decimate, panels
 def network(n):
     """A network whose channels fall from starts of both signs, the last but one the most slowly."""
     plant = smc.plant("pendulum_network", n=n)
-    trace = made(smc.Scenario(plant=plant, law="classical", duration=1.0))
+    trace = made(smc.Scenario(plant=plant, law=smc.law("classical"), duration=1.0))
     starts = np.where(np.arange(n) % 4 == 1, -0.4, 0.1 + 0.4 * np.arange(n) / n)
     rates = np.where(np.arange(n) == n - 2, 0.5, 5.0)
     return dataclasses.replace(trace, x=starts * np.exp(-rates * trace.t[:, None]), r=0.0 * trace.r)

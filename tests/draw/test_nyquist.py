@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import predict
@@ -19,7 +20,7 @@ def page():
     }
     scenarios = []
     for law in ("super_twisting", "observer_free"):
-        scenarios.append(smc.Scenario(law=law, **fields))
+        scenarios.append(smc.Scenario(law=at_defaults(law), **fields))
     cycles = []
     for scenario in scenarios:
         cycles.append(predict(scenario, ranges=False))

@@ -46,7 +46,7 @@ def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letter
     tmp_path,
 ):
     """At 800 px ticks had 8 px. A column's PNG had 150 dots an inch."""
-    trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2))
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.2))
     whole = smc.figure(trace)
     sizes = []
     for text in whole.findobj(Text):

@@ -113,7 +113,7 @@ def test_a_law_that_a_file_cannot_name_is_not_saved(tmp_path):
 def test_a_saved_file_holds_the_name_of_a_plant_as_text_and_replaces_no_other(name, tmp_path):
     """A quote in a name lost the session; the name of a file ran as code when it was opened."""
     plant = smc.plant_from(ARM, ["shoulder"], name=name)
-    session = Session([smc.Scenario(plant=plant, law="pid", duration=0.1)])
+    session = Session([smc.Scenario(plant=plant, law=smc.law("pid"), duration=0.1)])
     path = session.save(tmp_path / "view.py")
     text = path.read_text(encoding="utf-8")
     assert f"A view of {name}" in [

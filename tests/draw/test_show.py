@@ -25,7 +25,7 @@ renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 
 @pytest.fixture(scope="module")
 def trace() -> smc.Trace:
-    return smc.run(smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.2))
+    return smc.run(smc.Scenario(plant="inverted_pendulum", law=smc.law("classical"), duration=0.2))
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import itertools
 import random
 
 import pytest
+from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
@@ -96,7 +97,7 @@ def test_runs_of_one_law_have_its_colour_and_lines_and_marks_tell_them_apart_as_
     """Friction of 0, 0.005 and 0.02 was magenta, brown and green, then five reds."""
     runs = []
     for law in ("classical", "pid", "classical", "adaptive", "classical"):
-        runs.append(made(smc.Scenario(plant="duffing", law=law, duration=0.1)))
+        runs.append(made(smc.Scenario(plant="duffing", law=at_defaults(law), duration=0.1)))
     colours = style.trace_colours(runs)
     assert colours[0] == colours[2] == colours[4] == style.law_colour("classical")
     assert len(set(colours)) == 3
@@ -115,13 +116,15 @@ def test_law_colours_never_repeat_in_one_picture():
 def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
     runs = []
     for delta in (0.2, 0.5):
-        runs.append(smc.Scenario(plant=smc.plant("duffing", delta=delta), law="pid", duration=0.01))
+        runs.append(
+            smc.Scenario(plant=smc.plant("duffing", delta=delta), law=smc.law("pid"), duration=0.01)
+        )
     labels = style.labels(smc.run(runs), None)
     assert labels == ["PID: delta = 0.2", "PID: delta = 0.5"]
     assert style.distinct(labels) == ["delta = 0.2", "delta = 0.5"]
     heavy = smc.Scenario(
         plant="duffing",
-        law="classical",
+        law=smc.law("classical"),
         mismatch={"mass": 1.3},
         duration=0.01,
     )

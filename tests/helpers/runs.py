@@ -13,8 +13,14 @@ JOINTED = [name for name in smc.plants() if not smc.plant(name).pose]
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 
 
+def at_defaults(law):
+    """A law; a name means its default gains, where a scenario would take the shipped ones."""
+    return smc.law(law) if law in smc.laws() else law
+
+
 def scenario(law="classical", **fields):
-    """A Duffing oscillator for 20 ms, unless fields say otherwise."""
+    """A Duffing oscillator for 20 ms, unless fields say otherwise. A law's name is its defaults."""
+    law = at_defaults(law)
     return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
 
 

@@ -355,7 +355,7 @@ def test_the_twin_of_a_run_has_the_whole_machine_of_the_run():
         "velocity": "levant",
         "model": "nominal",
     }
-    plain = smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.1)
+    plain = smc.Scenario(plant="inverted_pendulum", law=smc.law("classical"), duration=0.1)
     run = smc.run(dataclasses.replace(plain, **machine))
     twin, _ = identification._twin(plain.plant, [run])
     for name in machine:

@@ -280,14 +280,14 @@ def test_a_quantity_has_the_scale_of_its_value_or_a_hundredth_of_its_range(
 
 
 def test_corrected_replays_have_steps_that_divide_the_period():
-    plain = smc.Scenario(plant="duffing", law="pid", control_period=0.0011)
+    plain = smc.Scenario(plant="duffing", law=smc.law("pid"), control_period=0.0011)
     assert replays._steps(plain, 0) == {"integrator": "RK4", "physics_step": pytest.approx(2.2e-4)}
     assert replays._steps(plain, 2)["physics_step"] == pytest.approx(5.5e-5)
-    even = smc.Scenario(plant="duffing", law="pid", control_period=0.001)
+    even = smc.Scenario(plant="duffing", law=smc.law("pid"), control_period=0.001)
     assert replays._steps(even, 1)["physics_step"] == pytest.approx(1.25e-4)
     late = smc.Scenario(
         plant="duffing",
-        law="pid",
+        law=smc.law("pid"),
         input_delay=0.003,
         friction=smc.hardware.LuGre(0.3, 0.4, 0.01),
     )

@@ -121,7 +121,7 @@ def test_a_state_comes_from_a_cubic_about_it_and_at_the_start_from_the_first_sam
 def test_a_run_becomes_the_record_that_the_machine_would_write():
     plain = smc.Scenario(
         plant="pendulum_network",
-        law="pid",
+        law=smc.law("pid"),
         duration=0.2,
         sensor=smc.Encoder(500, bias=0.1),
         feedforward=smc.Sine(0.3, 9.0),

@@ -243,7 +243,7 @@ def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
 
 
 def test_bad_input_is_one_sentence(trace, pressed, refused):
-    plain = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
+    plain = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01))
     refused(lambda: smc.metrics.tip_scores(plain))
     refused(lambda: tip.contacts(trace))
     refused(lambda: smc.score([trace]))

@@ -17,7 +17,7 @@ from smc_mujoco.robustness.uncertainty import Members
 
 
 def scenario(**fields) -> smc.Scenario:
-    return smc.Scenario(**{"plant": "duffing", "law": "pid", "duration": 0.5} | fields)
+    return smc.Scenario(**{"plant": "duffing", "law": smc.law("pid"), "duration": 0.5} | fields)
 
 
 def space(*names: str) -> SimpleNamespace:
@@ -284,7 +284,7 @@ def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_inde
 
 
 def test_a_run_fails_where_its_force_is_too_small_and_one_without_a_score_has_the_worst():
-    base = scenario(plant="inverted_pendulum", law="observer_free", duration=4.0)
+    base = scenario(plant="inverted_pendulum", law=smc.law("observer_free"), duration=4.0)
     found = smc.sensitivity(
         base,
         smc.Uncertainty(bound=(0.05, 1.0)),
@@ -377,7 +377,7 @@ def test_scores_that_only_mixed_points_tell_apart_explain_nothing_and_no_index_i
 
 
 def test_runs_without_a_score_are_counted_and_too_many_are_not_explained():
-    base = scenario(plant="inverted_pendulum", law="observer_free", duration=1.0)
+    base = scenario(plant="inverted_pendulum", law=smc.law("observer_free"), duration=1.0)
     over = smc.Uncertainty(bound=(0.05, 1.0))
     with pytest.raises(
         smc.ScenarioError,

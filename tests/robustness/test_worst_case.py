@@ -175,7 +175,7 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
 
 def test_a_relay_replays_from_its_record_to_the_last_bit():
     relay = Relay(2.0, s=0.3, rate=1.0, error=-0.2)
-    base = scenario(plant=smc.plant("pendulum_network", n=2), law="super_twisting")
+    base = scenario(plant=smc.plant("pendulum_network", n=2), law=smc.law("super_twisting"))
     run = smc.run(dataclasses.replace(base, disturbance=relay))
     force = 2.0 * recorded_force(run, relay, np.zeros(0))
     np.testing.assert_array_equal(run.d, np.column_stack([force, force]))
@@ -289,7 +289,7 @@ def test_constants_and_relays_reach_what_another_adversary_found():
 
 @pytest.mark.parametrize("metric", ["tv_rate", "max_u", "energy", "rms_error", "peak"])
 def test_who_never_arrives_is_worst_in_metrics_of_u_alone(metric):
-    base = scenario(plant="van_der_pol", law="twisting")
+    base = scenario(plant="van_der_pol", law=smc.law("twisting"))
     worst = smc.worst_case(base, metric, CLASSES["force"], budget=4)
     assert (worst.words == "not arrived") is CATALOGUE[metric].command
 

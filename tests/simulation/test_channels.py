@@ -184,7 +184,9 @@ REFUSED = {
     "unknown joint": lambda: smc.Scenario(
         law={"shoulder": "classical", "elbo": "classical"}, **BOTH
     ),
-    "missing joint": lambda: smc.Scenario(law="classical", u_max={"shoulder": 2.0}, **BOTH),
+    "missing joint": lambda: smc.Scenario(
+        law=smc.law("classical"), u_max={"shoulder": 2.0}, **BOTH
+    ),
     "joint law in one channel": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
     "wrong degree": lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
 }

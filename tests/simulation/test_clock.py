@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from helpers import reference
-from helpers.runs import assert_same
+from helpers.runs import assert_same, at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.robustness import margins
@@ -156,7 +156,7 @@ def test_callback_equals_plain_loop(plant, name):
         law = "super_twisting"
     made = smc.Scenario(
         plant=plant,
-        law=law,
+        law=at_defaults(law),
         duration=0.2,
         seed=3,
         **FIELDS[name],
@@ -191,7 +191,7 @@ def test_jitter_takes_margin_from_a_law_that_lives_near_its_delay():
         [
             smc.Scenario(
                 plant="duffing",
-                law="classical",
+                law=smc.law("classical"),
                 input_delay=d,
                 **fields,
             )

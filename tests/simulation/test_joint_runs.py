@@ -173,7 +173,7 @@ def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
         "v0": (1.0, -2.0),
         "u_max": 1e3,
     }
-    smc.run(smc.Scenario(law="computed_torque", **common))
+    smc.run(smc.Scenario(law=smc.law("computed_torque"), **common))
     trace = smc.run(smc.Scenario(law=curious, **common))
     assert trace.failure is None
     assert_same(trace, reference.run(trace.scenario))

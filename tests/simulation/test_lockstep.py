@@ -22,7 +22,7 @@ import pytest
 from helpers import reference
 from helpers.commands import python
 from helpers.pages import ROOT
-from helpers.runs import ARRAYS, JOINTED, assert_loops_agree, assert_same
+from helpers.runs import ARRAYS, JOINTED, assert_loops_agree, assert_same, at_defaults
 
 import smc_mujoco as smc
 
@@ -83,7 +83,7 @@ def noisy(plant, law, model, velocity):
     common = {"duration": 0.03, "noise": smc.Noise(0.01, 0.05)}
     return smc.Scenario(
         plant=plant,
-        law=law,
+        law=at_defaults(law),
         model=model,
         velocity=velocity,
         **common,
@@ -94,7 +94,7 @@ def noisy(plant, law, model, velocity):
 def test_callback_equals_plain_loop_on_every_surface(surface):
     scenario = smc.Scenario(
         plant="inverted_pendulum",
-        law="boundary_layer",
+        law=smc.law("boundary_layer"),
         surface=surface,
         model="nominal",
         duration=0.2,
@@ -106,7 +106,7 @@ def test_callback_equals_plain_loop_on_every_surface(surface):
 def test_callback_equals_plain_loop_with_every_estimator(velocity):
     scenario = smc.Scenario(
         plant="duffing",
-        law="classical",
+        law=smc.law("classical"),
         velocity=velocity,
         noise=smc.Noise(0.01),
         duration=0.3,
@@ -172,7 +172,7 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
     keys = list(smc.plant(plant).parameters)
     common = {
         "plant": plant,
-        "law": "super_twisting",
+        "law": smc.law("super_twisting"),
         "duration": 0.03,
         "disturbance": smc.Sine(0.2, omega=5.0),
     }
@@ -293,7 +293,7 @@ def test_applied_is_the_command_of_the_delay_ago():
     delays = (0.0, 0.001, 0.004, 0.007, 0.01, 0.19)
     common = {
         "plant": "duffing",
-        "law": "observer_free",
+        "law": smc.law("observer_free"),
         "duration": 0.2,
         "control_period": 0.005,
         "physics_step": 0.001,
@@ -535,7 +535,7 @@ def predict():
 
 @pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 def test_a_python_law_may_run_scenarios_of_its_own():
-    inner = smc.Scenario(plant="duffing", law="classical", duration=0.005)
+    inner = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.005)
     alone = smc.run(inner)
     inside = []
     trace = smc.run(uncompiled(lambda: inside.append(smc.run(inner)), duration=0.005))

@@ -146,7 +146,7 @@ def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, mon
 def test_a_body_that_is_pushed_stays_in_a_run():
     pushed = smc.Scenario(
         plant="duffing",
-        law="classical",
+        law=smc.law("classical"),
         disturbance=Push("scale", x=1.0),
         duration=0.01,
     )
@@ -160,7 +160,7 @@ def test_the_scenery_of_a_users_model_stays():
         "<body><joint name='turn'/><geom size='0.1' pos='0 0 1'/></body></worldbody></mujoco>",
         channels={"turn": smc.Channel(motor=True)},
     )
-    made = compile_model(smc.Scenario(plant=plant, law="classical"), scenery=False)
+    made = compile_model(smc.Scenario(plant=plant, law=smc.law("classical")), scenery=False)
     assert made.ngeom == 2
     assert made.nlight == 1
 

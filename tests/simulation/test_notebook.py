@@ -59,7 +59,7 @@ def test_a_scenario_shows_what_it_was_given():
         "noise": "Noise(position=0.01, velocity=0.05)",
         "mismatch": "{'mass': 1.3}",
     }
-    assert list(cells(smc.Scenario(plant="duffing", law="classical"))) == [
+    assert list(cells(smc.Scenario(plant="duffing", law=smc.law("classical")))) == [
         "plant",
         "law",
         "gains",

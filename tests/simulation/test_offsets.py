@@ -20,7 +20,7 @@ STRUCTS = {
     name: "mjModel" if name in callback.OF_MODEL else "mjData"
     for name in callback.Offsets._fields[1:]
 }
-SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
+SCENARIO = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.05)
 
 
 @pytest.fixture(autouse=True)

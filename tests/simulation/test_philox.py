@@ -188,7 +188,7 @@ def test_process_noise_does_not_depend_on_steps_or_integrator():
     for fields in (
         {"physics_step": 2.5e-4},
         {"integrator": "Euler"},
-        {"law": "classical"},
+        {"law": smc.law("classical")},
         {"noise": smc.Noise(1, 1)},
     ):
         np.testing.assert_allclose(

@@ -16,7 +16,7 @@ NOISE = smc.Noise(position=0.001, velocity=0.01)
 SCENARIOS = {
     "a channel with noise, surface and feedforward": smc.Scenario(
         plant="duffing",
-        law="super_twisting",
+        law=smc.law("super_twisting"),
         surface="integral",
         noise=NOISE,
         feedforward=smc.Sine(0.3, 4.0),
@@ -30,7 +30,7 @@ SCENARIOS = {
     ),
     "a network with an estimator": smc.Scenario(
         plant=smc.plant("pendulum_network", n=3),
-        law="observer_free",
+        law=smc.law("observer_free"),
         velocity="levant",
         u_max=2.0,
     ),
@@ -58,7 +58,7 @@ def test_it_gives_the_u_and_s_of_the_run_from_the_positions_and_velocities_of_th
 def test_what_the_sensors_read_is_not_written_to():
     x = np.array([0.3])
     v = np.array([-0.1])
-    Controller(smc.Scenario(plant="duffing", law="classical", noise=NOISE))(1, 1e-3, x, v)
+    Controller(smc.Scenario(plant="duffing", law=smc.law("classical"), noise=NOISE))(1, 1e-3, x, v)
     assert x[0] == 0.3
     assert v[0] == -0.1
 

@@ -161,14 +161,14 @@ RUNS = {
     "an estimator": network(law="classical", velocity=difference()),
     "a disturbance that sees the loop": smc.Scenario(
         plant="duffing",
-        law="classical",
+        law=smc.law("classical"),
         disturbance=Kicks(0.1),
         duration=0.05,
     ),
     "a disturbance of random numbers": network(law="classical", disturbance=Wanders(0.1)),
     "a nominal model": smc.Scenario(
         plant=own_equation(),
-        law="observer_free",
+        law=smc.law("observer_free"),
         model="nominal",
         duration=0.05,
     ),

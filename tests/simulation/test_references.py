@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 from helpers import reference
+from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import catalogue
@@ -81,7 +82,7 @@ def test_no_other_move_between_the_same_rests_has_less_jerk():
 def test_a_reference_is_followed_alike_in_both_loops(signal):
     scenario = smc.Scenario(
         plant="pendulum_network",
-        law="computed_torque",
+        law=smc.law("computed_torque"),
         model="nominal",
         reference=signal,
         duration=0.5,
@@ -118,7 +119,7 @@ def test_the_reference_s_acceleration_is_fed_forward_with_the_model_and_only_wit
             smc.run(
                 [
                     smc.Scenario(
-                        law=law,
+                        law=at_defaults(law),
                         model=model,
                         reference=Sine(0.2, omega, math.pi / 2),
                         **common,
@@ -154,7 +155,7 @@ def followed():
             scenarios.append(
                 smc.Scenario(
                     plant=plant,
-                    law=name,
+                    law=at_defaults(name),
                     reference=r,
                     duration=T,
                     **common,

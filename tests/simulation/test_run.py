@@ -57,7 +57,9 @@ def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(
 ):
     scenarios = []
     for seed in (0, 1):
-        scenarios.append(smc.Scenario(**{"law": "classical", "duration": 0.2} | fields, seed=seed))
+        scenarios.append(
+            smc.Scenario(**{"law": smc.law("classical"), "duration": 0.2} | fields, seed=seed)
+        )
     flags = []
     its = runs.ScenarioBatch.may_have_constraints
     monkeypatch.setattr(
@@ -76,7 +78,7 @@ def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(
 def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
     common = {
         "plant": "duffing",
-        "law": "classical",
+        "law": smc.law("classical"),
         "integrator": "implicitfast",
         "duration": 0.01,
     }

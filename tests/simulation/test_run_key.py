@@ -285,7 +285,7 @@ def test_an_object_that_changed_is_another():
 def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(
     monkeypatch, tmp_path
 ):
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=1.0)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=1.0)
     package = tmp_path / "smc_mujoco"
     shutil.copytree(
         fingerprint.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains")
@@ -319,7 +319,7 @@ def test_replaced_functions_of_a_plant_change_the_key():
 
     # without a module, as SymPy's lambdify
     exec("def generated(x, v, i, q): return 0.0, 2.0", made := {})
-    own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
+    own = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.1)
     contacts = own.plant.contacts
     mechanisms = own.plant.mechanisms
     changes = (

@@ -166,7 +166,7 @@ def test_a_helper_that_writes_beyond_the_memory_fails_the_run_and_touches_nothin
             plant=THREE,
             seed=seed,
             noise=smc.Noise(0.1),
-            law="adaptive",
+            law=smc.law("adaptive"),
         )
         for seed in range(3)
     ]

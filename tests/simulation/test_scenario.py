@@ -22,7 +22,9 @@ TINY, HUGE = 1e-320, 1e308  # subnormal; its quotient with anything small overfl
 
 
 def scenario(**fields):
-    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 1.0} | fields)
+    return smc.Scenario(
+        **{"plant": "duffing", "law": smc.law("classical"), "duration": 1.0} | fields
+    )
 
 
 def brief(value) -> str:
@@ -356,11 +358,11 @@ def test_the_field_s_usual_words_are_understood(refused):
     ):
         refused(lambda word=word: smc.Scenario(plant="duffing", law=word), f"'{meant}'?")
     refused(lambda: smc.Scenario(plant="duffing", law="STA"), "'super_twisting' or")
-    refused(lambda: smc.Scenario(plant="duffing", law="pid", reference=0.5))
+    refused(lambda: smc.Scenario(plant="duffing", law=smc.law("pid"), reference=0.5))
 
 
 def test_what_belongs_elsewhere_is_sent_there(tmp_path, refused):
-    scenario = smc.Scenario(plant="duffing", law="pid", duration=0.01)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.01)
     refused(lambda: smc.margins(scenario))  # pyright: ignore[reportArgumentType]
     refused(lambda: smc.plot(smc.run(scenario)))  # pyright: ignore[reportArgumentType]
     refused(lambda: smc.figure(smc.study([scenario], tmp_path)))  # pyright: ignore[reportArgumentType]
@@ -410,7 +412,10 @@ def test_what_is_no_scenario_is_refused_by_run_and_stream_alike(given, refused):
         (lambda: smc.Scenario(plant="duffing", controller="pid"), "'law'"),
         (lambda: smc.Scenario(plant="duffing", dt=0.01), "'control_period'"),
         (lambda: smc.Scenario(system="duffing"), "'plant'"),
-        (lambda: dataclasses.replace(smc.Scenario(plant="duffing", law="pid"), noize=1), "'noise'"),
+        (
+            lambda: dataclasses.replace(smc.Scenario(plant="duffing", law=smc.law("pid")), noize=1),
+            "'noise'",
+        ),
         (lambda: smc.Uncertainty(delai=(0.0, 0.01)), "'delay'"),
     ],
 )

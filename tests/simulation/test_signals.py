@@ -91,7 +91,9 @@ LED = [signal for signal in EVERY if not (signal.random or signal.cartesian or s
 
 
 def scenario(**fields):
-    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 0.2} | fields)
+    return smc.Scenario(
+        **{"plant": "duffing", "law": smc.law("classical"), "duration": 0.2} | fields
+    )
 
 
 def written(signal, times, seed=3, channel=1, stream=2):

@@ -421,7 +421,9 @@ def test_a_disk_that_is_full_leaves_the_old_file_and_no_other(ending, samples, r
 
     path = tmp_path / f"a.{ending}"
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=samples * 1e-3))
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law=smc.law("classical"), duration=samples * 1e-3)
+    )
     WRITERS[ending](trace, path)
     old = path.read_bytes()
     try:

@@ -8,10 +8,10 @@ from smc_mujoco.studies import scene
 
 pytestmark = pytest.mark.quick
 
-RUN = smc.Scenario(plant="duffing", law="classical", duration=0.5)
+RUN = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.5)
 
 
-OTHER = smc.Scenario(plant="van_der_pol", law="classical")
+OTHER = smc.Scenario(plant="van_der_pol", law=smc.law("classical"))
 PERIOD = Condition("slow", lambda plant, duration: {"control_period": 0.01})
 SCENES = [
     {"title": ""},

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.quick
 FILES = sorted((Path(smc.__file__).parents[1] / "scenes").glob("*.py"))
 RUN = smc.Scenario(
     plant="duffing",
-    law="classical",
+    law=smc.law("classical"),
     x0=1.0,
     duration=2.0,
 )

@@ -15,7 +15,7 @@ from smc_mujoco.simulation import run_key
 from smc_mujoco.studies import study
 from smc_mujoco.studies.scene import slug
 
-RUN = smc.Scenario(plant="duffing", law="classical", duration=8.0)
+RUN = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=8.0)
 WITHIN = smc.Uncertainty(disturbance=0.5, mass=(0.8, 1.2))
 
 
@@ -64,7 +64,7 @@ def test_a_worst_case_that_is_kept_is_the_one_that_is_read(field, tmp_path, monk
 def test_a_default_budget_is_as_many_runs_as_take_the_time_of_that_many_steps():
     """2.5 million steps for two numbers of runs; a channel adds half, dry friction doubles."""
     rough = dataclasses.replace(RUN, friction=smc.Coulomb(0.1), duration=1.0)
-    network = smc.Scenario(plant="pendulum_network", law="classical", duration=8.0)
+    network = smc.Scenario(plant="pendulum_network", law=smc.law("classical"), duration=8.0)
     assert default_budget(RUN, WITHIN) == 2_500_000 // (8000 * 2)
     assert default_budget(rough, WITHIN) == 2_500_000 // (1000 * rough.steps * 2 * 2)
     assert default_budget(RUN, dataclasses.replace(WITHIN, friction=(0.0, 0.1))) == 2_500_000 // (

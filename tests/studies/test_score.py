@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.metrics.catalogue import itae, settling_time
@@ -18,7 +19,7 @@ def cases():
     rough = smc.hardware.LuGre(0.1, 0.1, 0.1)
     laws = ("pid", failing(when=0.2), "pid", failing(when=9.0))
     for law, friction in zip(laws, ((), (), rough, ()), strict=True):
-        yield smc.Scenario(plant="duffing", law=law, duration=0.5, friction=friction)
+        yield smc.Scenario(plant="duffing", law=at_defaults(law), duration=0.5, friction=friction)
 
 
 def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):

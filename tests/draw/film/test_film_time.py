@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
@@ -22,7 +23,7 @@ def resting(law, rate):
     trace = made(
         smc.Scenario(
             plant="inverted_pendulum",
-            law=law,
+            law=at_defaults(law),
             duration=4.0,
             x0=0.5,
         )

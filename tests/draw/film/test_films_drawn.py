@@ -9,6 +9,7 @@ import itertools
 import numpy as np
 import pytest
 from helpers.films import staged
+from helpers.runs import at_defaults
 from helpers.sketch import Pen, failed, made
 from PIL import Image, ImageDraw
 
@@ -33,7 +34,7 @@ def pen(monkeypatch):
 
 
 def machine(plant: str, law: str = "classical", **fields) -> smc.Trace:
-    trace = made(smc.Scenario(plant=plant, law=law, **{"duration": 1.0} | fields))
+    trace = made(smc.Scenario(plant=plant, law=at_defaults(law), **{"duration": 1.0} | fields))
     if trace.scenario.realistic:
         return trace
     return dataclasses.replace(trace, reaction=0.0 * trace.reaction)

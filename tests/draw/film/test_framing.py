@@ -9,6 +9,7 @@ import itertools
 import numpy as np
 import pytest
 from helpers.films import without_charts
+from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
@@ -44,7 +45,10 @@ def dog(free):
 def two(plant, **fields):
     """Two runs of made-up motion, with u as large as its limit."""
     laws = ("super_twisting", "pid")
-    return [made(smc.Scenario(plant=plant, law=law, **{"duration": 1.0} | fields)) for law in laws]
+    return [
+        made(smc.Scenario(plant=plant, law=at_defaults(law), **{"duration": 1.0} | fields))
+        for law in laws
+    ]
 
 
 @contextlib.contextmanager
@@ -76,7 +80,7 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
 def test_a_stranger_that_goes_far_is_followed_and_fills_half_of_its_tile(base, count, monkeypatch):
     """A quadruped whose knee is driven: on a free base it slides away by ten of its lengths."""
     plant = smc.plant_from(dog(base == "free"), ["knee"])
-    traces = [smc.run(smc.Scenario(plant=plant, law="pid", duration=2.0, x0=0.3))] * count
+    traces = [smc.run(smc.Scenario(plant=plant, law=smc.law("pid"), duration=2.0, x0=0.3))] * count
     if base == "free":
         poses = []
         monkeypatch.setattr(track, "motion", lambda trace, times: poses[0])
@@ -135,7 +139,9 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
     traces = []
     for law in ("super_twisting", "pid"):
-        traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3, x0=0.1)))
+        traces.append(
+            smc.run(smc.Scenario(plant=plant, law=at_defaults(law), duration=0.3, x0=0.1))
+        )
     with filmed(traces, monkeypatch) as (stages, _):
         assert len({shown.puppet.height for shown in stages}) == 1  # they stand on one floor
         for shown, mount in itertools.product(stages, stages[0].mounts):

@@ -7,6 +7,7 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
@@ -19,7 +20,7 @@ LAWS = ("observer_free", "classical", "adaptive")
 
 def swinging(law, amplitude):
     """A run whose u switches between +-amplitude at every sample after its first tenth."""
-    trace = made(smc.Scenario(plant="duffing", law=law, duration=1.0))
+    trace = made(smc.Scenario(plant="duffing", law=at_defaults(law), duration=1.0))
     signs = np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0) * (trace.t > 0.1)
     return dataclasses.replace(trace, u=(amplitude * signs)[:, None])
 
@@ -51,7 +52,7 @@ def test_a_law_that_switches_in_few_samples_has_a_lane():
     run = made(
         smc.Scenario(
             plant="duffing",
-            law="pid",
+            law=smc.law("pid"),
             duration=1.0,
         )
     )
@@ -84,7 +85,9 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
 
 
 def test_the_cursor_passes_behind_words():
-    runs = [made(smc.Scenario(plant="duffing", law=law, duration=1.0)) for law in LAWS[:2]]
+    runs = [
+        made(smc.Scenario(plant="duffing", law=at_defaults(law), duration=1.0)) for law in LAWS[:2]
+    ]
     same = charts.Charts(runs, LAWS[:2], ["#0072B2", "#D55E00"], SIZE, 1.0)
     assert same.words
     hidden = 0

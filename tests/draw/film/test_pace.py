@@ -86,7 +86,7 @@ def test_impacts_are_slowest(monkeypatch):
     trace = smc.run(
         smc.Scenario(
             plant="duffing",
-            law="observer_free",
+            law=smc.law("observer_free"),
             contact="stops",
             v0=3.0,
             duration=1.0,
@@ -130,7 +130,7 @@ TURN = 2.0 * np.pi * 20.0  # rad/s
 @pytest.mark.parametrize("kind", CLOSE)
 def test_where_nothing_is_seen_to_move_the_last_three_periods_follow_slowly_and_large(kind):
     x, parts, follows = CLOSE[kind]
-    trace = made(smc.Scenario(plant="duffing", law="classical", duration=2.0, **parts))
+    trace = made(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=2.0, **parts))
     place = x(trace.t)[:, None]
     run = dataclasses.replace(trace, x=place, s=20.0 * place, u=np.sign(place), r=0.0 * place)
     found = pace.clock([run], FPS)

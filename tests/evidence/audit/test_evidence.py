@@ -154,7 +154,7 @@ def test_nothing_of_the_machine_is_in_it(reported, folder):
 
 
 def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_condition(monkeypatch):
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.1)
+    scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.1)
     name = portable_key(scenario)
     monkeypatch.setattr(
         serialise, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"}

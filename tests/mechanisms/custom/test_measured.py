@@ -122,7 +122,7 @@ def test_the_order_of_measured_joints_is_that_of_the_channels():
         trace = smc.run(
             smc.Scenario(
                 plant=poles(order),
-                law="pid",
+                law=smc.law("pid"),
                 x0=start,
                 duration=0.2,
             )

@@ -535,7 +535,7 @@ def test_the_file_s_own_sensors_are_no_channels(arm):
     plant = arm(["shoulder"], ACTUATED + sensors)
     scenario = smc.Scenario(
         plant=plant,
-        law="classical",
+        law=smc.law("classical"),
         duration=0.1,
         x0=0.3,
     )
@@ -670,7 +670,7 @@ def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
     trace = smc.run(
         smc.Scenario(
             plant=plant,
-            law="classical",
+            law=smc.law("classical"),
             duration=0.05,
             x0=0.3,
         )
@@ -1068,7 +1068,9 @@ def test_no_record_of_a_model_knows_its_folder(arm, tmp_path, monkeypatch):
         folder = tmp_path / name / "models"
         folder.mkdir(parents=True)
         path = shutil.copy(original, folder)
-        scenario = smc.Scenario(plant=smc.plant_from(path, ["shoulder"]), law="pid", duration=0.1)
+        scenario = smc.Scenario(
+            plant=smc.plant_from(path, ["shoulder"]), law=smc.law("pid"), duration=0.1
+        )
         about = serialise.describe(scenario)
         records.append((run_key.row(scenario), run_key.portable_key(scenario), about))
     assert records[0] == records[1]

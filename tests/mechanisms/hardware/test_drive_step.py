@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from helpers import reference
 from helpers.reference import advance
+from helpers.runs import at_defaults
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
@@ -418,7 +419,7 @@ def hard():
     return [
         smc.Scenario(
             plant=name,
-            law=law,
+            law=at_defaults(law),
             **common | fields,
         )
         for name, law in laws.items()

@@ -270,7 +270,7 @@ EXTRAS = [
 def test_the_reference_loop_does_the_same_to_the_bit(plant, extra):
     fields = {
         "plant": plant,
-        "law": "super_twisting",
+        "law": smc.law("super_twisting"),
         "x0": 0.02,
         "duration": 0.06,
         "friction": smc.Coulomb(0.3),
@@ -287,7 +287,7 @@ def test_the_reference_loop_does_the_same_to_the_bit(plant, extra):
 def test_uncoupled_pendulums_of_a_network_stick_each_by_itself():
     x0 = 0.02, -0.1
     fields = {
-        "law": "super_twisting",
+        "law": smc.law("super_twisting"),
         "friction": smc.Coulomb(0.2),
         "duration": 0.3,
     }
@@ -322,7 +322,7 @@ def test_your_own_robot_of_one_joint_has_it_too():
     plant = smc.plant_from(ROBOT, ["hip"])
     fields = {
         "plant": plant,
-        "law": "super_twisting",
+        "law": smc.law("super_twisting"),
         "x0": 0.02,
         "duration": 0.2,
         "u_max": 0.3,

@@ -38,7 +38,7 @@ def exact(plant: Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
 def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default_step(plant, tau):
     scenario = smc.Scenario(
         plant=plant,
-        law="classical",
+        law=smc.law("classical"),
         x0=0.01,
         duration=DURATION,
         actuator=smc.Lag(tau),
@@ -55,7 +55,7 @@ def test_the_mean_of_its_force_over_a_control_period_is_in_the_trace():
     trace = smc.run(
         smc.Scenario(
             plant="duffing",
-            law="classical",
+            law=smc.law("classical"),
             duration=0.05,
             actuator=smc.Lag(5e-3),
         )

@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from helpers.own_parts import dahl
+from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
@@ -82,7 +83,7 @@ NOTHING = {
 
 
 def scenario(plant="inverted_pendulum", law="pid", **fields):
-    return smc.Scenario(plant=plant, law=law, **{"duration": 0.05} | fields)
+    return smc.Scenario(plant=plant, law=at_defaults(law), **{"duration": 0.05} | fields)
 
 
 def same(a, b):

@@ -298,7 +298,7 @@ def test_a_goal_in_an_obstacle_is_said(name):
         with pytest.warns(smc.errors.ScenarioWarning, match=f"reference.*{words}"):
             smc.Scenario(
                 plant=plant,
-                law="pid",
+                law=smc.law("pid"),
                 reference=goal,
                 contact=part,
             )

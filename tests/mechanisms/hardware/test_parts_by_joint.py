@@ -39,7 +39,12 @@ EACH = [("actuator", pair) for pair in ACTUATORS] + [("sensor", pair) for pair i
 
 
 def scenario(**fields):
-    common = {"law": "pid", "duration": 0.2, "integrator": "implicitfast", "physics_step": 1.25e-4}
+    common = {
+        "law": smc.law("pid"),
+        "duration": 0.2,
+        "integrator": "implicitfast",
+        "physics_step": 1.25e-4,
+    }
     common |= {"x0": (0.4, -0.3), "noise": smc.Noise(1e-3, 1e-2), "seed": 3}
     return smc.Scenario(plant=PLANT, velocity="filtered_difference", **common | fields)
 

@@ -350,7 +350,9 @@ def scenarios():
     yield smc.Scenario(plant="panda", law="computed_torque_sliding", friction=by_joint, **common)
     servo = smc.hardware.servo("mx64", "m5", command="voltage")
     by_joint = {"p0/hinge": Curious(), "p3/hinge": servo.friction}
-    yield smc.Scenario(plant="pendulum_network", law="classical", friction=by_joint, **common)
+    yield smc.Scenario(
+        plant="pendulum_network", law=smc.law("classical"), friction=by_joint, **common
+    )
     gust = {
         "disturbance": smc.signals.Gust(2.0, time=0.05, width=0.1),
         "duration": 0.2,
@@ -358,7 +360,7 @@ def scenarios():
     for start in (0.5, -1.5):
         yield smc.Scenario(
             plant="pendulum_network",
-            law="classical",
+            law=smc.law("classical"),
             friction=servo.friction,
             actuator=servo.motor,
             x0=start,
@@ -380,7 +382,7 @@ def scenarios():
 def test_a_rigid_play_puts_no_load_of_its_own_on_a_gearbox(friction):
     common = {
         "plant": "pendulum_network",
-        "law": "pid",
+        "law": smc.law("pid"),
         "friction": friction,
         "physics_step": 1.25e-4,
         "integrator": "implicitfast",

@@ -309,7 +309,7 @@ CONDITIONS = {
     "several motors": {
         "plant": "pendulum_network",
         "x0": 0.1,
-        "law": "pid",
+        "law": smc.law("pid"),
         "actuator": Stepper(torque=20.0),
     },
     "a free joint": {
