@@ -334,7 +334,7 @@ def stick_time(trace: Trace) -> float:
     """Time for which a channel is at rest, with a reaction of friction or contact; longest channel.
 
     Where dry friction ran by its moments, it is the time for which it held the joint, also within a
-    control period.
+    control period. With LuGre friction it is the time for which bristles bend and do not slide.
     """
     if trace.held is not None:
         return trace.held.sum(axis=0).max()

@@ -40,8 +40,8 @@ project:
   each sample at which r has jumped by more than the settling band; the side it comes from is the
   sign of e there.
 - at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Joints
-  held by Coulomb friction or contacts creep at 1e-6 or less; with LuGre friction they move as the
-  bristles bend.
+  held by Coulomb friction or contacts creep at 1e-6 or less. With LuGre friction they move as the
+  bristles bend; there a joint sticks while these carry less than 99 % of what slides at its speed.
 - channels: errors and efforts that are integrals over time are summed over the group's channels;
   every other metric takes its worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.
@@ -139,8 +139,10 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     whole = trace.arrays()
     if trace.scenario.tracks == "speed" and trace.x.shape[1] == plant.n:
         whole |= {"x": trace.v, "r": reference_rates(trace)}
+    whole |= _stuck(trace)
     if len(group.channels) == trace.x.shape[1]:
-        return dataclasses.replace(trace, **whole) if whole["x"] is trace.v else trace
+        changed = any(whole[name] is not getattr(trace, name) for name in whole)
+        return dataclasses.replace(trace, **whole) if changed else trace
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
     columns = [i for i in group.channels if i in trace.scenario.scored_channels]
@@ -333,6 +335,29 @@ def at_rest(trace: Trace) -> Array:
     conventions.
     """
     return np.abs(trace.v) <= max(REST_SHARE * float(np.abs(trace.v).max()), REST_SPEED)
+
+
+def _stuck(trace: Trace) -> dict[str, Array]:
+    """Return `held` of a run with frictions that say by their force where a joint sticks, else
+    nothing.
+    """
+    plant = trace.scenario.plant
+    if trace.held is not None or trace.x.shape[1] != plant.n:
+        return {}
+    bends = {}
+    for part in trace.scenario.friction:
+        for i in part.channels(plant):
+            stuck = part.sticks(trace.v[:, i], trace.reaction[:, i])
+            if stuck is not None:
+                bends[i] = stuck
+    if not bends:
+        return {}
+    rest = at_rest(trace) & (trace.reaction != 0.0)
+    for i, stuck in bends.items():
+        rest[:, i] = stuck & (trace.reaction[:, i] != 0.0)
+    held = np.zeros(trace.x.shape)
+    held[1:] = np.diff(trace.t)[:, None] * (rest[:-1] & rest[1:])
+    return {"held": held}
 
 
 def leans(trace: Trace) -> bool:

@@ -31,6 +31,9 @@ from smc_mujoco.mechanisms.plant import Field
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
 LEVELS = slice(3, 6)  # of actuator_biasprm: coulomb, static, stribeck
+# share of g(v) that bristles carry when they slide; chosen: a slow ramp's stick and slip, by an
+# event-driven set-valued integration, then last as long within 2 %
+SLIDES = 0.99
 RELATIVE_DAMPING = 0.2  # default damping of bristles over sqrt(stiffness inertia)
 
 
@@ -254,6 +257,12 @@ class LuGre(Friction):
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: "
                 "give static >= coulomb"
             )
+
+    def sticks(self, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return where the bristles bend: they carry less than what slides at this speed."""
+        drop = np.exp(-((v / self.stribeck) ** 2))
+        sliding = self.coulomb + (self.static - self.coulomb) * drop
+        return np.abs(force) < SLIDES * sliding
 
     def default_damping(self, inertia: np.ndarray) -> np.ndarray:
         """Return the damping of bristles on joints of these inertias, kg m^2 (kg)."""

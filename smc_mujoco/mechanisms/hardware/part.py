@@ -179,6 +179,12 @@ class Friction(OnJoints):
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""
 
+    def sticks(self, v: np.ndarray, force: np.ndarray) -> np.ndarray | None:
+        """Return where a joint sticks, from its velocity and the force of friction, (K + 1,) each;
+        None if it sticks where it is at rest.
+        """
+        del v, force
+
     @property
     def exact(self) -> Any:
         """The part that gives the stages of RK4 this dry friction of joints that move alone, with a

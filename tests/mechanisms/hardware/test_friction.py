@@ -2,6 +2,7 @@
 formulas say.
 """
 
+import dataclasses
 import math
 
 import mujoco
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.models import build
 
+import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.plant import field_array, plant
 
@@ -178,3 +180,34 @@ def test_lugre_is_the_formula_of_its_docstring():
         assert data.qfrc_actuator[0] == pytest.approx(
             -(LUGRE.stiffness * 4e-5 + damping * rate), rel=1e-9
         )
+
+
+SHAFT = """<mujoco model="shaft"><option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1"
+armature=".35"/><geom size=".01" mass="1e-6" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-40 40"/></actuator></mujoco>"""
+
+
+def test_a_joint_on_bristles_sticks_as_long_as_one_on_dry_friction_with_a_stribeck_drop():
+    kp, kd, coulomb, static, stribeck, rate = 30.0, 0.8, 0.65, 2.8, 0.12, 0.05
+    run = smc.Scenario(
+        plant=smc.plant_from(SHAFT, ["j"]),
+        law=smc.law("pid", kp=kp, ki=0.0, kd=kd),
+        reference=smc.signals.Ramp(rate),
+        friction=smc.hardware.LuGre(coulomb, static, stribeck),
+        duration=9.0,
+    )
+    trace = smc.run(run)
+    x, v, stuck, h = 0.0, 0.0, 0.0, 1e-4  # the same, event-driven and set-valued
+    for k in range(round(run.duration / h)):
+        u = kp * (rate * k * h - x) + kd * (rate - v)
+        if v == 0.0 and abs(u) <= static:
+            stuck += h
+            continue
+        rubs = coulomb + (static - coulomb) * math.exp(-((v / stribeck) ** 2))
+        new = v + h * (u - math.copysign(rubs, v or u)) / 0.35
+        v = 0.0 if new * v < 0.0 else new
+        x += h * v
+    assert 0.6 * run.duration < stuck < 0.95 * run.duration
+    assert smc.score(trace)["stick_time"] == pytest.approx(stuck, rel=0.05)
+    slides = dataclasses.replace(run, reference=smc.signals.Ramp(0.5), duration=2.0)
+    assert smc.score(smc.run(slides))["stick_time"] < 0.3 * slides.duration
