@@ -93,6 +93,7 @@ def run(
         sensor=None,
         encoder=lambda joint: None,
         tracks="position",
+        friction=(),
         scored_channels=tuple(range(n)),
     )
     more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
