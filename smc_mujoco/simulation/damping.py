@@ -25,7 +25,9 @@ def forces(scenario: Scenario, x: Array) -> Array:
     """
     coefficients = of_file(scenario.plant).copy()
     for part in scenario.friction:
-        coefficients[0, list(part.channels(scenario.plant))] += part.added_to_model.damping
+        if b := part.added_to_model.damping:
+            named = part.joint_names(scenario.plant)  # some may be no channels
+            coefficients[0, np.isin(channel_names(scenario.plant), named)] += b
     found = np.zeros(x.shape)
     if coefficients.any():
         v = np.diff(x, axis=0) / scenario.control_period
