@@ -26,7 +26,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Fields
-from smc_mujoco.mechanisms.custom.scales import beside_goal
+from smc_mujoco.mechanisms.custom.scales import usual_start
 from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, Values
@@ -79,10 +79,7 @@ class Task:
         """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring
         joints' ranges.
         """
-        start = plant.x0
-        if plant.is_user_model and not plant.pose and start == plant.origin:
-            start = beside_goal(plant)
-        reach = np.abs(start - rest(plant))
+        reach = np.abs(usual_start(plant) - rest(plant))
         return -reach, reach
 
     def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:

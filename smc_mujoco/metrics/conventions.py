@@ -347,14 +347,14 @@ def _stuck(trace: Trace) -> dict[str, Array]:
     bends = {}
     for part in trace.scenario.friction:
         for i in part.channels(plant):
-            stuck = part.sticks(trace.v[:, i], trace.reaction[:, i])
+            stuck = part.sticks(trace.v[:, i], trace.holding[:, i])
             if stuck is not None:
                 bends[i] = stuck
     if not bends:
         return {}
-    rest = at_rest(trace) & (trace.reaction != 0.0)
+    rest = at_rest(trace) & (trace.holding != 0.0)
     for i, stuck in bends.items():
-        rest[:, i] = stuck & (trace.reaction[:, i] != 0.0)
+        rest[:, i] = stuck & (trace.holding[:, i] != 0.0)
     held = np.zeros(trace.x.shape)
     held[1:] = np.diff(trace.t)[:, None] * (rest[:-1] & rest[1:])
     return {"held": held}

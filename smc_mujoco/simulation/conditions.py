@@ -16,13 +16,13 @@ sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N 
 viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn
 gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
 inexpensive encoder. On a free body and on a user's model, whose size may be any, a disturbance is
-the same share of the largest force as it is of u_max in the study. The pulse of "contact" is as
-strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half
-of the suite's control period. Under "missed" one sample in ten does not run. Under "stepper" u is
-the wanted acceleration, so gains for a force do not suit it: tune under it. Its rates are those of
-the firmware of rig stepper_furuta; it is 30 times as strong as other drives, near that machine's
-ratio of torque to inertia, as one of their strength loses steps here. Under "fault" every actuator
-loses half of its force at 2 s.
+the same share of the largest force as it is of u_max in the study. Under "contact" a joint has
+stops about its goal, and a blow drives it there whatever u does, see `blow`. Under "jitter" samples
+are late by up to half of the suite's control period. Under "missed" one sample in ten does not run.
+Under "stepper" u is the wanted acceleration, so gains for a force do not suit it: tune under it.
+Its rates are those of the firmware of rig stepper_furuta; it is 30 times as strong as other drives,
+near that machine's ratio of torque to inertia, as one of their strength loses steps here. Under
+"fault" every actuator loses half of its force at 2 s.
 """
 
 import ast
@@ -62,6 +62,7 @@ from smc_mujoco.simulation import (
     coerce,
     time_series,  # noqa: F401
 )
+from smc_mujoco.simulation.blow import bump
 from smc_mujoco.simulation.scenario import (
     NOT_OF_FREE_BODIES,
     U_MAX,
@@ -422,12 +423,9 @@ def _jump(size: str) -> Recipe:
 
 
 def _contact(plant: Plant, duration: float) -> Data:
-    """Return a pulse that drives a plant against its obstacles: its neighbours, or stops."""
-    if kinds := [kind for kind in ("bobs", "stops") if kind in plant.contacts]:
-        return {"contact": kinds[0], "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
-    raise ScenarioError(
-        f"condition 'contact' needs stops, and plant {plant.name!r} has none: choose another"
-    )
+    """Return a joint's stops about its goal, and a blow that reaches them whatever u does."""
+    stops, blow = bump(plant, duration / 2, 1.0 / BOUNDS_PER_FRICTION)
+    return {"contact": stops, "disturbance": blow}
 
 
 def _stepper(plant: Plant, duration: float) -> Data:

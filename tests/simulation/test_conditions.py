@@ -148,7 +148,7 @@ def test_conditions_suit_a_plant_that_they_have_numbers_for(arm):
     names = ["nominal", "jump_mild", "coulomb", "contact"]
     duffing = smc.plant("duffing")
     assert applicable(names, [duffing], 1.0) == names
-    assert applicable(names, [duffing, arm], 1.0) == ["nominal", "coulomb"]
+    assert applicable(names, [duffing, arm], 1.0) == ["nominal", "coulomb", "contact"]
 
 
 def test_a_condition_that_starts_at_0_is_nothing_to_tune_for(refused):

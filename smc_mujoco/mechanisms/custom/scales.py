@@ -73,8 +73,8 @@ def _forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 @functools.lru_cache(maxsize=32)
 def at_goal(plant: Plant) -> AtGoal:
-    """Return what moves a user's joints about their default goal."""
-    model, data = _at(plant, plant.origin)
+    """Return what moves a plant's joints about their default goal."""
+    model, data = _at(plant, plant.rest or plant.origin)
     dofs = dof_ids(model)[: plant.driven]
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
@@ -204,6 +204,15 @@ def beside_goal(plant: Plant) -> Floats:
     return x0
 
 
+def usual_start(plant: Plant) -> Floats:
+    """Return where runs of a plant begin if nobody says so, (n,): beside the goal of a user's
+    model that would start at it.
+    """
+    if plant.is_user_model and not plant.pose and plant.x0 == plant.origin:
+        return beside_goal(plant)
+    return plant.x0
+
+
 def _clear_start(plant: Plant, x0: Floats, i: int, down: float, up: float) -> Floats:
     """Return a start in which joint i is moved, the farthest of those that touch nothing; `down`
     and `up` are the ways to its limits.
@@ -233,10 +242,7 @@ def needs(plant: Plant) -> Floats:
     with two digits: 2 load + (60/s^2 M + 8/s D) X + 1.5 dry friction.
     """
     at = at_goal(plant)
-    start = plant.x0
-    if start == plant.origin:
-        start = beside_goal(plant)
-    way = np.abs(np.subtract(start, plant.origin))[: plant.driven]
+    way = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven]
     way = np.where(way > MAX_EXCESS, way, BESIDE)
     damping = np.maximum(np.diag(at.D)[at.dofs], 0.0)
     moving = (STIFFNESS * np.diag(at.M)[at.dofs] + DAMPING * damping) * way

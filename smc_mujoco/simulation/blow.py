@@ -1,0 +1,125 @@
+"""A joint's stops about its goal, and a blow that drives it against them whatever u does.
+
+A blow acts on every driven joint, so the stops are on the joint that needs the least momentum. With
+d the distance of the start from the goal, the stop lies beyond the goal at `near`, d/3 or less, and
+the momentum is
+
+    p = sqrt(2 REACH M F near) + F WIDTH + D near
+
+F is all that may hold the joint back: the bounds on u, the load, friction and springs. So the blow
+has REACH times the energy that they can take from it on its way, and what they take during the blow
+and damping takes on the way comes on top. M, D, load and springs are those at the goal.
+"""
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import Array, Pair
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.custom.scales import at_goal, usual_start
+from smc_mujoco.mechanisms.hardware.obstacles import Stops
+from smc_mujoco.mechanisms.layout import channel_names, driven_ids, loaded, posed
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Impulse
+
+# All chosen.
+REACH = 1.5  # energy of a blow over what can be taken from it
+WIDTH = 5e-3  # s, of a blow
+NEAR, FAR = (
+    1 / 3,
+    1.5,
+)  # of the start's distance from the goal: beyond the goal, and behind the start
+SHARE = 0.5  # of the way from the goal to the end of its range, at most
+LEAST = 0.02  # of the start's distance, where the goal is at the end of its range
+# of the other joints' distance, for a joint that starts at its goal: room for what it does there
+BESIDE_OTHERS = 9.0
+
+
+class Stopped(NamedTuple):
+    """The stops of a joint, and what drives it there."""
+
+    momentum: float  # N m s (N s), on each driven joint
+    side: float  # 1 or -1: where it goes
+    joint: str
+    ends: Pair  # rad or m, its stops
+
+
+def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
+    """Return stops of a joint, and the blow at a time, s, that reaches them.
+
+    Args:
+      rubs: share of the bound on u that friction may have, and take of a speed of 1 rad/s (m/s).
+
+    Raises:
+      ScenarioError: no joint of the plant can be stopped.
+    """
+    found = [] if plant.pose else _stopped(plant, rubs)
+    if not found:
+        raise ScenarioError(
+            f"condition 'contact' finds no driven joint of {plant.name} that stops could hold: "
+            "give an obstacle yourself, as bump: contact=Ball('body', mass=0.1)"
+        )
+    momentum, side, joint, ends = min(found)
+    return Stops({joint: ends}), Impulse(side * momentum, time=time, width=WIDTH)
+
+
+def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
+    """Return each driven joint that a blow moves."""
+    at = at_goal(plant)
+    goal = np.array(plant.rest or plant.origin)
+    away = np.array(usual_start(plant)) - goal
+    if not away[: plant.driven].any():
+        away[: plant.driven] = BESIDE_OTHERS * np.abs(away).max()
+    inverse = np.linalg.inv(at.M)[at.dofs]
+    gained = inverse @ _blown(plant, goal)  # speed of each joint for a unit of momentum on all
+    inverse = inverse[:, at.dofs]
+    bounds = np.array(Scenario.recorded(plant=plant, law="none").limits)
+    held = bounds * (1.0 + rubs) + np.abs(at.load) + at.dry
+    names = channel_names(plant)
+    found = []
+    for j in range(plant.driven):
+        if not away[j] or not gained[j] > 0.0:
+            continue
+        dof = at.dofs[j]
+        side = -math.copysign(1.0, away[j])
+        near, far = _room(plant, j, abs(away[j]), side)
+        # of what moves at once, and of the joint where servos or PDs hold the others
+        mass = max(1.0 / gained[j], at.M[dof, dof])
+        force = np.abs(inverse[j]) @ held / gained[j] + max(at.K[dof, dof], 0.0) * near
+        damping = max(at.D[dof, dof], 0.0) + 0.5 * rubs * bounds[j]
+        momentum = math.sqrt(2.0 * REACH * mass * force * near) + force * WIDTH + damping * near
+        ends = sorted((goal[j] + side * near, goal[j] - side * far))
+        found.append(Stopped(float(momentum), side, names[j], (float(ends[0]), float(ends[1]))))
+    return found
+
+
+def _blown(plant: Plant, goal: Array) -> Array:
+    """Return what a disturbance of 1 on every driven joint exerts at the goal, (nv,): on the joints
+    of a `direct` plant, on the bodies that they carry of another.
+    """
+    model = loaded(plant)
+    data = posed(model, goal)
+    mujoco.mj_comPos(model, data)
+    exerted = np.zeros(model.nv)
+    for joint in driven_ids(model).tolist():
+        along, about = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jacBodyCom(model, data, along, about, int(model.jnt_bodyid[joint]))
+        if plant.direct:
+            exerted[model.jnt_dofadr[joint]] += 1.0
+        elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
+            exerted += data.xaxis[joint] @ about
+        else:
+            exerted += data.xaxis[joint] @ along
+    return exerted
+
+
+def _room(plant: Plant, j: int, away: float, side: float) -> Pair:
+    """Return how far beyond joint j's goal and how far behind it the stops are, rad or m."""
+    low, high = (-math.inf, math.inf) if not plant.ranges else plant.ranges[j][1:]
+    goal = (plant.rest or plant.origin)[j]
+    beyond, behind = (high - goal, goal - low) if side > 0.0 else (goal - low, high - goal)
+    return max(min(NEAR * away, SHARE * beyond), LEAST * away), min(FAR * away, behind)

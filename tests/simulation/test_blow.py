@@ -1,0 +1,76 @@
+"""The condition `contact` reaches its stops whatever u does, on machines of any size."""
+
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control.component import by_channel
+from smc_mujoco.mechanisms.custom.scales import at_goal
+from smc_mujoco.mechanisms.layout import channel_names
+from smc_mujoco.simulation import conditions
+from smc_mujoco.simulation.grid import case
+
+MACHINE = """<mujoco model="{name}"><compiler angle="radian"/><worldbody><body pos="0 0 1">
+<joint name="j" type="{kind}" axis="0 {axis}" {joint}/><geom type="capsule" fromto="0 0 0 {tip}"
+size="{size}" mass="{mass}"/>{more}</body></worldbody><actuator><motor joint="j"
+ctrlrange="-{bound} {bound}"/>{motors}</actuator></mujoco>"""
+LINK = """<body pos=".3 0 0"><joint name="k" axis="0 1 0" damping=".1" {joint}/><geom type="capsule"
+fromto="0 0 0 .3 0 0" size=".02" mass=".6"/></body>"""
+ARM = {"kind": "hinge", "axis": "1 0", "tip": ".3 0 0", "size": 0.02, "mass": 0.5, "joint": ""}
+ARM |= {"bound": 20, "more": "", "motors": ""}
+K = '<motor joint="k" ctrlrange="-9 9"/>'
+BUILT = {
+    "calf": ({"joint": 'range="-1 1" damping=".1"', "tip": "0 0 -.4", "bound": 10}, ["j"], None),
+    "chain": ({"more": LINK.format(joint=""), "motors": K}, ["j", "k"], None),
+    "held": ({"more": LINK.format(joint=""), "motors": K}, ["k"], "held"),
+    "locked": ({"more": LINK.format(joint=""), "motors": K}, ["k"], "locked"),
+    "slide": ({"kind": "slide", "joint": 'range="0 .04"', "mass": 0.1, "bound": 5}, ["j"], None),
+    "wheel": ({"joint": 'armature="1e-5"', "tip": "0 .01 0", "size": 1e-3, "mass": 1e-4}
+              | {"bound": 0.05}, ["j"], None),
+    "boom": ({"tip": "7 0 0", "size": 0.1, "mass": 100, "bound": 9000}, ["j"], None),
+    "spring": ({"joint": 'stiffness="30" damping="2" frictionloss=".5"'}, ["j"], None),
+    "at its end": ({"joint": 'range="0 2"'}, ["j"], None),
+}  # fmt: skip
+TIME = 1.5  # s, of the blow
+
+
+@smc.law_function(gains={"kp": 1.0, "kd": 1.0, "load": 0.0, "bound": 1.0, "way": 1.0, "at": 1.0})
+def resists(y, gains, memory):
+    """Holds the goal by a PD, and from the blow on pushes back with all it has."""
+    if y.t < gains.at:
+        return gains.load - gains.kp * y.e - gains.kd * y.de, y.e
+    return -gains.way * gains.bound, y.e
+
+
+def machine(name):
+    if name not in BUILT:
+        return smc.plant(name)
+    parts, joints, others = BUILT[name]
+    return smc.plant_from(MACHINE.format(name="m", **ARM | parts), joints, others=others)
+
+
+@pytest.mark.parametrize("more", ["", " + friction"])
+@pytest.mark.parametrize("name", [*BUILT, "duffing", "double_pendulum", "inverted_pendulum"])
+def test_a_blow_reaches_the_stops_whatever_u_does(name, more):
+    plant = machine(name)
+    given = conditions.find_condition(f"contact{more}").on(plant, 2.0 * TIME)
+    blow = given["disturbance"]
+    at = at_goal(plant)
+    limits = smc.Scenario(plant=plant, law=smc.law("none")).limits
+    laws = []
+    for bound, dof, load in zip(limits, at.dofs, at.load, strict=True):
+        kp = bound / 0.3
+        kd = 2.0 * math.sqrt(kp * at.M[dof, dof])
+        way = math.copysign(1.0, blow.impulse)
+        laws.append(resists(kp=kp, kd=kd, load=load, bound=bound, way=way, at=TIME))
+    made = conditions.condition("hit", **given)
+    runs = [case(plant, by_channel(laws), made, 2.0 * TIME, seed=seed) for seed in range(3)]
+    (stopped,) = given["contact"].limits.items()
+    joint = channel_names(plant).index(stopped[0])
+    for trace in smc.run(runs):
+        assert trace.failure is None
+        beyond = np.clip(trace.x[:, joint], *stopped[1]) != trace.x[:, joint]
+        assert not beyond[trace.t < TIME].any()
+        assert beyond[(trace.t >= TIME) & (trace.t < TIME + 0.5)].any()
