@@ -24,7 +24,8 @@ import numpy as np
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.ranking import interval, linked
+from smc_mujoco.analysis.ranking import linked
+from smc_mujoco.analysis.signed_rank import interval
 from smc_mujoco.control.law import Law
 from smc_mujoco.simulation.signals import Constant, Dryden, Noise, Sine, Wind
 from smc_mujoco.studies.table import Table

@@ -49,7 +49,7 @@ from smc_mujoco.analysis.engine import scores
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, Form, row_places, work_places
 from smc_mujoco.analysis.engine.group import Group, why_not
 from smc_mujoco.analysis.engine.scores import own
-from smc_mujoco.analysis.ranking import interval
+from smc_mujoco.analysis.signed_rank import interval
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import BUDGET, OBJECTIVES, Objective

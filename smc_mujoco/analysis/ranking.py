@@ -19,44 +19,51 @@ more than what is relevant. Where only some of the runs were repeated at half th
 of their relative changes widens the others. For shares, d is the difference.
 
 The test. A law is better than a rival if the number of pairs i <= j with d_i + d_j > -2 log(1 - r)
-is too large for the exact law of the signed ranks; r is the share that is relevant. That is F.
-Wilcoxon's test (Biometrics Bulletin 1(6), 1945) in the form of J. W. Tukey: it rejects that the law
-is not lower by the share r. It is monotone: d never falls because a value of the law's own falls,
-or one of its rival's rises; so a winner that becomes better in its block stays its winner. There
-are two exceptions. Where only some runs were repeated, a value that falls alone is farther from
-that at half the step, and widens the others. And Holm's limit, below, depends on all p-values of
-the family. The test does not depend on the metric's unit. Besides, the law must not fail more
-often. The estimate is the median of the means of all pairs (J. L. Hodges, E. L. Lehmann, Annals of
-Mathematical Statistics 34(2), 1963), and an interval has the centres that the test does not reject.
+is too large for the exact law of the signed ranks, see `signed_rank`; r is the share that is
+relevant. So it rejects that the law is not lower by the share r. It is monotone: d never falls
+because a value of the law's own falls, or one of its rival's rises; so a law that becomes better in
+its block stays better than its rivals. There is one exception. Where only some runs were repeated,
+a value that falls alone is farther from that at half the step, and widens the others. The test does
+not depend on the metric's unit. Besides, the law must not fail more often.
 
-The correction. There are two families, over all blocks of a metric in a table, however the table is
-grouped into boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics
-6(2), 1979), with two-sided p-values.
+Winners. The winner of a block is better than every other law. Its p-value is the largest of those
+against the others, and needs no correction for their number (S. Gutmann, Z. Maymin, Annals of
+Statistics 15(1), 1987): the error is largest where two laws are equal and the others far behind.
+The family is all blocks of a metric in a table, however the table is grouped into boards. It is
+corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided
+p-values: the probability of any wrong winner of a metric is at most 5 %.
 
-- Winners. The winner of a block is better than every other law. Its p-value is the largest of those
-  against the others, and needs no correction for their number (S. Gutmann, Z. Maymin, Annals of
-  Statistics 15(1), 1987): the error is largest where two laws are equal and the others far behind.
-  So the family is the blocks. The probability of any wrong winner is at most 5 %.
-- Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly
-  called better than another is at most 5 %, in addition to that of a wrong winner.
+The best. Where no law wins, a law may be the best unless another is better, with a p-value of at
+most 5 % / 15: multiple comparisons with the best (J. C. Hsu, Annals of Statistics 12(3), 1984) with
+Bonferroni's inequality. So in each block the law that is best is taken for a worse one with a
+probability of at most 5 %, beside up to 15 rivals; with more, the level is 5 % over their number.
+It is that of 16 laws however few there are, so that it does not depend on a law that is added. It
+is not corrected over blocks, as the printed intervals are not.
+
+What an added law changes. It changes no values and intervals of others. If it is not among the best
+itself, it does not change which others are, as far as was seen (`docs/winners.md`). If it is, it
+takes those out that it is better than, and may keep a law from winning, which brings back those
+that only a winner beats. No rule could do without both: let a be better than b, and c level with
+either. Then {a, b} has a winner, and {a, c}, {b, c} and {a, b, c} have none.
 
 Below the floor. A law is below q in a block if its high values are at most q in more than half of
 its units. Two laws below q are not ranked: neither is better, and they have no least visible lead.
 If only one is, and is better, its lead is at least the median of the rival's low values over q.
+Beside a law that is below, no law above q is among the best.
 
-No winner. Two laws are level only if there are 12 units or more and the interval of their ratio, at
-the pairs' level, lies within 10 %. Otherwise one cannot tell, and `least_visible_lead` says which
-lead would have been seen.
+Too few samples. A law whose sets of gains, or runs, are too few for a p-value as small as that of a
+winner or of the best is not ranked; the others are ranked without it.
+
+No winner. Two laws are level only if there are 12 units or more and the 95 % interval of their
+ratio lies within 10 %. Otherwise one cannot tell, and `least_visible_lead` says which lead would
+have been seen.
 
 A law with a run that failed, has no value, or has not arrived (`metrics.catalogue.arrived`) wins
-nothing. In every order the laws with fewer runs without a value come first.
-
-A law is among the best if no other is better and all its runs have a value and have arrived.
+nothing, and is not among the best. In every order the laws with fewer runs without a value come
+first.
 """
 
-import copy
 import functools
-import hashlib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -67,24 +74,26 @@ from numpy.typing import ArrayLike
 
 from smc_mujoco.analysis.bootstrap import LEVEL, middle
 from smc_mujoco.analysis.differ import differ
+from smc_mujoco.analysis.signed_rank import (
+    MAX_LOG,
+    interval,
+    least_visible_lead,
+    min_p,
+    p_values,
+)
 from smc_mujoco.common.constraints import Number, constrained
 
-MAX_EXACT = 60  # samples; with more the normal approximation of the rank sum is used
 RELEVANT = 0.03  # r, default share of the larger value that is relevant; chosen
 Relevant = Annotated[float, Number(low=0.0, high=0.5)]
 # the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
 TREND_POWER = 5
 LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
 MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
-MAX_LOG = 1e6  # of a logarithm: more than the range of floating-point numbers, but finite
 # of log rho: a value that has vanished within the last fifth of a run has fallen enough
 MAX_RISE = 60.0
-POWER = 0.8  # with which the least visible lead is seen
-LEAD_RESAMPLES = 400  # for the least visible lead; chosen
-# of resamples that must see it, so that on average POWER of new samples do; chosen by samples of 51
-# shapes and confirmed on shapes drawn later, see docs/winners.md
-OWN_SHARE = 0.95
-MAX_SUMS = 10_000_000  # of pairs, in memory at once
+WIN_ERROR = (1.0 - LEVEL) / 2  # one-sided, of any wrong winner of a metric
+BEST_ERROR = 1.0 - LEVEL  # of the best law of a block taken for a worse one
+RIVALS = 15  # of a law, for which levels are corrected even if it has fewer; chosen
 
 
 class Rank(NamedTuple):
@@ -100,22 +109,12 @@ class Effect(NamedTuple):
     """How a law's values compare with a rival's, in one block."""
 
     value: float  # ratio of the law's values to the rival's
-    low: float  # of its interval, at the level that the correction leaves for one comparison
+    low: float  # of its 95 % interval
     high: float
     ahead: int  # number of units in which the law is better by more than what is relevant
     samples: int  # number of units
     sets: bool  # whether the units are sets of gains; otherwise they are seeds
     below: bool = False  # whether the law is below the floor and the rival is not
-
-
-class Limits(NamedTuple):
-    """The largest one-sided p-values with which a law is better than another, and with which it
-    wins a block.
-    """
-
-    pair: float
-    winner: float
-    first: float = 0.0  # of Holm's first step for winners
 
 
 class Comparison:
@@ -170,6 +169,7 @@ class Comparison:
         self.away = np.isinf(self.cells) | (self._cube(arrived, 1) == 0)
         self.below = np.zeros((count, blocks), bool)
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
+        self.units = np.zeros((count, blocks), int)  # of each law alone: its sets, or its runs
         # d of the first law over the second by unit, then NaN; and without halves and trends
         self.leads = np.full((blocks, count, count, seeds), math.nan)
         self.plain = self.leads.copy()
@@ -178,6 +178,8 @@ class Comparison:
         for k in range(blocks):
             for a in range(count):
                 self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
+                alone = linked(gains[a, k, ran[k]])
+                self.units[a, k] = ran[k].sum() if alone is None else max(alone) + 1
                 # the law alone, then beside each other
                 for b in range(a + 1):
                     pair = sorted({a, b})
@@ -193,19 +195,16 @@ class Comparison:
                             leads[k, i, j] = _by_unit(by_run, units, seeds)
         # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
         self.p = p_values(self.leads - self.beyond)
-        self.p[self.unranked] = 1.0
-        self.limits = corrected_limits([self])  # of the p-values, after the correction
+        self.p[self.both_below] = 1.0
+        # the largest p-values with which a law is better than another, and wins a block
+        self.limit = BEST_ERROR / max(count - 1, RIVALS)
+        self.winning = self.first = WIN_ERROR  # after Holm's last step, and after his first
+        corrected([self])
 
     def _cube(self, by_law: Mapping[str, ArrayLike] | None, unknown: ArrayLike) -> np.ndarray:
         if by_law:
             return np.array([np.atleast_2d(by_law[law]) for law in self.laws], float)
         return np.broadcast_to(unknown, self.cells.shape)
-
-    def limited(self, limits: Limits) -> "Comparison":
-        """Return the same comparison as part of a larger family, which has these limits."""
-        other = copy.copy(self)
-        other.limits = limits
-        return other
 
     @property
     def centres(self) -> np.ndarray:
@@ -215,7 +214,7 @@ class Comparison:
         return middle(self.cells)
 
     @property
-    def unranked(self) -> np.ndarray:
+    def both_below(self) -> np.ndarray:
         """Whether two laws are both below the floor, (blocks, laws, laws)."""
         return self.below.T[:, :, None] & self.below.T[:, None, :]
 
@@ -241,25 +240,39 @@ class Comparison:
         return lacking[:, :, None] <= lacking[:, None, :]
 
     @property
-    def winners(self) -> list[str | None]:
-        """The law of each block that is better than every other, if there is one."""
-        itself = np.eye(len(self.laws), dtype=bool)
-        beats = (self.p <= self.limits.winner) & self._eligible
-        wins = np.all(beats | itself, axis=2) & ~self.away.any(axis=2).T
-        wins &= len(self.laws) > 1
-        names = np.array([*self.laws, None])
-        return names[np.where(wins.any(axis=1), wins.argmax(axis=1), -1)].tolist()
+    def ranked(self) -> np.ndarray:
+        """Whether the units are enough for a law to win, or to be worse than another, beside
+        another such law, (laws, blocks).
+        """
+        ranked = min_p(self.units) <= max(self.limit, self.first)
+        return ranked & (ranked.sum(axis=0) > 1)
 
     @property
     def better(self) -> np.ndarray:
         """Whether a law is better than another, (blocks, laws, laws)."""
-        better = (self.p <= self.limits.pair) & self._eligible
-        for block, winner in zip(better, self.winners, strict=True):
+        better = (self.p <= self.limit) & self._eligible
+        for block, ranked, winner in zip(better, self.ranked.T, self.winners, strict=True):
             if winner is not None:
-                at = self.laws.index(winner)
-                block[at] = True
-                block[:, at] = False
+                block[self.laws.index(winner)] |= ranked & (np.array(self.laws) != winner)
         return better
+
+    @property
+    def winner_p(self) -> np.ndarray:
+        """The one-sided p-value with which a law is better than every other that is ranked,
+        (blocks, laws); 1 of a law that is not.
+        """
+        ranked = self.ranked.T
+        against = ranked[:, None, :] & ~np.eye(len(self.laws), dtype=bool)
+        return np.where(ranked, np.where(against, self.p, 0.0).max(axis=2), 1.0)
+
+    @property
+    def winners(self) -> list[str | None]:
+        """The law of each block that is better than every other, if there is one."""
+        eligible = self._eligible | ~self.ranked.T[:, None, :]
+        wins = (self.winner_p <= self.winning) & np.all(eligible, axis=2)
+        wins &= ~self.away.any(axis=2).T
+        names = np.array([*self.laws, None])
+        return names[np.where(wins.any(axis=1), wins.argmax(axis=1), -1)].tolist()
 
     @property
     def worse(self) -> np.ndarray:
@@ -267,11 +280,19 @@ class Comparison:
         return np.asarray(self.better.any(axis=1)).T
 
     @property
-    def beaten(self) -> np.ndarray:
-        """Whether another law is better, or a run of the law failed, has no value or has not
-        arrived, (laws, blocks).
+    def best(self) -> np.ndarray:
+        """Whether a law may be the best, (laws, blocks): the winner, or where there is none, no
+        other is better, its units are enough to say so, all its runs have a value and have arrived,
+        and it is below the floor if one of these is.
         """
-        return self.worse | self.away.any(axis=2)
+        enough = min_p(self.units) <= self.limit
+        best = self.ranked & enough & ~self.worse & ~self.away.any(axis=2)
+        lowest = best & self.below
+        best = np.where(lowest.any(axis=0), lowest, best)
+        for k, winner in enumerate(self.winners):
+            if winner is not None:
+                best[:, k] = np.array(self.laws) == winner
+        return best
 
     @property
     def level(self) -> np.ndarray:
@@ -281,21 +302,20 @@ class Comparison:
         if self.shares:
             within = ~np.any(self.leads**2 > 0.0, axis=3)
         else:
-            within = p_values(self.leads - math.log1p(-LEVEL_SHARE)) <= self.limits.pair
+            within = p_values(self.leads - math.log1p(-LEVEL_SHARE)) <= WIN_ERROR
         level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS)
         level &= ~(self.below.T[:, :, None] | self.below.T[:, None, :])
         return level | np.eye(len(self.laws), dtype=bool)
 
     def effect(self, block: int, law: str, rival: str) -> Effect:
-        """Return how a law compares with a rival in a block, at a winner's level."""
+        """Return how a law compares with a rival in a block, with a 95 % interval."""
         a = self.laws.index(law)
         b = self.laws.index(rival)
-        error = self.limits.winner
         leads = self.leads[block, a, b]
         with np.errstate(over="ignore"):
-            low = np.exp(interval(self.leads[block, b, a], error)[1])
-            high = np.exp(-interval(leads, error)[1])
-            value = np.exp(-interval(self.plain[block, a, b], error)[0])
+            low = np.exp(interval(self.leads[block, b, a], WIN_ERROR)[1])
+            high = np.exp(-interval(leads, WIN_ERROR)[1])
+            value = np.exp(-interval(self.plain[block, a, b], WIN_ERROR)[0])
         below = bool(self.below[a, block] and not self.below[b, block])
         if below:
             low = 0.0
@@ -314,16 +334,15 @@ class Comparison:
         )
 
     def visible(self, block: int, law: str, rival: str) -> float:
-        """Return the least lead of a law over a rival that is seen with a probability of 80 %, as a
-        share; NaN if one of them is below the floor.
+        """Return the least lead of a law over a rival with which a winner is seen with a
+        probability of 80 %, as a share; NaN if one of them is below the floor.
 
         It makes up for what half the step and trends charge, too.
         """
         at = block, self.laws.index(law), self.laws.index(rival)
         if self.below[list(at[1:]), block].any():
             return math.nan
-        error = self.limits.winner if self.winners[block] else self.limits.first
-        lead = least_visible_lead(self.leads[at], error, self.relevant)
+        lead = least_visible_lead(self.leads[at], self.first, self.relevant)
         charged = np.nan_to_num(middle(_difference(self.plain[at], self.leads[at])))
         return 1.0 - (1.0 - lead) * math.exp(-max(float(charged), 0.0))
 
@@ -395,41 +414,6 @@ def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np
     return centres
 
 
-def least_visible_lead(leads: ArrayLike, error: float, relevant: float = RELEVANT) -> float:
-    """Return the least lead that the test sees with a probability of 80 %, as a share; 1 if it can
-    see none.
-
-    Let c be the n units' d about their centre, times sqrt(n / (n - 1)), and low and high the ends
-    of the signed-rank interval of n draws from c, at `error`. The test sees a lead l of these draws
-    if low + l > -log(1 - r). With Q the quantiles over 400 resamples,
-
-        L = 1 - (1 - r) exp( -max(0, Q95[-low], Q50[high]) )
-
-    Quantiles of 80 % of both see too little where the law has a long tail: with twelve units the
-    tail is seldom in the sample. The seed of the resamples follows from the units, so that L is
-    always the same.
-
-    Args:
-      leads: d of the units, NaN for none.
-      error: one-sided level of the first step of Holm's method.
-      relevant: r.
-    """
-    known = _finite(leads)
-    n = known.size
-    if n < 2 or min_p(n) > error:
-        return 1.0
-    centred = math.sqrt(n / (n - 1)) * (known - interval(known, error)[0])
-    seed = int.from_bytes(hashlib.sha256(known.tobytes()).digest()[:8])
-    drawn = np.random.default_rng(seed).integers(n, size=(LEAD_RESAMPLES, n))
-    needed = []
-    for indices in np.array_split(drawn, 1 + drawn.size * n // MAX_SUMS):
-        low, high = _ends(centred[indices], error)
-        needed.append([-low, high])
-    own, mirrored = np.concatenate(needed, axis=1)
-    least = max(0.0, np.quantile(own, OWN_SHARE), np.median(mirrored))
-    return 1.0 - (1.0 - relevant) * math.exp(-least)
-
-
 def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
     """Return a number for each run, the same for runs that share a set of gains, directly or
     through others.
@@ -471,49 +455,79 @@ def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
     return first
 
 
-def corrected_limits(comparisons: Sequence[Comparison]) -> Limits:
-    """Return the limits of p-values for comparisons that form one family."""
-    pairs = [np.zeros(0)]
-    winners = [np.zeros(0)]
-    for one in comparisons:
-        count = len(one.laws)
-        if count > 1:
-            both = np.minimum(one.p, one.p.swapaxes(1, 2))
-            pairs.append(both[:, *np.triu_indices(count, 1)].ravel())
-            winners.append(np.where(np.eye(count), 0.0, one.p).max(axis=2).min(axis=1))
-    error = (1.0 - LEVEL) / 2  # two-sided
-    of_winner = np.concatenate(winners)
-    first = error / max(of_winner.size, 1)
-    return Limits(_holm(np.concatenate(pairs), error), _holm(of_winner, error), first)
+def corrected(comparisons: Sequence[Comparison]) -> None:
+    """Correct the winners' limits of comparisons whose blocks form one family."""
+    several = [one for one in comparisons if len(one.laws) > 1]
+    blocks = sum(len(one.floors) for one in several)
+    for one in several:
+        one.first = WIN_ERROR / blocks
+    p = [one.winner_p.min(axis=1) for one in several]
+    for one in several:
+        one.winning = holm(np.concatenate(p), WIN_ERROR)
 
 
-def _holm(p: np.ndarray, error: float) -> float:
+def holm(p: np.ndarray, error: float) -> float:
     """Return the p-value up to which Holm's method rejects."""
     allowed = error / np.arange(p.size, 0, -1)
     kept = np.flatnonzero(np.sort(p) > allowed)
     return float(allowed[kept[0]]) if kept.size else error
 
 
-def ranks(comparison: Comparison) -> list[Rank]:
-    """Return the laws' ranks: fewest runs without a value first, then by mean rank; irrelevant
-    differences are ties.
+def needed_to_win(blocks: int) -> int:
+    """Return the number of units from which a law can win in one of the blocks of a family."""
+    return _units(WIN_ERROR / blocks)
 
-    In each block a law's rank is by its number of runs without a value, then by its median.
-    """
+
+def needed_to_rank(laws: int) -> int:
+    """Return the number of units from which one of several laws can be taken for a worse one."""
+    return _units(BEST_ERROR / max(laws - 1, RIVALS))
+
+
+def _units(error: float) -> int:
+    return next(n for n in itertools.count(1) if min_p(n) <= error)
+
+
+def ranks(comparison: Comparison) -> list[Rank]:
+    """Return the laws' ranks over all blocks, see `placed` and `ranks_by_block`."""
     lacking = comparison.without_value
-    centres = comparison.centres
+    tied = comparison.both_below.transpose(1, 2, 0)
+    by_block = ranks_by_block(
+        lacking, comparison.centres, comparison.floors, comparison.relevant, tied
+    )
+    return placed(comparison.laws, by_block, lacking, np.all(comparison.best, axis=1))
+
+
+def ranks_by_block(
+    lacking: np.ndarray,
+    centres: np.ndarray,
+    floors: ArrayLike = 0.0,
+    relevant: float = RELEVANT,
+    tied: ArrayLike = False,
+) -> np.ndarray:
+    """Return the rank of each law in each block, (laws, blocks): by the number of runs without a
+    value, then by median. Irrelevant differences and laws that are `tied` share the mean of ranks.
+    """
     behind = lacking[:, None] > lacking
-    larger = exceeds(centres[:, None], centres, comparison.floors, comparison.relevant)
-    larger &= ~comparison.unranked.transpose(1, 2, 0)
+    larger = exceeds(centres[:, None], centres, floors, relevant) & ~np.asarray(tied)
     behind |= (lacking[:, None] == lacking) & larger
-    by_block = (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
+    return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
+
+
+def placed(
+    laws: Sequence[str], by_block: np.ndarray, lacking: np.ndarray, best: np.ndarray
+) -> list[Rank]:
+    """Return laws by the number of their runs without a value, then by mean rank over the blocks.
+
+    Args:
+      by_block, lacking: ranks and numbers of runs without a value, (laws, blocks).
+      best: whether a law may be the best, (laws,).
+    """
     means = by_block.mean(axis=1).tolist()
-    doubted = np.any(comparison.beaten, axis=1).tolist()
-    order = list(zip(lacking.sum(axis=1).tolist(), np.round(means, 9), strict=True))
+    order = list(zip(lacking.sum(axis=1).tolist(), np.round(means, 9).tolist(), strict=True))
     found = []
-    for law, mean, own, doubt in zip(comparison.laws, means, order, doubted, strict=True):
+    for law, mean, own, star in zip(laws, means, order, best.tolist(), strict=True):
         place = sum(other < own for other in order) + (1 + order.count(own)) / 2
-        found.append(Rank(law, mean, place, not doubt))
+        found.append(Rank(law, mean, place, star))
     return sorted(found, key=lambda rank: (rank.place, rank.law))
 
 
@@ -529,86 +543,3 @@ def exceeds(
     larger = np.asarray(np.maximum(a, floor))
     smaller = np.asarray(np.maximum(b, floor))
     return np.asarray((1.0 - relevant) * larger > smaller)
-
-
-# the signed-rank test
-
-
-def p_values(differences: ArrayLike) -> np.ndarray:
-    """Return the one-sided p-values with which differences (..., n), NaN for none, lie above 0; 1
-    without any.
-
-    The statistic is the number of pairs i <= j whose sum is above 0: without ties and zeros, the
-    sum of the positive ranks. Ties and zeros lower it, so that the test keeps its level.
-    """
-    given = np.asarray(differences, float)
-    p = np.ones(given.shape[:-1])
-    for at in np.ndindex(p.shape):
-        known = given[at][~np.isnan(given[at])]
-        if known.size:
-            with np.errstate(invalid="ignore"):  # the sum of opposite infinities is not above 0
-                above = known[:, None] + known > 0.0  # each pair i < j twice
-            p[at] = _tail(known.size, int(above.sum() + above.trace()) // 2)
-    return p
-
-
-def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]:
-    """Return the centre of differences (n,), NaN for none, and the ends of its interval.
-
-    The true centre lies beyond each end with probability `error`. Ends are infinite if the sample
-    is too small.
-    """
-    known = _finite(differences)
-    if not known.size:
-        return math.nan, math.nan, math.nan
-    i, j = np.triu_indices(known.size)
-    low, high = _ends(known[None], error)
-    return float(np.median(known[i] + known[j])) / 2, float(low[0]), float(high[0])
-
-
-def _finite(differences: ArrayLike) -> np.ndarray:
-    """Return the differences that are known, with finite numbers in place of infinite ones."""
-    known = np.asarray(differences, float)
-    return np.clip(known[~np.isnan(known)], -MAX_LOG, MAX_LOG)
-
-
-def _ends(samples: np.ndarray, error: float) -> np.ndarray:
-    """Return the ends of the intervals of samples (m, n), as (2, m); infinite if n is too small."""
-    i, j = np.triu_indices(samples.shape[1])
-    enough = np.flatnonzero(_tail(samples.shape[1], np.arange(i.size + 1)) <= error)
-    if not enough.size:
-        return np.array([[-math.inf], [math.inf]]).repeat(len(samples), axis=1)
-    at = i.size - enough[0], enough[0] - 1
-    sums = np.partition(samples[:, i] + samples[:, j], at, axis=1)
-    return sums[:, at].T / 2
-
-
-def min_p(n: int) -> float:
-    """Return the smallest one-sided p-value that n differences can have."""
-    return 2.0**-n
-
-
-def _tail(n: int, sums: int | np.ndarray) -> np.ndarray:
-    """Return the probability that random signs of the ranks 1 to n give a sum at least as large as
-    these.
-    """
-    if n <= MAX_EXACT:
-        return _distribution(n)[sums]
-    from scipy.special import ndtr
-
-    mean = n * (n + 1) / 4
-    deviation = math.sqrt(n * (n + 1) * (2 * n + 1) / 6) / 2
-    return ndtr((mean - sums + 0.5) / deviation)
-
-
-@functools.cache
-def _distribution(n: int) -> np.ndarray:
-    """Return the probability of a sum of the ranks 1 to n of at least 0, 1, ..., if signs are
-    random.
-    """
-    share = np.zeros(n * (n + 1) // 2 + 1)
-    share[0] = 1.0
-    for rank in range(1, n + 1):
-        share[rank:] += share[: share.size - rank].copy()
-        share /= 2
-    return np.cumsum(share[::-1])[::-1]

@@ -16,7 +16,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing, slug
 from smc_mujoco.common.text import number
 from smc_mujoco.problems import suite
-from smc_mujoco.problems.results import MEASURE, TITLES, WORDS, Board, Results, sound
+from smc_mujoco.problems.results import MEASURE, TITLES, WORDS, QuestionBoard, Results, sound
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -92,7 +92,7 @@ def _environment() -> "Environment":
     return made
 
 
-def scale(board: Board, rank: float) -> float:
+def scale(board: QuestionBoard, rank: float) -> float:
     """Return where a rank lies in a board's picture, % from the left."""
     return round(100.0 * (rank - 0.5) / max(len(board.standings), 1), 2)
 
@@ -116,7 +116,7 @@ def extremes(found: Results, name: str) -> Mapping[str, list[tuple[str, str, int
     medians = found.entries[name].medians
     rows = []
     for question in found.boards():
-        ranks = found.ranks(question, names)[names.index(name)]
+        ranks = found.ranks(question)[names.index(name)]
         for cell, rank in zip(found.on(question), ranks, strict=True):
             rows.append((question, cell, int(np.ceil(rank)), medians[cell][MEASURE[question]]))
     rows.sort(key=lambda row: row[2])

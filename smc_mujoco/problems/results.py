@@ -7,7 +7,9 @@ compared.
 
 There is no single number. A board is a question: accuracy under forces, accuracy under sensors,
 speed, calm. An entry has the mean rank of its medians over the board's problems, with an interval
-over problems, and the share of the targets that it reaches and keeps.
+over problems, and the share of the targets that it reaches and keeps. Ranks and tests are those of
+`analysis.ranking`, with the problems as units: an entry is better than another if the ratio of
+their medians says so over the problems.
 """
 
 import functools
@@ -22,6 +24,8 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis import ranking
+from smc_mujoco.analysis.bootstrap import LEVEL, draws
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Fields, Names, Numbers
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import named_data
@@ -43,8 +47,6 @@ WORDS = {
     "settling": "settling time",
     "calm": "variation of u",
 }
-DRAWS = 4000  # resamples of the problems
-LEVEL = 90.0  # %, of the intervals
 CHANGE = 0.01  # a median that changes by less counts as the same; chosen
 MOMENTS = 81  # of a curve of targets
 CURE = "enter the law again"
@@ -87,14 +89,14 @@ class Standing:
     entry: str
     place: int
     rank: float  # the mean over the problems, 1 is best
-    low: float  # ends of the interval over problems
+    low: float  # ends of its 95 % interval over problems
     high: float
-    level: bool  # with the first: the interval of the difference of their ranks holds 0
+    best: bool  # whether no other entry is better
     reached: float  # share of the targets of all runs that are reached and kept
 
 
 @named_data
-class Board:
+class QuestionBoard:
     """A question and the entries' places."""
 
     question: str
@@ -106,11 +108,8 @@ class Board:
         lines = [f"{title}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"]
         for one in self.standings:
             rank = f"{one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}]"
-            if one.level and one.place > 1:
-                level = " level"
-            else:
-                level = ""
-            lines.append(f"{one.place:>3} {one.entry:<28} {rank} {100 * one.reached:4.0f} %{level}")
+            star = "*" if one.best else ""
+            lines.append(f"{one.place:>3} {one.entry:<28} {rank} {100 * one.reached:4.0f} %{star}")
         return "\n".join(lines)
 
 
@@ -176,7 +175,7 @@ class Results:
         for cell in self.problems:
             for question in suite.boards(cell):
                 self._informing[question].append(cell)
-        self._boards: dict[str, Board] = {}
+        self._boards: dict[str, QuestionBoard] = {}
 
     def __repr__(self) -> str:
         return f"results of {len(self.entries)} entries on {self.title}"
@@ -192,55 +191,61 @@ class Results:
         """Return the problems that inform a board."""
         return self._informing[question]
 
-    def ranks(self, question: str, names: Sequence[str]) -> Array:
-        """Return the ranks of entries on each problem of a board, (entries, problems); equal
-        medians share a rank.
+    def medians(self, question: str) -> Array:
+        """Return the medians of all entries on each problem of a board, (entries, problems); inf
+        where an entry has none.
         """
-        from scipy.stats import rankdata
-
         medians = []
-        for name in names:
-            of_entry = self.entries[name].medians
-            medians.append([of_entry[cell][MEASURE[question]] for cell in self.on(question)])
-        return rankdata(np.array(medians), axis=0)
+        for entry in self.entries.values():
+            medians.append([entry.medians[cell][MEASURE[question]] for cell in self.on(question)])
+        return np.nan_to_num(np.array(medians), nan=np.inf, posinf=np.inf)
 
-    def boards(self) -> dict[str, Board]:
-        """Return question -> Board, of the questions that the suite's problems inform."""
+    def ranks(self, question: str) -> Array:
+        """Return the ranks of all entries on each problem of a board, (entries, problems); medians
+        that differ by no more than what is relevant share a rank.
+        """
+        medians = self.medians(question)
+        return ranking.ranks_by_block(np.isinf(medians), medians)
+
+    def boards(self) -> dict[str, QuestionBoard]:
+        """Return question -> board, of the questions that the suite's problems inform."""
         return {question: self.board(question) for question in MEASURE if self.on(question)}
 
-    def board(self, question: str) -> Board:
+    def board(self, question: str) -> QuestionBoard:
         """Return the board of a question, the best entry first."""
         find("board", question, MEASURE)
         if question not in self._boards:
-            standings = tuple(self._places(question, list(self.entries)))
+            standings = tuple(self._places(question))
             problems = tuple(self.on(question))
-            self._boards[question] = Board(
+            self._boards[question] = QuestionBoard(
                 question=question, problems=problems, standings=standings
             )
         return self._boards[question]
 
-    def _places(self, question: str, names: Sequence[str]) -> list[Standing]:
-        """Return the places of entries on a board, the best first."""
-        ranks = self.ranks(question, names)
+    def _places(self, question: str) -> list[Standing]:
+        """Return the places of the entries on a board, the best first."""
+        names = list(self.entries)
+        medians = self.medians(question)
+        ranks = self.ranks(question)
+        compared = ranking.Comparison(dict(zip(names, medians, strict=True)))
+        unbeaten = set(np.array(compared.laws)[~compared.worse[:, 0]])
+        best = np.array([name in unbeaten for name in names])
         count = ranks.shape[1]
-        means = ranks.mean(axis=1)
-        draws = np.random.default_rng(0).integers(count, size=(DRAWS, count))
-        drawn = ranks[:, draws].mean(axis=2)  # (entries, DRAWS)
-        order: list[int] = np.argsort(means, kind="stable").tolist()
-        tails = (50.0 - LEVEL / 2, 50.0 + LEVEL / 2)
+        tails = 50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)
+        ends = np.percentile(ranks @ draws(count) / count, tails, axis=1)
+        placed = ranking.placed(names, ranks, np.isinf(medians), best)
         standings = []
-        for i in order:
-            low, high = np.percentile(drawn[i], tails).tolist()
-            behind = drawn[i] - drawn[order[0]]
+        for one in placed:
+            low, high = ends[:, names.index(one.law)].tolist()
             standings.append(
                 Standing(
-                    entry=names[i],
-                    place=1 + int((means < means[i] - 1e-9).sum()),
-                    rank=float(means[i]),
+                    entry=one.law,
+                    place=1 + sum(other.place < one.place for other in placed),
+                    rank=one.mean,
                     low=low,
                     high=high,
-                    level=bool(np.percentile(behind, tails[0]) <= 0.0),
-                    reached=float(self.curve(names[i], question)[1][-1]),
+                    best=one.best,
+                    reached=float(self.curve(one.law, question)[1][-1]),
                 )
             )
         return standings

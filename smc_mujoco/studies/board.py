@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES
-from smc_mujoco.analysis.ranking import LEVEL_SHARE, POWER, Effect, Rank, min_p
+from smc_mujoco.analysis.ranking import LEVEL_SHARE, Effect, Rank, needed_to_rank, needed_to_win
 from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import named_data
@@ -22,7 +22,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 
 LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
-MAX_VISIBLE = 0.995  # a larger lead is called none, but where a law wins
+MAX_LEAD = 0.995  # that is resolved; a larger one is called none
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
@@ -41,13 +41,11 @@ MARKS = {
     "shipped": "Shipped gains come with the package.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
-    "strong=True": "A star or bold type marks a law if no other law is better, all its runs have "
-    "arrived, and the samples are enough to detect a lead.",
+    "strong=True": "A star or bold type marks the laws of which one is the best, with "
+    f"{100 * LEVEL:g} % confidence in each column and condition: no other is better, all their "
+    "runs have arrived, and their samples are enough.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
-    "detectable lead ": "A detectable lead is the least difference from the leader that a paired "
-    f"test finds with {100 * POWER:g} % power. The leader's is measured from its closest rival.",
-    "no detectable": "'No detectable lead': there are too few samples to detect any lead.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
     "initial value; late in the run it is at least half an encoder count, and at least the noise. "
     f"For u and its variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
@@ -59,9 +57,7 @@ LAST = "never", "fails", "not arrived"  # words in place of a value
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval].",
-    "strong=True": "Bold: no other law is better, all runs have arrived, a lead would be detected.",
-    "detectable lead ": f"Detectable lead: the smallest found with {100 * POWER:g} % power.",
-    "no detectable": "No detectable lead: too few samples to detect any lead.",
+    "strong=True": f"Bold: one of these is the best, with {100 * LEVEL:g} % confidence.",
     "below ": "Below a floor: too small to be resolved; such laws are not ranked.",
     "at half": "At half the step: the median with half the physics step.",
 }
@@ -73,6 +69,7 @@ class Entry:
 
     law: str
     interval: Interval  # of its median, or of the share of its runs that settle, over its samples
+    vague: bool  # whether the interval is too wide for the median to say anything
     rank: Rank
     failed: int  # number of its runs that failed, or have no value, such as those that never settle
     runs: int  # number of its runs, equal ones counted once
@@ -80,8 +77,8 @@ class Entry:
 
 
 class Lead(NamedTuple):
-    """The law in front in a block, its closest rival (with the largest p-value), and how they
-    compare.
+    """The law in front in a block, the rival over which its lead is least (by the upper end of the
+    interval), and how they compare.
     """
 
     law: str
@@ -121,7 +118,7 @@ class Block:
     # medians over the seeds; for "settles" the share of runs that do not settle
     medians: Numbers
     lacking: Mapping[str, int]  # number of runs that failed or have no value
-    best: Names  # laws that no other is better than, of which every run has arrived
+    best: Names  # laws that may be the best, see `ranking`
     worse: Names  # laws that another is better than
     below: Names  # laws below the floor, which are not ranked among themselves
     floor: str  # in words, such as "0.01 rad"; "" where it is not known
@@ -133,13 +130,14 @@ class Block:
     # distinct runs in these seeds; in the others every law repeats the result of an earlier one
     runs: int
     level: bool  # whether the `best` laws are all level with each other
-    # the least lead that would have been seen, a share; {} without a test
-    visible: Numbers
+    # the least lead with which one of the `best` would have won, a share; NaN without a test
+    resolves: float
     # medians at the step and at half of it, where they differ much
     by_step: Mapping[str, Pair]
     samples: int  # largest number of any two laws, see `ranking`; for one law, of its runs
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     given: bool  # whether a law has one set of gains
+    few: Mapping[str, int]  # laws that are not ranked, as they have so few sets of gains or runs
     # the laws with default gains, over which no other law is named the winner
     untuned: Names = ()
 
@@ -158,7 +156,7 @@ class Block:
         return ()
 
     @property
-    def unranked(self) -> str:
+    def lowest(self) -> str:
         """That several of the best laws are below the floor; "" if they are not."""
         low = [law for law in self.best if law in self.below]
         if len(low) < 2:
@@ -224,8 +222,8 @@ class Board(Tables):
         return [block.condition for block in self.blocks if block.winner == law]
 
     def losses(self, law: str) -> list[str]:
-        """Return the conditions in which another law is better."""
-        return [block.condition for block in self.blocks if law in block.worse]
+        """Return the conditions in which another law wins."""
+        return [block.condition for block in self.blocks if block.winner not in (law, None)]
 
     @property
     def label(self) -> str:
@@ -247,12 +245,28 @@ class Board(Tables):
 
     @property
     def result(self) -> str:
-        """The winner and its least lead; else where laws win and lose; else why none wins."""
-        where = at_worst = ""
+        """The winner and its least lead; else where laws win and lose; else why none wins. Then
+        which laws are not ranked.
+        """
+        if self.winner or any(map(self.wins, self._laws)):
+            text = self._won
+        else:
+            text = f"no winner; {self._why}"
+        if self.few and not self.too_few:
+            text += f"; {self._not_ranked}"
+        return text
+
+    @property
+    def _laws(self) -> list[str]:
+        return [entry.law for entry in self.entries]
+
+    @property
+    def _won(self) -> str:
+        """The winner and its least lead, or where laws win and lose."""
+        where = at_worst = given = ""
         if len(self.blocks) > 1:
             where = f" in {every(len(self.blocks))} conditions"
             at_worst = "at worst "
-        given = ""
         if any(block.given for block in self.blocks):
             given = ", for these gains"
         if self.winner:
@@ -262,13 +276,10 @@ class Board(Tables):
                 given += f"; {at_worst}its value is {least.words}"
             return f"{self.winner} wins{where}{given}"
         results = []
-        for entry in self.entries:
-            if wins := self.wins(entry.law):
-                lost = joined(self.losses(entry.law)) or "none"
-                results.append(f"{entry.law} wins under {joined(wins)} and loses under {lost}")
-        if results:
-            return f"no law wins{where}; {'; '.join(results)}{given}"
-        return f"no winner; {self._why}"
+        for law in filter(self.wins, self._laws):
+            lost = joined(self.losses(law)) or "none"
+            results.append(f"{law} wins under {joined(self.wins(law))} and loses under {lost}")
+        return f"no law wins{where}; {'; '.join(results)}{given}"
 
     @property
     def _why(self) -> str:
@@ -279,8 +290,8 @@ class Board(Tables):
             return f"no law may win over the default gains of {joined(self.barred)}"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
-        reasons = dict.fromkeys(block.unranked or self.too_few for block in self.blocks)
-        if reason := "; ".join(filter(None, reasons)):
+        reasons = dict.fromkeys(block.lowest or self.too_few for block in self.blocks)
+        if reason := "; ".join(filter(None, reasons)) or self._too_few_to_rank:
             return reason
         if not self.best:
             return "every law is beaten in some condition"
@@ -291,38 +302,24 @@ class Board(Tables):
         """That the best laws are level or statistically indistinguishable, and the largest of the
         least leads that would have been seen; which law is below the floor, where one is.
         """
-        if len(self.best) == 1:
-            return f"{self.best[0]} is undefeated, but does not beat every rival"
-        names = "both laws" if len(self.entries) == 2 else "all laws"
-        if any(self.losses(entry.law) for entry in self.entries):
-            names = joined(self.best)
-        if all(block.level for block in self.blocks):
-            return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         for block in self.blocks:
             if block.lead and block.lead.floor:
-                return (
-                    f"{names} are undefeated; the value of {block.lead.law} is {block.lead.words}"
-                )
-        seen = []
-        for lead in map(self.visible, self.best):
-            if not math.isnan(lead):
-                seen.append(lead)
+                undefeated = f"{joined(self.best)} {_are(self.best)} undefeated"
+                return f"{undefeated}; the value of {block.lead.law} is {block.lead.words}"
+        if len(self.best) == 1:
+            return f"{self.best[0]} is undefeated, but does not beat every rival"
+        names = joined(self.best)
+        if len(self.best) == len(self.entries):
+            names = "both laws" if len(self.entries) == 2 else "all laws"
+        if all(block.level for block in self.blocks):
+            return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
+        seen = [block.resolves for block in self.blocks if not math.isnan(block.resolves)]
         if not seen:
             return f"{names} are statistically indistinguishable"
         least = "no lead"
-        if max(seen) < MAX_VISIBLE:
+        if max(seen) < MAX_LEAD:
             least = f"a lead of {100 * max(seen):.2g} %"
-        return f"{names} are statistically indistinguishable ({least} would be detected)"
-
-    def visible(self, law: str) -> float:
-        """Return the largest, over the blocks, of the least leads that would have been seen, a
-        share; NaN for none.
-        """
-        known = []
-        for block in self.blocks:
-            if law in block.visible:
-                known.append(block.visible[law])
-        return max(known, default=math.nan)
+        return f"{names} are statistically indistinguishable; the runs resolve {least}"
 
     @property
     def barred(self) -> list[str]:
@@ -332,19 +329,62 @@ class Board(Tables):
         return list(dict.fromkeys(law for block in self.blocks for law in block.barred))
 
     @property
+    def few(self) -> dict[str, int]:
+        """The laws that are not ranked in some block -> their number of sets of gains, or runs."""
+        few: dict[str, int] = {}
+        if len(self.entries) > 1:
+            for block in self.blocks:
+                few |= block.few
+        return few
+
+    @property
+    def _samples(self) -> int:
+        """The number of samples in the block with most of them."""
+        return max(block.samples for block in self.blocks)
+
+    @property
     def too_few(self) -> str:
-        """That no block has enough samples for a winner, and how many decide; "" if one has."""
-        largest = max(self.blocks, key=lambda block: block.samples)
-        allowed = (1 - LEVEL) / self.family
-        if 2 * min_p(largest.samples) <= allowed:
+        """That no block has enough samples for a winner, how many are enough, and the cure; "" if
+        one has.
+        """
+        least = needed_to_win(self.family)
+        enough = any(len(block.medians) - len(block.few) > 1 for block in self.blocks)
+        if len(self.entries) < 2 or (enough and self._samples >= least):
             return ""
-        least = next(n for n in itertools.count(1) if 2 * min_p(n) <= allowed)
-        few = "runs"
-        cure = "give more seeds"
-        if largest.sets > 1:
-            few = "sets of gains"
-            cure = "leave out quick, or give `compare` more searches"
-        return f"too few {few} ({largest.samples}) for a verdict, which needs {least}: {cure}"
+        few = self._counted(self._samples)
+        least = max(least, self._samples + 1)
+        return f"{few} cannot rank {len(self.entries)} laws here; {self._cure(least)}"
+
+    @property
+    def _too_few_to_rank(self) -> str:
+        """That a law may win, but no law can be told from the best, and the cure; "" if one can."""
+        least = needed_to_rank(len(self.entries))
+        if self._samples >= least:
+            return ""
+        few = self._counted(self._samples)
+        return f"no law beats all others, and {few} cannot rank them; {self._cure(least)}"
+
+    def _cure(self, least: int) -> str:
+        """How many samples are enough, and how to have them."""
+        cure = f"seeds={least}"
+        if max(block.runs for block in self.blocks) >= least:
+            cure = f"searches={least} in compare"
+        return f"{least} can ({cure})"
+
+    def _counted(self, count: int) -> str:
+        """Return a number of samples, such as "3 sets of gains"."""
+        if any(block.sets > 1 for block in self.blocks):
+            return f"{counted(count, 'set')} of gains"
+        return counted(count, "run")
+
+    @property
+    def _not_ranked(self) -> str:
+        """Which laws are not ranked, and the cure."""
+        words = []
+        for law, count in self.few.items():
+            words.append(f"{law} ({self._counted(count)})")
+        least = min(needed_to_win(self.family), needed_to_rank(len(self.entries)))
+        return f"{joined(words)} {_are(words)} not ranked; {self._cure(least)}"
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, have not arrived, or never reach a time, such as
@@ -378,13 +418,25 @@ class Boards(Tables, list[Board]):
         return won
 
     @property
+    def order(self) -> list[str]:
+        """All laws, by the number of their runs without a value, then by mean rank over all
+        blocks.
+        """
+        standing: dict[str, tuple[int, float]] = {}
+        for board in self:
+            for entry in board.entries:
+                failed, rank = standing.get(entry.law, (0, 0.0))
+                rank += entry.rank.mean * len(board.blocks)
+                standing[entry.law] = failed + entry.failed, round(rank, 9)
+        return sorted(standing, key=lambda law: (standing[law], law))
+
+    @property
     def tables(self) -> list[Tabular]:
         """A table for each group of runs, with what each metric's board says below, and a key below
         the last.
 
         It has a line for each law and a column for each metric. A cell has a median with its
-        interval. The median is marked if no law is better in any block, no run failed, and there
-        are enough runs for a winner.
+        interval. The median is marked if the law may be the best in every block.
         """
         groups: dict[str, list[Board]] = {}
         for board in self:
@@ -394,6 +446,10 @@ class Boards(Tables, list[Board]):
         made = [_table(name, boards) for name, boards in groups.items()]
         notes = *made[-1].notes, *self.failures, key(self, repr(made))
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
+
+
+def _are(things: Sequence[str]) -> str:
+    return "is" if len(things) == 1 else "are"
 
 
 def size(value: float, metric: str) -> str:
@@ -460,21 +516,9 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
 
 
 def _cell(board: Board, entry: Entry) -> Cell:
-    """Return a law's median, strong if no law is better, no run failed and there are enough runs
-    for a winner.
-    """
+    """Return a law's median, strong if the law may be the best in every block."""
     median = size(entry.interval.median, board.metric)
-    visible = board.visible(entry.law)
-    silent = 0  # blocks without a winner in which no lead of the law would have been seen
-    for block in board.blocks:
-        silent += not block.winner and block.visible.get(entry.law, 0.0) >= MAX_VISIBLE
-    blind = board.too_few or silent or board.barred
-    blind = blind or any(block.unranked and entry.law in block.below for block in board.blocks)
     below = [spread(entry.interval, board.metric)]
-    if not math.isnan(visible):
-        below.append(_detects(visible, silent))
-        if 0 < silent < len(board.blocks):
-            below[-1] += f" in {silent} of {len(board.blocks)} conditions"
     for block in board.blocks:
         if entry.law in block.below:
             below.append(f"below {block.floor}")
@@ -484,17 +528,9 @@ def _cell(board: Board, entry: Entry) -> Cell:
     for before, after in changes[:1]:
         step = f"becomes {size(after, board.metric)} at half the step"
         alarms.append(f"{size(before, board.metric)} {step}")
-    best = entry.rank.best and median != "" and not blind
+    says = entry.law == board.winner or not entry.vague
+    best = entry.rank.best and says and median != "" and not board.barred
     return Cell(median, "\n".join(filter(None, below)), best, alarm="\n".join(filter(None, alarms)))
-
-
-def _detects(lead: float, silent: int) -> str:
-    """Return the least lead that would have been seen, such as "detectable lead 24 %"."""
-    if silent:
-        return "no detectable lead"
-    if lead >= MAX_VISIBLE:
-        return f"detectable lead {number(1.0 / (1.0 - lead))}-fold"
-    return f"detectable lead {100 * lead:.2g} %"
 
 
 def _few(boards: Sequence[Board]) -> bool:
@@ -515,10 +551,12 @@ def key(boards: Sequence[Board], tables: str) -> str:
     if last := joined([repr(word) for word in LAST if word in tables]):
         parts.append(f"Every value ranks before {last}.")
     parts.append(
-        "A winner is better than every other law in a paired test, corrected for multiple "
-        "comparisons. A verdict gives the winner's ratio to the statistically closest rival in "
-        "paired runs, with an interval. That ratio differs from the ratio of the medians. A law is "
-        f"ahead if it is better by more than {100 * boards[0].relevant:g} % of the larger value."
+        "A winner is better than every other law in a paired test. In each metric by itself, the "
+        f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all conditions "
+        "of the table; with six metrics, any of six may be wrong. A verdict gives the winner's "
+        f"least lead over its rivals: the ratio in paired runs with a {100 * LEVEL:g} % interval. "
+        "It differs from the ratio of the medians. A law is ahead if it is better by more than "
+        f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")

@@ -1,21 +1,22 @@
 """Leaderboards: comparison of a study's laws on equal runs, with the uncertainty of every number.
 
 A board is one metric in one group of runs. Laws are compared by the rules of `analysis.ranking` in
-each of its blocks, a plant in a condition. The tests are corrected for all blocks of the boards in
-this metric. The winner of a board
-with several blocks wins in every one. The conclusions hold for the plants and conditions of the
-table, over initial states and noise, and over the gains with which the laws ran.
+each of its blocks, a plant in a condition. Winners are corrected for all blocks of the boards in
+this metric. The winner of a board with several blocks wins in every one. The conclusions hold for
+the plants and conditions of the table, over initial states and noise, and over the gains with which
+the laws ran.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import median_of, share_interval
+from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, Columns, Group, Scores
-from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected_limits, linked, ranks
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected, linked, ranks
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
@@ -24,6 +25,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
+MAX_RATIO = 200.0  # of the ends of a median's interval, above which it says nothing; chosen
 Sources = Mapping[str, tuple[Source, ...]]  # law -> those of its gains
 
 
@@ -83,7 +85,7 @@ def leaderboard(
         for i, of_group in enumerate(scores):
             if of_group.blocks:
                 compared[i] = _compared(of_group, ran[i], metric, relevant)
-        limits = corrected_limits([*compared.values()])
+        corrected([*compared.values()])
         family = _family(compared.values())
         for i, comparison in compared.items():
             made[i, metric] = _board(
@@ -91,7 +93,7 @@ def leaderboard(
                 scores[i],
                 ran[i],
                 metric,
-                comparison.limited(limits),
+                comparison,
                 _untuned(sources[i], defaults),
                 sources[i],
                 family,
@@ -118,10 +120,9 @@ def objective_boards(
             halves=runs.halves,
             arrived=runs.arrived,
         )
-    limits = corrected_limits([*compared.values()])
+    corrected([*compared.values()])
     boards = []
-    for plant, alone in compared.items():
-        comparison = alone.limited(limits)
+    for plant, comparison in compared.items():
         untuned = _untuned(sources[plant], defaults)
         sets = {}
         for law, numbers in holdout[plant].sets.items():
@@ -166,7 +167,7 @@ def _board(
     sources: Sources,
     family: int,
 ) -> Board:
-    """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
+    """Return the board of a comparison, whose winners are corrected for `family` blocks."""
     blocks = []
     for at, k in enumerate(scores.blocks):
         floor = paired_runs.floor_words(ran[k], metric)
@@ -230,11 +231,14 @@ def _block(
     changes = {law: comparison.step_change(at, law) for law in comparison.laws}
     medians = dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True))
     lacking = dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True))
-    best = ~comparison.beaten[:, at]
+    best = comparison.best[:, at]
+    units = comparison.units[:, at]
+    few = ~comparison.ranked[:, at]
     runs = int(comparison.seeds[at])
     winner = comparison.winners[at]
     # by failed runs, then by median
     order = sorted(comparison.laws, key=lambda law: (law != winner, lacking[law], medians[law]))
+    unbeaten = [law for law in order if law in laws[best]]
     return Block(
         plant=name[0],
         condition=name[1],
@@ -246,30 +250,33 @@ def _block(
         away=tuple(laws[comparison.away[:, at].any(axis=1)].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=winner,
-        lead=_lead(comparison, at, order, floor),
+        lead=_lead(comparison, at, [law for law in order if law not in laws[few]], floor),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
-        visible=_visible(comparison, at, order),
+        resolves=_resolves(comparison, at, unbeaten),
         by_step={law: change for law, change in changes.items() if change},
         seeds=seeds,
         runs=runs,
         samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
         sets=min(sets[sets > 1].tolist(), default=1),
+        few=dict(zip(laws[few].tolist(), units[few].tolist(), strict=True)),
         given=bool((sets == 1).any()),
         untuned=untuned,
     )
 
 
 def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> Lead | None:
-    """Return how the law in front of a block compares with its closest rival; `order` has the law
-    in front first.
+    """Return the least lead of the law in front of a block, which comes first in `order`, over its
+    rivals.
     """
     if len(order) < 2 or comparison.shares:
         return None
-    first, rival = order[0], _closest(comparison, at, order)
+    first, *rivals = order
+    effects = {rival: comparison.effect(at, first, rival) for rival in rivals}
+    rival = max(rivals, key=lambda rival: effects[rival].high)
     a, b = comparison.laws.index(first), comparison.laws.index(rival)
     lacking = comparison.without_value[:, at]
-    effect = comparison.effect(at, first, rival)
-    if lacking[a] or not effect.samples or comparison.unranked[at, a, b]:
+    effect = effects[rival]
+    if lacking[a] or not effect.samples or comparison.both_below[at, a, b]:
         return None
     lost = ""
     if lacking[b]:
@@ -277,32 +284,14 @@ def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> 
     return Lead(first, rival, effect, floor if effect.below else "", lost)
 
 
-def _closest(comparison: Comparison, at: int, order: Sequence[str]) -> str:
-    """Return the rival of the law in front with the largest p-value, of those with a value in every
-    run if there are some.
+def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float:
+    """Return the least lead of the first of the unbeaten laws with which it would have been seen to
+    be better than all others of them, a share; NaN without a test.
     """
-    first, *rivals = (comparison.laws.index(law) for law in order)
-    complete = [i for i in rivals if not comparison.without_value[i, at]]
-    return comparison.laws[max(complete or rivals, key=lambda i: comparison.p[at, first, i])]
-
-
-def _visible(comparison: Comparison, at: int, order: Sequence[str]) -> dict[str, float]:
-    """Return law -> the least lead that would have been seen between it and the law in front, if
-    all runs of both have values and neither is below the floor; {} without a test.
-
-    For the law in front it is that over its closest rival.
-    """
-    if len(order) < 2 or comparison.shares:
-        return {}
-    first = order[0]
-    seen = {}
-    for law in comparison.laws:
-        rival = law if law != first else _closest(comparison, at, order)
-        lead = comparison.visible(at, first, rival)
-        pair = [comparison.laws.index(first), comparison.laws.index(rival)]
-        if not np.isnan(lead) and not comparison.without_value[pair, at].any():
-            seen[law] = lead
-    return seen
+    seen = [math.nan]
+    if not comparison.shares:
+        seen += [comparison.visible(at, unbeaten[0], rival) for rival in unbeaten[1:]]
+    return max(seen, key=lambda lead: (not math.isnan(lead), lead))
 
 
 def _entries(
@@ -321,6 +310,7 @@ def _entries(
             Entry(
                 law=rank.law,
                 interval=interval,
+                vague=not comparison.shares and _vague(interval, comparison.floors.min()),
                 rank=rank,
                 failed=int(comparison.without_value[at].sum()),
                 runs=int((~np.isnan(values)).sum()),
@@ -328,3 +318,8 @@ def _entries(
             )
         )
     return tuple(entries)
+
+
+def _vague(interval: Interval, floor: float) -> bool:
+    """Return whether a median is not known within a factor of MAX_RATIO."""
+    return interval.high > MAX_RATIO * max(interval.low, floor)

@@ -3,12 +3,11 @@
 A need is a metric to compare, such as "fast", or a property that each law must have, such as
 "continuous". A law that settles in less than half as many runs of a condition as the law that
 settles most often is not compared, because a law that does nothing would be the calmest. The others
-stand by the number of their runs that fail, then by their mean rank over all needs and conditions.
-This order is not tested; the last line of the answer says how sure it is.
+stand by the number of their runs that fail, then by their mean rank over all needs and conditions,
+see `Boards.order`. This order is not tested; the last line of the answer says how sure it is.
 """
 
 import dataclasses
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -103,7 +102,7 @@ class Advice(Tables):
         blocks = sum(len(board.blocks) for board in boards)
         wins = sum(len(board.wins(name)) for board in boards)
         losses = sum(len(board.losses(name)) for board in boards)
-        text = f"it wins {wins} of {blocks} comparisons, and another law is better in {losses}"
+        text = f"it wins {wins} of {blocks} comparisons, and another law wins {losses}"
         if wins:
             return text
         return f"first so far; {text}"
@@ -210,14 +209,14 @@ def which(
     if brief and len(chosen) > FINALISTS:
         first = trial._replace(searches=1).candidates({machine.name: chosen})
         _, boards = judged(trial.run(first, min(FEW, seeds), half_steps=False))
-        best = _order(boards)[:FINALISTS]
+        best = boards.order[:FINALISTS]
         left_out = [law.name for law in chosen if law.name not in best]
         chosen = [law for law in chosen if law.name in best]
     candidates = trial.candidates({machine.name: chosen})
     table = trial.run(candidates, seeds)
     settles, boards = judged(table)
     found = {law.name: law for law, _, _ in candidates[machine.name]}
-    ordered = tuple(found[name] for name in _order(boards))
+    ordered = tuple(found[name] for name in boards.order)
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles, left_out=left_out)
 
 
@@ -285,14 +284,3 @@ def _fit(table: Table) -> tuple[dict[str, float], list[str]]:
     enough = np.all(shares >= MIN_SETTLED * shares.max(axis=0), axis=1)
     least = dict(zip(names, shares.min(axis=1).tolist(), strict=True))
     return least, np.array(names)[enough].tolist() or names
-
-
-def _order(boards: Boards) -> list[str]:
-    """Return the laws by the number of their failed runs, then by mean rank over all blocks."""
-    failed: dict[str, int] = defaultdict(int)
-    rank: dict[str, float] = defaultdict(float)
-    for board in boards:
-        for entry in board.entries:
-            failed[entry.law] += entry.failed
-            rank[entry.law] += entry.rank.mean * len(board.blocks)
-    return sorted(rank, key=lambda law: (failed[law], round(rank[law], 9), law))

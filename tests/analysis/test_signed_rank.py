@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from smc_mujoco.analysis import ranking
-from smc_mujoco.analysis.ranking import interval, p_values
+from smc_mujoco.analysis import signed_rank
+from smc_mujoco.analysis.signed_rank import interval, p_values
 
 pytestmark = pytest.mark.quick
 
@@ -72,7 +72,7 @@ def test_an_interval_has_the_centres_that_the_test_does_not_reject(error):
 def test_more_samples_than_are_enumerated_have_the_normal_approximation(monkeypatch):
     differences = np.random.default_rng(6).standard_normal(61) + 0.2
     approximate = p_values(differences)
-    monkeypatch.setattr(ranking, "MAX_EXACT", 61)
+    monkeypatch.setattr(signed_rank, "MAX_EXACT", 61)
     assert 0.0 < abs(approximate - p_values(differences)) < 1e-3
 
 

@@ -207,7 +207,7 @@ def made(medians):
     return found
 
 
-def test_equal_laws_are_level_and_a_better_one_is_first():
+def test_equal_entries_share_a_place_and_one_that_is_better_is_first():
     middle = np.linspace(0.1, 1.0, 30)
     board = made(
         {
@@ -219,7 +219,7 @@ def test_equal_laws_are_level_and_a_better_one_is_first():
     ).board("speed")
     places = {}
     for one in board.standings:
-        places[one.entry] = (one.place, one.rank, one.level)
+        places[one.entry] = (one.place, one.rank, one.best)
     assert places == {
         "c": (1, 1.0, True),
         "a": (2, 2.5, False),
@@ -228,7 +228,7 @@ def test_equal_laws_are_level_and_a_better_one_is_first():
     }
     close = made({"a": middle, "b": middle * np.where(np.arange(30) % 2, 0.9, 1.1)}).board("speed")
     for one in close.standings:
-        assert one.level
+        assert one.best
 
 
 def test_a_change_says_where_and_by_how_much():

@@ -13,6 +13,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
 from smc_mujoco.studies import which as module
+from smc_mujoco.studies.board import Boards
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 SLOW = smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
@@ -59,10 +60,10 @@ def test_laws_stand_by_their_mean_rank_and_doing_nothing_is_not_compared(advice)
 def test_a_law_whose_runs_fail_comes_after_one_whose_runs_do_not(advice):
     fast, calm = advice.leaderboard
     first, *others = fast.entries
-    assert module._order([fast, calm])[0] == first.law
+    assert Boards([fast, calm]).order[0] == first.law
     failing = dataclasses.replace(first, failed=first.failed + 99)
     changed = dataclasses.replace(fast, entries=(failing, *others))
-    assert module._order([changed, calm])[-1] == first.law
+    assert Boards([changed, calm]).order[-1] == first.law
 
 
 def test_the_answer_has_four_lines_and_counts_comparisons(advice):
@@ -71,7 +72,7 @@ def test_the_answer_has_four_lines_and_counts_comparisons(advice):
         "Use: observer_free",
         "Gains: lam=6, k1=2, yours",
         f"Second: {SLOW}",
-        f"Evidence: it wins {wins} of 4 comparisons, and another law is better in 0",
+        f"Evidence: it wins {wins} of 4 comparisons, and another law wins 0",
     ]
     assert advice.tables[-1].notes[-4:] == advice.answer
 
@@ -85,7 +86,7 @@ def test_what_cannot_be_decided_is_said(advice, folder):
         duration=2.5,
         seeds=3,
     )
-    assert few.answer[3].startswith("Evidence: first so far; too few runs (3) ")
+    assert few.answer[3].startswith("Evidence: first so far; 3 runs cannot rank 2 laws here; 7 can")
     same = smc.which("duffing", laws=[FAST, FAST.named("same")], out=folder, **COMMON)
     assert same.answer[3].startswith("Evidence: first so far; it wins 0 of 6 comparisons, ")
     alone = smc.which("duffing", laws=FAST, out=folder, **COMMON)

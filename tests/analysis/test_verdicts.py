@@ -1,0 +1,106 @@
+"""How often verdicts are wrong, that they are found where there is a winner, and that a law which
+is added changes nothing that is said of the others but what it must.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.tables import table_of
+
+from smc_mujoco.analysis.ranking import Comparison, needed_to_rank, needed_to_win
+from smc_mujoco.studies.leaderboard import leaderboard
+
+SETS = 12
+
+
+def drawn(rng, centres, spread: float, blocks: int = 1, stuck: float = 0.1) -> dict:
+    """Return law -> (blocks, 12) of laws with these centres of the logarithm. Half of a search's
+    variance is the same in all blocks; one in ten is stuck at twice the value.
+    """
+    scores = {}
+    for i, centre in enumerate(centres):
+        of_set = rng.normal(size=(1, SETS))
+        of_run = rng.normal(size=(blocks, SETS))
+        late = math.log(2.0) * (rng.random((1, SETS)) < stuck)
+        scores[f"law{i:02}"] = np.exp(centre + spread * (of_set + of_run) / math.sqrt(2.0) + late)
+    return scores
+
+
+@pytest.mark.parametrize("laws", [2, 4, pytest.param(16, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("spread", [0.02, 0.2])
+def test_of_twins_few_win_and_few_are_taken_for_worse(laws, spread):
+    """5 % of tables may have a winner, and a twin may be beaten in 5 % of blocks."""
+    rng = np.random.default_rng(laws)
+    won = lost = 0
+    for _ in range(100):
+        found = Comparison(drawn(rng, [0.0] * laws, spread, blocks=2))
+        won += any(found.winners)
+        lost += found.worse[0].sum()
+    assert won <= 5
+    assert lost <= 10
+
+
+def test_a_law_that_is_better_than_fifteen_others_by_half_wins_with_twelve_sets():
+    rng = np.random.default_rng(1)
+    named = 0
+    for _ in range(10):
+        found = Comparison(drawn(rng, [0.0, *[math.log(1.5)] * 15], 0.1, blocks=3, stuck=0.0))
+        named += found.winners.count("law00")
+        assert set(found.winners) <= {"law00", None}
+    assert named >= 27  # of 30
+
+
+def test_six_sets_name_a_winner_of_one_block_among_any_number_of_laws():
+    scores = drawn(np.random.default_rng(2), [0.0, *[1.5] * 20], 0.02)
+    for sets, winner in ((6, "law00"), (5, None)):
+        found = Comparison({law: values[:, :sets] for law, values in scores.items()})
+        assert found.winners == [winner]
+        # where none wins, so few say nothing of any law
+        assert found.best.sum() == (winner is not None)
+
+
+def test_the_units_that_are_needed():
+    assert [needed_to_win(blocks) for blocks in (1, 4, 12, 102, 103)] == [6, 8, 9, 12, 13]
+    assert [needed_to_rank(laws) for laws in (2, 16, 41)] == [9, 9, 10]  # 5 % / 15, 5 % / 40
+
+
+def test_a_law_with_few_sets_of_gains_takes_no_other_s_verdict_along():
+    """Three sets of a law that is 16 times worse left the winner of J without a verdict."""
+    scores = drawn(np.random.default_rng(3), [0.0, 0.5, 2.8], 0.02)
+    sets = {law: np.arange(SETS)[None] for law in scores}
+    sets["law02"] = np.arange(SETS)[None] % 3
+    found = Comparison(scores, sets=sets)
+    assert found.ranked.tolist() == [[True], [True], [False]]
+    assert found.winners == ["law00"]
+    assert found.best.tolist() == [[True], [False], [False]]
+    assert found.worse.tolist() == [[False], [True], [False]]
+
+
+def cells(boards) -> dict:
+    """Law -> its cells."""
+    found: dict = {}
+    for table in boards.tables:
+        for name, *row in table.rows:
+            found.setdefault(name.text, []).extend(row)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_law_that_is_beaten_changes_no_other_cell(seed):
+    """And one of several that may be the best changes nothing but stars."""
+    rng = np.random.default_rng(seed)
+    scores = drawn(rng, rng.normal(0.0, 0.5, 6), 0.15, blocks=3)
+    table = table_of(scores)
+    boards = leaderboard(table, ["itae"], by=("plant", "condition"))
+    before = cells(boards)
+    beaten = 0
+    for law in scores:
+        rest = table.taken(table.column("law") != law)
+        after = cells(leaderboard(rest, ["itae"], by=("plant", "condition")))
+        for rival, row in after.items():
+            for own, old, new in zip(before[law], before[rival], row, strict=True):
+                assert new._replace(strong=old.strong) == old
+                assert new == old or own.strong
+                beaten += not own.strong
+    assert beaten > 20
