@@ -424,10 +424,9 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
         overall = verdicts[statement.rivals]
         rivals = f"{statement.rivals} gains of the other laws"
         sentence = f"Decided by a search over the law's gains, with {rivals}."
-        flips = False
     else:
         overall, sentence = combined(verdicts, statement.quantifier, statement.over)
-        flips = len(set(verdicts.values())) > 1
+    flips = len(set(verdicts.values())) > 1
     if statement.whose == OURS:
         overall = ANSWERS[overall]
         verdicts = {name: ANSWERS[kind] for name, kind in verdicts.items()}
