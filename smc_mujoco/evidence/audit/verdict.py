@@ -365,6 +365,16 @@ def summary(claims: Sequence[Claim]) -> str:
     return "; ".join(parts)
 
 
+def over_gains(claims: Sequence[Claim]) -> str:
+    """Return a sentence on how many supported sentences hold under every set of gains."""
+    supported = [one for one in claims if one.whose == PAPER and one.verdict == SUPPORTED]
+    same = sum(not claim.flips for claim in supported)
+    return (
+        f"Of the paper's {len(supported)} supported sentences {same} hold under every set of gains "
+        f"that was run, and {len(supported) - same} under some."
+    )
+
+
 def _marked(counts: Mapping[str, int]) -> str:
     """Return counts of verdicts with their marks; "none" without any."""
     return ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items()) or "none"

@@ -31,9 +31,9 @@ def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
             _print_claim(claim, console)
     else:
         console.print(_claims_overview(claims))
-    flips = sum(claim.flips for claim in claims)
-    totals = f"{capital(verdicts.summary(claims))}; depend on the gains: {flips}"
-    console.print(Text(totals), highlight=False)
+    console.print(Text(f"{capital(verdicts.summary(claims))}."), highlight=False)
+    if any(len(claim.verdicts) > 1 for claim in claims):
+        console.print(Text(verdicts.over_gains(claims)), highlight=False)
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:

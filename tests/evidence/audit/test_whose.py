@@ -5,6 +5,7 @@ set of them.
 import pytest
 
 from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.verdict import over_gains
 
 pytestmark = pytest.mark.quick
 
@@ -168,6 +169,8 @@ def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_besid
     (found,) = audit(written(data)).claims
     (beside,) = {"paper", "other"} - {rivals}
     assert (found.verdict, found.flips, found.verdicts[beside]) == (verdict, True, "refuted")
+    count = int(verdict == "supported")
+    assert over_gains([found]).startswith(f"Of the paper's {count} supported sentences 0 hold")
     assert "sets of gains tried" not in found.beside[beside]
     if verdict == "not shown":
         assert found.beside[rivals]["sets of gains tried"] == 51
