@@ -2,6 +2,7 @@
 dry friction holds.
 """
 
+import copy
 import functools
 import math
 
@@ -11,6 +12,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
+from smc_mujoco.mechanisms.layout import loaded, posed
 from smc_mujoco.mechanisms.plant import Plant
 
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
@@ -90,11 +92,9 @@ def softness_warnings(label: str, made: Plant) -> list[str]:
     """Return warnings: a sentence on joint limits, contacts and equality constraints that give way
     to a blow of 1 rad/s (m/s) by more than MAX_GIVE, and one on dry friction that creeps.
     """
-    model = made.load()
+    model = copy.copy(loaded(made))
     model.opt.timestep = TEST_STEP
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data = posed(model, made.x0)
     mujoco.mj_forward(model, data)
     if model.opt.disableflags & FLAGS.mjDSBL_CONSTRAINT.value:
         return []
@@ -158,13 +158,18 @@ def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[st
     creep = np.max(slack * data.efc_frictionloss[dry], initial=0.0)
     if not creep > MAX_CREEP:
         return []
+    joints = model.dof_solref[model.dof_frictionloss > 0.0]
+    tendons = model.tendon_solref_fri[model.tendon_frictionloss > 0.0]
+    of_file = not np.all(np.vstack([joints, tendons]) == HARD_SOLREF)
     # what it holds once the soft constraints have given way
     model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
     mujoco.mj_forward(model, data)
     under = np.max(slack * np.abs(data.efc_force[dry]))
+    at_start = f"by {under:.2g} rad/s (m/s) under the weight at the start, and "
+    cure = 'nothing creeps without contacts (<flag contact="disable"/>)'
+    if of_file:
+        cure = "leave out the solreffriction in the file"
     return [
-        f"the dry friction of {label} creeps by {under:.2g} rad/s (m/s) under the weight at the "
-        f"start, and by {creep:.2g} where it holds all that it can: leave out the "
-        "solreffriction in the file if there is one; else nothing creeps without contacts "
-        '(<flag contact="disable"/>)'
+        f"the dry friction of {label} creeps {at_start if under > MAX_CREEP else ''}"
+        f"by {creep:.2g} rad/s (m/s) where it holds all that it can: {cure}"
     ]

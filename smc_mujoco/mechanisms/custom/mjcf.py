@@ -6,7 +6,9 @@ compiles each model once in a child process, with bounds on time and memory. Tha
 hundredths of a second.
 """
 
+import contextlib
 import dataclasses
+import functools
 import glob
 import hashlib
 import os
@@ -50,6 +52,10 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
 }
 OF_A_PART = "not found", "invalid qpos size", "mujocoinclude"  # words on a file that is no model
 
+MAX_KEPT = 16  # models that are kept as they were read; chosen
+Stamp = dict[str, tuple[int, int]]  # file -> time of its last change, ns, and size
+
+_stamps: dict[str, Stamp] = {}  # of a hash, when it was taken
 _passed: set[str] = set()  # hashes of models that passed
 _known: dict[str, Path] = {}  # hash of a file that this process has read -> where it was
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
@@ -73,8 +79,20 @@ class Source:
         roots = _elements(self.text)[:1]
         return f"{(roots and roots[0].get('model')) or 'model'}.xml"
 
+    def spec(self) -> mujoco.MjSpec:
+        """Return the model as an editable MjSpec of one's own.
+
+        The file is parsed once. A change of it is an error.
+        """
+        spec = _parsed(self)
+        if self.path and not _unchanged(self):
+            raise ScenarioError(
+                f"{self.path}, or a file that it names, has changed: call smc.plant_from again"
+            )
+        return spec.copy()
+
     def read(self) -> mujoco.MjSpec:
-        """Return the model as an editable MjSpec; a free joint without a name has its body's."""
+        """Parse the model; a free joint without a name has its body's."""
         try:
             if not self.path:
                 included = {}
@@ -90,10 +108,6 @@ class Source:
                 spec = mujoco.MjSpec.from_file(self.path)
         except ValueError as error:
             raise broken(self.path or self.label, str(error)) from None
-        if self.path and digest(Path(self.path)) != self.sha256:
-            raise ScenarioError(
-                f"{self.path}, or a file that it names, has changed: call smc.plant_from again"
-            )
         taken = {joint.name for joint in spec.joints}
         for joint in spec.joints:
             if (
@@ -110,6 +124,18 @@ class Source:
             return mjcb.compiled(spec, _built)
         except ValueError as error:
             raise broken(self.path or self.label, str(error)) from None
+
+
+@functools.lru_cache(maxsize=MAX_KEPT)
+def _parsed(source: Source) -> mujoco.MjSpec:
+    """Return the model of a source, which is shared."""
+    return source.read()
+
+
+@functools.lru_cache(maxsize=MAX_KEPT)
+def as_it_is(source: Source) -> mujoco.MjModel:
+    """Return the model of a source, compiled without an edit, which is shared."""
+    return source.compiled(source.spec())
 
 
 def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -146,9 +172,14 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
         raise ScenarioError(
             f"{path.name} is no model yet: give what xacro {path.name} > FILE.urdf writes"
         )
-    made = Source(str(path), digest(path))
-    _known[made.sha256] = path
-    return made
+    return _of_file(path, digest(path))
+
+
+def _of_file(path: Path, sha256: str) -> Source:
+    """Return the source of a file whose digest is known."""
+    _known[sha256] = path
+    _stamps[sha256] = _stamp(path)
+    return Source(str(path), sha256)
 
 
 def found(name: str, sha256: str) -> Source:
@@ -161,7 +192,7 @@ def found(name: str, sha256: str) -> Source:
     there = [place for place in places if place.is_file()]
     for place in there:
         if digest(place) == sha256:
-            return source(place)
+            return _of_file(Path(os.path.abspath(place)), sha256)
     if there:
         raise ScenarioError(
             f"its model {there[0]}, or a file that it names, has changed since the run: put it back"
@@ -204,7 +235,7 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
     except (ValueError, mujoco.FatalError) as error:
         raise broken("the MjSpec", str(error)) from None
     made = _of_text(text, _assets(spec, text))
-    if lost := _difference(model, made.compiled(made.read())):
+    if lost := _difference(model, made.compiled(made.spec())):
         raise ScenarioError(
             f"the MjSpec loses its {lost} when it is written as XML: "
             "write the file, and give its path"
@@ -344,13 +375,17 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
 
 
 def digest(path: Path) -> str:
-    """Hash the file and every file that it names (includes, attached models, meshes, textures):
-    SHA-256, 64 hex digits.
+    """Hash the file and every file that it names: SHA-256, 64 hex digits."""
+    return _sha256(file.read_bytes() for file in _named_files(path))
 
-    If a name fits files in several folders, all of them are hashed.
+
+def _named_files(path: Path) -> list[Path]:
+    """Return the file and every file that it names: includes, attached models, meshes, textures.
+
+    If a name fits files in several folders, all of them count.
     """
     if made := urdf.read(path):
-        return _sha256(file.read_bytes() for file in (path, *made.meshes.values()))
+        return [path, *made.meshes.values()]
     texts = [path]
     files = {path.resolve(): None}
     names = []
@@ -366,7 +401,30 @@ def digest(path: Path) -> str:
                 files[place.resolve()] = None
                 if place.suffix.lower() in XML:
                     texts.append(place)
-    return _sha256(file.read_bytes() for file in files)
+    return [*files]
+
+
+def _stamp(path: Path) -> Stamp:
+    """Return file -> time of its last change, ns, and size, of the file and all that it names."""
+    stamp = {}
+    for file in _named_files(path):
+        about = file.stat()
+        stamp[str(file)] = about.st_mtime_ns, about.st_size
+    return stamp
+
+
+def _unchanged(source: Source) -> bool:
+    """Return whether a file and those that it names are as when they were hashed."""
+    with contextlib.suppress(OSError):
+        known = _stamps.get(source.sha256, {})
+        now = {file: Path(file).stat() for file in known}
+        if known and all(known[f] == (at.st_mtime_ns, at.st_size) for f, at in now.items()):
+            return True
+    path = Path(source.path)
+    if digest(path) != source.sha256:
+        return False
+    _stamps[source.sha256] = _stamp(path)
+    return True
 
 
 def _sha256(parts: Iterable[bytes]) -> str:

@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.custom.channels import (
     joints_of,
     starts,
 )
-from smc_mujoco.mechanisms.custom.mjcf import Source
+from smc_mujoco.mechanisms.custom.mjcf import Source, as_it_is
 
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
@@ -58,9 +58,12 @@ def at_start(
     source: Source, channels: Pairs, keyframe: str | None
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return the file's model, with a body for each of the file, and its state at the start."""
-    spec = source.read()
-    spec.compiler.fusestatic = False
-    model = source.compiled(spec)
+    spec = source.spec()
+    if spec.compiler.fusestatic:
+        spec.compiler.fusestatic = False
+        model = source.compiled(spec)
+    else:
+        model = as_it_is(source)
     data = mujoco.MjData(model)
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)

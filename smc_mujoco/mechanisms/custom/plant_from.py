@@ -118,10 +118,13 @@ def plant_from(
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     pairs = own.coerce(channels)
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
-    spec = source.read()
-    model = source.compiled(spec)
+    spec = source.spec()
+    model = mjcf.as_it_is(source)
     read = urdf.read(Path(source.path))
-    doubts = [*(read.notes(source.label) if read else ()), *softness_warnings(source.label, made)]
+    doubts = [
+        *(read.notes(source.label, spec) if read else ()),
+        *softness_warnings(source.label, made),
+    ]
     if touches(model):
         doubts += _overlaps(source.label, made, of_urdf=read is not None)
     _, outside = ((), []) if made.pose else own.goals(model, joints_of(pairs), keyframe)
@@ -186,9 +189,8 @@ def _plant(
 ) -> Plant:
     """Return the plant of a model, see `plant_from`."""
     label = source.label
-    spec = source.read()
-    model = source.compiled(spec)
-    title = spec.modelname
+    title = source.spec().modelname
+    model = mjcf.as_it_is(source)
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
     pairs = tuple(

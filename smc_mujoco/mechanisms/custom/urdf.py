@@ -56,11 +56,10 @@ class Urdf(NamedTuple):
             spec.add_exclude(bodyname1=first, bodyname2=second)
         return spec
 
-    def notes(self, label: str) -> list[str]:
-        """Return a sentence on each kind of change to the file."""
+    def notes(self, label: str, spec: mujoco.MjSpec) -> list[str]:
+        """Return a sentence on each kind of change to the file, whose `spec` this is."""
         guessed = []
         moving = set()
-        spec = self.spec()  # bodies have parents while it lives
         for body in spec.bodies[1:]:
             if body.joints or body.parent.name in moving:
                 moving.add(body.name)

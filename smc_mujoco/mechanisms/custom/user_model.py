@@ -36,7 +36,7 @@ class UserModel:
 
     def edited(self) -> mujoco.MjSpec:
         """Return the model without sensors, and with its other joints as wanted."""
-        spec = self.source.read()
+        spec = self.source.spec()
         # tuples may name sensors and motors that are deleted
         while named := [*spec.tuples, *spec.sensors]:
             # MuJoCo 4 also deletes the tuples that name it, so list them again

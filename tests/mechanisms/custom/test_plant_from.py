@@ -2,6 +2,7 @@
 get a sentence.
 """
 
+import collections
 import dataclasses
 import importlib.util
 import math
@@ -617,9 +618,11 @@ def test_dry_friction_that_creeps_is_told_with_its_speed_and_each_cure_holds(kin
     text = hard
     if solref:
         text = re.sub(r'(frictionloss="[39]")', rf'\1 solreffriction="{solref}"', hard)
-    with pytest.warns(smc.errors.ScenarioWarning, match="leave out the solreffriction") as caught:
+    cure = "leave out the solreffriction" if solref else "nothing creeps without contacts"
+    with pytest.warns(smc.errors.ScenarioWarning, match=cure) as caught:
         plant = smc.plant_from(text, joints)
     sentence = next(str(w.message) for w in caught if "creeps" in str(w.message))
+    assert ("solreffriction" in sentence) == bool(solref)
     told, bound = (float(text) for text in re.findall(r"by ([0-9.e-]+)", sentence))
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3))
     assert told == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)
@@ -629,6 +632,54 @@ def test_dry_friction_that_creeps_is_told_with_its_speed_and_each_cure_holds(kin
         warnings.simplefilter("error" if not solref else "ignore")
         held = smc.run(smc.Scenario(plant=smc.plant_from(cured, joints), law="none"))
     assert np.abs(held.v[-1]).max() < (2e-5 if solref else 1e-9)
+
+
+HANGING = """<mujoco><worldbody><body><joint name="j" axis="0 1 0" frictionloss="9"
+ solreffriction="-100 -50"/><geom type="capsule" fromto="0 0 0 0 0 -.4" size=".02" mass="1"/></body>
+</worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
+
+
+@pytest.mark.filterwarnings("always:the dry friction of")
+@pytest.mark.parametrize("x0", [None, 1.2])
+def test_dry_friction_creeps_under_the_weight_where_runs_start(x0):
+    with pytest.warns(smc.errors.ScenarioWarning, match="creeps") as caught:
+        plant = smc.plant_from(HANGING, {"j": smc.Channel(x0=x0)})
+    sentence = next(str(w.message) for w in caught if "creeps" in str(w.message))
+    told = re.search(r"by ([0-9.e-]+) rad/s \(m/s\) under the weight", sentence)
+    if x0 is None:
+        assert told is None  # it hangs, and nothing pulls
+        return
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3))
+    assert float(told[1]) == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)
+
+
+def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeypatch):
+    counts = collections.Counter()
+
+    def counted(owner, name):
+        function = getattr(owner, name)
+
+        def counting(*args, **kwargs):
+            counts[name] += 1
+            return function(*args, **kwargs)
+
+        monkeypatch.setattr(owner, name, counting)
+
+    counted(mjcf, "digest")
+    counted(mjcf.Source, "read")
+    counted(mjcf.Source, "compiled")
+    path = tmp_path / "hanging.xml"
+    path.write_text(HANGING.replace("-.4", f"-.{tmp_path.stat().st_ino}"))  # none that is known
+    plant = smc.plant_from(path, ["j"])
+    assert counts == {"digest": 1, "read": 1, "compiled": 1}
+    scenario = smc.Scenario(plant=plant, law="pid", duration=0.01)
+    smc.run([scenario, dataclasses.replace(scenario, law="classical")])
+    smc.plant_from(path, ["j"], others="locked")
+    assert counts == {"digest": 2, "read": 1, "compiled": 2}  # of the file as edited, the second
+    path.touch()
+    smc.run(scenario)
+    assert counts["read"] == 1
+    assert counts["digest"] == 3
 
 
 @pytest.mark.filterwarnings("always:.* gives way")
