@@ -25,6 +25,7 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
+from smc_mujoco.mechanisms.custom.actuator_kinds import no_motor
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, unit_wrenches
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
@@ -437,7 +438,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
         raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
     elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
-    elif why := _no_motor(model, actuators[0]):
+    elif why := no_motor(model, actuators[0]):
         raise ScenarioError(
             f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}"
         )
@@ -445,28 +446,6 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
         bounds.append(_of_actuator(model, actuators[0]))
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
     return Motor(joint, _limit(gives, CURE, *bounds), tuple(actuators))
-
-
-def _no_motor(model: mujoco.MjModel, i: int) -> str:
-    """Return why an actuator is not a motor; "" if it is one."""
-    if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
-        return "is a servo, a damper or a muscle"
-    if model.actuator_dyntype[i] != NO_DYNAMICS or model.actuator_delay[i]:
-        return "has dynamics or a delay"
-    if (
-        model.actuator_armature[i]
-        or model.actuator_damping[i]
-        or model.actuator_dampingpoly[i].any()
-    ):
-        return "has armature or damping"
-    if (
-        0 <= model.actuator_group[i] <= 30
-        and model.opt.disableactuator >> int(model.actuator_group[i]) & 1
-    ):
-        return "is in a group that actuatorgroupdisable turns off"
-    if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
-        return "has gear or gain 0"
-    return ""
 
 
 def _limit(who: str, cure: str, *ranges: Floats) -> float:
@@ -507,7 +486,7 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
     high = 0.0
     for i in actuators:
         ends = -math.inf, math.inf
-        if not _no_motor(model, i):
+        if not no_motor(model, i):
             ends = _of_actuator(model, i)
         elif model.actuator_forcelimited[i]:
             ends = sorted(model.actuator_gear[i, 0] * model.actuator_forcerange[i])

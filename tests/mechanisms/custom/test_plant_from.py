@@ -682,6 +682,27 @@ def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeyp
     assert counts["digest"] == 3
 
 
+ACTUATORS = {
+    '<dcmotor joint="j" motorconst=".05" resistance="2"/>': "<dcmotor>, whose command is no force",
+    '<position joint="j" kp="9" delay=".01" nsample="12"/>': "<position> .* a delay of 0.01 s",
+    '<motor joint="j" delay=".01" nsample="12"/>': "is a motor, with a delay of 0.01 s",
+    '<intvelocity joint="j" kp="9" actrange="-3 3"/>': "<intvelocity>, .* a speed",
+    '<velocity joint="j" kv="5"/>': "<velocity> servo, .* a speed",
+    '<pid joint="j" kp="9" ki="1"/>': "<pid>",
+    '<cylinder joint="j" area="1"/>': "<cylinder>",
+    '<damper joint="j" kv="5" ctrlrange="0 1"/>': "<damper>",
+    '<general joint="j" dyntype="integrator"/>': "dyntype integrator",
+}
+
+
+@pytest.mark.parametrize("element", ACTUATORS)
+def test_an_actuator_that_is_no_motor_is_called_what_it_is(element):
+    text = HANGING.replace('<motor joint="j"/>', element)
+    with pytest.raises(smc.ScenarioError, match=f"{ACTUATORS[element]}.*motor=True"):
+        smc.plant_from(text, ["j"])
+    assert smc.plant_from(text, {"j": smc.Channel(motor=True)}).driven == 1
+
+
 @pytest.mark.filterwarnings("always:.* gives way")
 @pytest.mark.parametrize("solref", [".02 1", ".04 .5", "-900 -60"])
 def test_a_warning_says_how_far_an_equality_gives_way(solref):
