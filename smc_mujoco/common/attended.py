@@ -18,7 +18,7 @@ from typing import Any
 
 from smc_mujoco.common.interrupts import delay_signals
 
-PATIENCE = 1.0  # s that threads have to end after they were asked to stop: chosen
+PATIENCE = 0.5  # s that threads have to end after they were asked to stop: chosen
 POLL = 0.05  # s between looks at the signals
 ENDED_BY_CTRL_C = 130  # the exit code of a shell's command that Ctrl-C ended
 
