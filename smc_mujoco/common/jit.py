@@ -482,7 +482,13 @@ def _complete(library: Any) -> bool:
 
 
 class Function:
-    """A compiled C function, kept alive, and its `address`. For `key` see `compiled`."""
+    """A compiled C function, kept alive, and its `address`. For `key` see `compiled`.
+
+    Whether it was `checked` for how it `differs` from its Python is of simulation/agreement.py.
+    """
+
+    checked = False
+    differs = ""
 
     def __init__(self, body: Callable, key: Key | None = None):
         try:

@@ -306,11 +306,14 @@ def compile_part(part: Part, kind: str) -> Function:
 def _compile(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:
     """Return what a compiler makes of these arguments. Its errors begin with the name."""
     try:
-        return compiler(*arguments)
+        made = compiler(*arguments)
     except NotCompilable as error:
         raise NotCompilable(f"{name} does not compile: {error}") from None
     except TypeError:
         raise NotCompilable(f"{name} does not compile: it is not hashable") from None
+    if made.differs:
+        raise NotCompilable(f"{name} {made.differs}")
+    return made
 
 
 def signal_values(s: Signal) -> tuple[float, ...]:

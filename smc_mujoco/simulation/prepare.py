@@ -28,7 +28,7 @@ from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import cfunctions, philox, python_functions, state
+from smc_mujoco.simulation import agreement, cfunctions, philox, python_functions, state
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
@@ -127,8 +127,8 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
 
 
 def _compile(s: Resolved) -> None:
-    """Compile every function of a scenario, for `pack`; NotCompilable names the first that numba
-    refuses.
+    """Compile and check every function of a scenario, for `pack`; NotCompilable names the first
+    that has to be called in Python.
     """
     signals = (
         *dict.fromkeys(s.references),
@@ -138,15 +138,13 @@ def _compile(s: Resolved) -> None:
     for signal in signals:
         cfunctions.signal_values(signal)  # refuses data that compiled code would misread
     for component in filter(None, (*s.law.parts, s.surface, s.velocity)):
-        cfunctions.compile_component(component)
+        agreement.check_component(component, s.plant.n, s.plant.driven)
     if not s.plant.by_mujoco:
         cfunctions.compile_nominal(s.plant)
     for signal in signals:
-        cfunctions.compile_signal(signal)
-    for part, kind in s.acting:
-        cfunctions.compile_part(part, kind)
-    for sensor in s.sensors:
-        cfunctions.compile_part(sensor, "read")
+        agreement.check_signal(signal)
+    for part, kind in (*s.acting, *((sensor, "read") for sensor in s.sensors)):
+        agreement.check_part(part, kind, lambda part=part: part.numbers(run_of(s, part))[0])
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:

@@ -8,6 +8,7 @@ directly.
 
 import contextlib
 import ctypes
+import functools
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -304,7 +305,12 @@ class Memories:
 def of_component(c: Component, s: Resolved) -> PythonFunction:
     """Return a law, a surface or an estimator of a run: for one channel, or for all joints."""
     if c.joint:
-        return _of_joint_law(c, s)
+        return of_joint_law(c, s.plant.n, s.plant.driven, functools.partial(NominalDynamics, s))
+    return of_channel_component(c)
+
+
+def of_channel_component(c: Component) -> PythonFunction:
+    """Return a law of one channel, a surface or an estimator."""
     component = PythonComponent(c, 1)
     memories = Memories(1, c.memory)
     record = Reading if c.kind == "estimator" else Measurement
@@ -317,19 +323,22 @@ def of_component(c: Component, s: Resolved) -> PythonFunction:
     return PythonFunction(body)
 
 
-def _of_joint_law(law: Component, s: Resolved) -> PythonFunction:
-    """Return a law of many joints."""
-    n = s.plant.n
-    component = PythonComponent(law, n, s.plant.driven)
+def of_joint_law(
+    law: Component, n: int, driven: int, dynamics_at: Callable[[np.ndarray, np.ndarray], Any]
+) -> PythonFunction:
+    """Return a law of n joints, of which some are driven; `dynamics_at` makes the nominal mechanism
+    of x and v.
+    """
+    component = PythonComponent(law, n, driven)
     memories = Memories(n, law.memory)
     dtype = stored_dtype(n)
 
     def body(inputs, _, memory):
         component.memory = memories[memory]
         stored = np.ctypeslib.as_array(inputs, (dtype.itemsize // 8,)).view(dtype)[0]
-        dynamics = NominalDynamics(s, stored["x"], stored["v"])
+        dynamics = dynamics_at(stored["x"], stored["v"])
         outputs = np.zeros((2, n))
-        outputs[:, : s.plant.driven] = component.call_joint(measurement_of(stored, dynamics))
+        outputs[:, :driven] = component.call_joint(measurement_of(stored, dynamics))
         return outputs.ravel()
 
     return PythonFunction(body)
