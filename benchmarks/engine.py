@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.engine.form import FAILURE, SCORES
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING
 from smc_mujoco.analysis.engine.group import Group
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.robustness import region_figure
@@ -51,12 +51,12 @@ def scenario(fields: dict, seed: int = 0) -> smc.Scenario:
 def rows_of(group: Group, count: int) -> np.ndarray:
     """Rows of runs that differ in seed and start."""
     rows = np.repeat(group.rows[:1], count, axis=0)
-    x0, bands, seed = group.places.of("x0", "bands", "seed")
+    at = group.layout.row
     n = group.form.n
     starts = np.random.default_rng(1).uniform(0.2, 0.6, (count, n))
-    rows[:, x0 : x0 + n] = starts
-    rows[:, bands : bands + n] = 0.02 * starts.max(axis=1, keepdims=True)
-    rows[:, seed] = np.arange(count)
+    rows[:, at.x0 : at.x0 + n] = starts
+    rows[:, at.bands : at.bands + n] = 0.02 * starts.max(axis=1, keepdims=True)
+    rows[:, SETTING.seed] = np.arange(count)
     return rows
 
 

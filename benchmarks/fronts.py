@@ -46,14 +46,15 @@ import numpy as np
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import scores
-from smc_mujoco.analysis.engine.form import FAILURE, SCORES, Form, row_places, work_places
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING, Form, layout
 from smc_mujoco.analysis.engine.group import Group, why_not
-from smc_mujoco.analysis.engine.scores import own
+from smc_mujoco.analysis.engine.scores import log_in
 from smc_mujoco.analysis.signed_rank import interval
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import BUDGET, OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.search import Task, task_of
+from smc_mujoco.common.jit import inlined
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import catalogue
@@ -178,17 +179,18 @@ def bandwidth(made: Plant) -> float:
 
 def _rms_before(form: Form, at: int) -> tuple[Any, Any]:
     """Return the rms of e over the window before that of rms_error, as long."""
-    X, R = work_places(form).of("sample_x", "r")
-    SAMPLES, EARLY = row_places(form).of("samples", "early")
+    now = layout(form).work.now
 
-    @own
+    @inlined
     def take(row, work, k):
-        length = row[SAMPLES] + 1.0 - row[EARLY]
-        if row[EARLY] - length <= k < row[EARLY]:
-            e = work[X] - work[R]
+        early = row[SETTING.early]
+        length = row[SETTING.samples] + 1.0 - early
+        if early - length <= k < early:
+            sample = log_in(work, now)
+            e = sample.x - sample.r
             work[at] += e * e / length
 
-    return take, own(lambda row, work: math.sqrt(work[at]))
+    return take, inlined(lambda row, work: math.sqrt(work[at]))
 
 
 def sums_of(trace: smc.Trace, window: int) -> list[float]:
@@ -210,7 +212,7 @@ class Bench:
     """The runs of a job: for each instance those of J, then those of the conditions."""
 
     def __init__(self, job: Job):
-        scores.METRICS["rms_before"] = _rms_before  # in each process
+        scores.WRITTEN_OUT["rms_before"] = _rms_before  # in each process
         self.job = job
         self.plant = plant_of(job.plant)
         self.task: Task = task_of(self.plant, smc.law(job.law), GOAL, BUDGET, 0, 1)
@@ -227,10 +229,9 @@ class Bench:
         self.fast = not any(map(why_not, self.cases))
         if self.fast:
             self.group = Group(self.cases, SUMS)
-            EARLY, LATE, SAMPLES = self.group.places.of("early", "late", "samples")
             rows = self.group.rows
-            rows[:, EARLY] = rows[:, SAMPLES] + 1 - self.windows
-            rows[:, LATE] = rows[:, SAMPLES] - self.windows
+            rows[:, SETTING.early] = rows[:, SETTING.samples] + 1 - self.windows
+            rows[:, SETTING.late] = rows[:, SETTING.samples] - self.windows
 
     def _add(self, instance: int) -> None:
         law = self.task.law

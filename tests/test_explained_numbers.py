@@ -16,7 +16,7 @@ from smc_mujoco.analysis.tuning import objective, search, search_space
 from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
 from smc_mujoco.evidence.accuracy import scaling
-from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
+from smc_mujoco.metrics import catalogue, conventions, fold, limit_cycle, tip
 from smc_mujoco.robustness import region_of_attraction as region
 from smc_mujoco.robustness import uncertainty
 from smc_mujoco.robustness import worst_case_search as attack
@@ -87,7 +87,7 @@ SAID = {
         f"throughout the last {part(1 / region.EARLY_PARTS)} of the run",
         f"is a {part(1.0 - outcome.MAX_EARLY_RATIO)} smaller than in the first",
         f"less than {short(outcome.REST_TOLERANCE)} of X",
-        f"throughout the last {percent(conventions.LAST_PART)} of the run",
+        f"throughout the last {percent(fold.LAST_PART)} of the run",
         f"at most {percent(round(outcome.MAX_FINAL_RATIO - 1.0, 9))} larger than in the first",
     ],
     region.basin: [f"V is {region.VELOCITY_RATIO:g} X per second"],
@@ -144,8 +144,8 @@ SAID = {
     ],
     conventions: [
         f"settling band: |e| <= {percent(conventions.SETTLING_BAND)} of the scale",
-        f"the last {percent(conventions.LAST_PART)} of the run",
-        f"the samples with t >= t0 + {1 - conventions.LAST_PART:g} (tK - t0)",
+        f"the last {percent(fold.LAST_PART)} of the run",
+        f"the samples with t >= t0 + {1 - fold.LAST_PART:g} (tK - t0)",
         f"|v| <= {percent(conventions.REST_SHARE)} of the group's largest |v|",
         f"or {short(conventions.REST_SPEED)} rad/s or m/s if that is larger",
     ],

@@ -2,8 +2,9 @@
 
 Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters
 are those of `conventions`. A metric is one decorated function here; `score` and all tables then
-include it. Every metric refuses a trace that diverged or has a NaN (ScenarioError). inf means
-"never".
+include it. If it takes one sample after the other, its row in `@folded` says all of it, and the
+fast engine sums it up as well. Every metric refuses a trace that diverged or has a NaN
+(ScenarioError). inf means "never".
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from smc_mujoco.metrics.conventions import (
     ARRIVAL_BAND,
     ARRIVAL_COUNTS,
     CATALOGUE,
-    ROUNDING,
     SETTLING_BAND,
     UNIT_OF_S,
     Metric,
     approaches,
     error,
+    folded,
     last_exit,
     last_part,
     metric,
@@ -32,11 +33,11 @@ from smc_mujoco.metrics.conventions import (
     scale,
     travels,
 )
+from smc_mujoco.metrics.fold import Fold
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
-TRANSIENT_SHARE = 0.25  # of the run, which rms_error leaves out
 RISE_LEVELS = (0.1, 0.9)  # shares of the way from the start of an approach to the reference
 # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 HIGH_FREQUENCY = 50.0
@@ -180,22 +181,22 @@ def overshoot(trace: Trace) -> float:
     return 100 * worst / scale(trace)
 
 
-@metric("{x}")
+@folded("{x}", Fold("x", "largest"))
 def peak(trace: Trace) -> float:
     """Largest |x| of the run (x, not e)."""
-    return np.abs(trace.x).max()
+    ...
 
 
-@metric("{x}", late=True)
+@folded("{x}", Fold("e", "mean", power=0, part="late"))
 def steady_error(trace: Trace) -> float:
     """|mean of e over the samples of the last part|, worst channel."""
-    return np.abs(error(trace)[last_part(trace)].mean(axis=0)).max()
+    ...
 
 
-@metric("{x}", need="accurate", late=True, error=True)
+@folded("{x}", Fold("e", "largest", part="late"), need="accurate", error=True)
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
-    return np.abs(error(trace)[last_part(trace)]).max()
+    ...
 
 
 @metric("{x}", late=True)
@@ -204,34 +205,32 @@ def ripple(trace: Trace) -> float:
     return np.ptp(error(trace)[last_part(trace)], axis=0).max()
 
 
-@metric("{x}", label="rms error", error=True)
+@folded("{x}", Fold("e", "mean", power=2, part="early"), label="rms error", error=True)
 def rms_error(trace: Trace) -> float:
     """Root mean square of e from a quarter of the run on, worst channel.
 
     Samples t >= t0 + 0.25 (tK - t0) have equal weights. `worst_case` maximises it, because its
     square is smooth.
     """
-    late = trace.t >= trace.t[0] + TRANSIENT_SHARE * (1.0 - ROUNDING) * (trace.t[-1] - trace.t[0])
-    return np.sqrt((error(trace)[late] ** 2).mean(axis=0)).max()
+    ...
 
 
-@metric("({x})^2 s", label="ISE", error=True)
+@folded("({x})^2 s", Fold("e", "integral", power=2), label="ISE", error=True)
 def ise(trace: Trace) -> float:
     """Integral of e^2 dt, summed over the channels (trapezoid)."""
-    return np.trapezoid((error(trace) ** 2).sum(axis=1), trace.t)
+    ...
 
 
-@metric("{x} s", label="IAE", error=True)
+@folded("{x} s", Fold("e", "integral"), label="IAE", error=True)
 def iae(trace: Trace) -> float:
     """Integral of |e| dt, summed over the channels (trapezoid)."""
-    return np.trapezoid(np.abs(error(trace)).sum(axis=1), trace.t)
+    ...
 
 
-@metric("{x} s^2", label="ITAE", need="on-track", error=True)
+@folded("{x} s^2", Fold("e", "integral", timed=True), label="ITAE", need="on-track", error=True)
 def itae(trace: Trace) -> float:
     """Integral of (t - t0) |e| dt, summed over the channels (trapezoid)."""
-    since = trace.t - trace.t[0]
-    return np.trapezoid(since * np.abs(error(trace)).sum(axis=1), trace.t)
+    ...
 
 
 @metric("s", command=True)
@@ -247,47 +246,44 @@ def reaching_time(trace: Trace) -> float:
     return last_exit(trace.t, magnitude, SETTLING_BAND * (magnitude[0] or magnitude.max()))
 
 
-@metric("{u}", label="max |u|", command=True, need="gentle")
+@folded("{u}", Fold("u", "largest"), label="max |u|", need="gentle")
 def max_u(trace: Trace) -> float:
     """Largest |u|, worst channel."""
-    return np.abs(trace.u).max()
+    ...
 
 
-@metric("{u}", command=True)
+@folded("{u}", Fold("u", "largest", change=True))
 def max_step(trace: Trace) -> float:
     """Largest |u[k+1] - u[k]|, worst channel; 0 for a single sample."""
-    return np.abs(np.diff(trace.u, axis=0)).max(initial=0.0)
+    ...
 
 
-@metric("{u}", label="TV", command=True)
+@folded("{u}", Fold("u", "sum", change=True), label="TV")
 def tv(trace: Trace) -> float:
     """Total variation of u: sum of |u[k+1] - u[k]| over the run, worst channel."""
-    return np.abs(np.diff(trace.u, axis=0)).sum(axis=0).max()
+    ...
 
 
-@metric("{u}/s", label="TV rate", command=True, need="calm", late=True)
+@folded(
+    "{u}/s", Fold("u", "sum", part="late", change=True, rate=True), label="TV rate", need="calm"
+)
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 
     Sum of |u[k+1] - u[k]| between samples of the last part, divided by the time from its first to
     its last sample; 0 for a single sample.
     """
-    part = last_part(trace)
-    u = trace.u[part]
-    t = trace.t[part]
-    if t.size < 2:
-        return 0.0
-    return np.abs(np.diff(u, axis=0)).sum(axis=0).max() / (t[-1] - t[0])
+    ...
 
 
-@metric("({u})^2 s", command=True, need="frugal")
+@folded("({u})^2 s", Fold("u", "held", power=2), need="frugal")
 def energy(trace: Trace) -> float:
     """Integral of u^2 dt, summed over the channels.
 
     Sum of u[k]^2 (t[k+1] - t[k]), k < K: exact for the held command. Control effort, not mechanical
     work.
     """
-    return (trace.u[:-1] ** 2).sum(axis=1) @ np.diff(trace.t)
+    ...
 
 
 @metric("1", command=True)
@@ -344,10 +340,10 @@ def stick_time(trace: Trace) -> float:
     return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.holding[1:] != 0.0))).max()
 
 
-@metric("{force}", realistic=True)
+@folded("{force}", Fold("reaction", "largest"), realistic=True)
 def peak_reaction(trace: Trace) -> float:
     """Largest force of friction, contacts, stops and backlash on a joint at a sample."""
-    return np.abs(trace.reaction).max()
+    ...
 
 
 @metric("1/s", realistic=True)

@@ -65,6 +65,7 @@ from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.metrics.fold import Fold, first_sample
 from smc_mujoco.simulation.python_functions import evaluate
 
 if TYPE_CHECKING:
@@ -72,12 +73,10 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
 SETTLING_BAND = 0.02  # of the scale
-LAST_PART = 0.2  # of the run's duration
 LEANS = 0.5  # of the last part, chosen: an honest law has left its bound by then
 ARRIVAL_BAND = 0.1  # of the scale
 ARRIVAL_COUNTS = 5.0  # of what the sensor tells apart
 STRAIGHT = 1e-6  # of the steps of a reference: by less they differ on a straight line
-ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
 # the law's; it follows from that of x, so that metres and radians do not mix
 UNIT_OF_S = "unit of s"
 REST_SHARE = 1e-3  # of the run's largest |v|
@@ -179,6 +178,7 @@ class Metric:
     error: bool = False
     # Value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN
     absent: float = math.nan
+    fold: Fold | None = None  # its row, if it takes one sample after the other
 
     def refusal(self, plant: Plant) -> str:
         """Return why the metric has no single value for the plant, or ""."""
@@ -290,6 +290,23 @@ def metric(
     return enter
 
 
+def folded(unit: str, fold: Fold, **flags: Any) -> Callable[[Callable], Callable[[Trace], float]]:
+    """Return a decorator that enters a fold in the catalogue, by the name and docstring of a
+    function that has nothing else. Flags are other ones of `metric`.
+    """
+
+    def enter(described: Callable) -> Callable[[Trace], float]:
+        @functools.wraps(described)
+        def formula(trace: Trace) -> float:
+            signal = error(trace) if fold.signal == "e" else getattr(trace, fold.signal)
+            return fold.of(trace.t, signal)
+
+        late = fold.part == "late"
+        return metric(unit, fold=fold, late=late, command=fold.signal == "u", **flags)(formula)
+
+    return enter
+
+
 def refuse(trace: Trace) -> None:
     """Raise ScenarioError for anything but a trace of finite signals whose run did not fail."""
     if not has(trace, "scenario"):
@@ -377,10 +394,7 @@ def leans(trace: Trace) -> bool:
 
 def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
-    start, end = trace.t[[0, -1]]
-    return slice(
-        int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None
-    )
+    return slice(first_sample("late", trace.t), None)
 
 
 def travels(trace: Trace) -> bool:

@@ -29,7 +29,7 @@ from smc_mujoco.mechanisms.layout import (
     initial_pose,
     joint_ids,
 )
-from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics import conventions, fold
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
@@ -228,7 +228,7 @@ def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
     }
     if knows_contacts(trace.scenario):
         pressed = contacts(trace)
-        start = FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)
+        start = FORCE_START * (1.0 - fold.ROUNDING) * np.ptp(trace.t)
         late = pressed.force[trace.t >= trace.t[0] + start]
         values["mean_force"] = late.mean()
         if wanted := force or trace.scenario.law.gains.get("force"):

@@ -38,9 +38,9 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
-from smc_mujoco.analysis.engine.form import SCORES
+from smc_mujoco.analysis.engine.form import SCORES, SETTING
 from smc_mujoco.analysis.engine.group import Group, why_not
-from smc_mujoco.analysis.engine.outcome import NAME, over_samples
+from smc_mujoco.analysis.engine.outcome import NAME, over_trace
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
@@ -273,14 +273,14 @@ class _Grid:
         def run(shortened: Scenario, states: Array, final: bool) -> Array:
             made = Group([shortened], (NAME,))
             rows = np.repeat(made.rows, len(states), axis=0)
-            LATE, REACH, X0, V0 = made.places.of("late", "reach", "x0", "v0")
+            at = made.layout.row
             n = self.base.plant.n
-            rows[:, X0 : X0 + n] = states[:, :1]
-            rows[:, V0 : V0 + n] = states[:, 1:]
+            rows[:, at.x0 : at.x0 + n] = states[:, :1]
+            rows[:, at.v0 : at.v0 + n] = states[:, 1:]
             u_max = shortened.resolved.u_max
-            rows[:, REACH : REACH + 4] = _reach(self.x, self.v, u_max, final)
+            rows[:, at.reach : at.reach + 4] = _reach(self.x, self.v, u_max, final)
             if not final:
-                rows[:, LATE] = _early(shortened.samples)
+                rows[:, SETTING.late] = _early(shortened.samples)
             outcome = made.run(rows, self.threads, device)[:, SCORES]
             return np.where(np.isnan(outcome), DOES_NOT, outcome)
 
@@ -293,12 +293,9 @@ def verdict_of(trace: Trace, x: Array, v: Array, final: bool) -> int | None:
     """
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
-    samples = len(trace.t) - 1
-    late = last_part(trace).start if final else _early(samples)
+    late = last_part(trace).start if final else _early(len(trace.t) - 1)
     reach = _reach(x, v, trace.scenario.resolved.u_max, final)
-    signals = trace.x, trace.v, trace.u, trace.r
-    row = np.array([samples, late, *reach])
-    outcome = over_samples(trace.x.shape[1])(row, np.hstack(signals))
+    outcome = over_trace(trace, late, reach)
     return outcome if outcome or final else None
 
 

@@ -8,8 +8,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import cpu, group
-from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES
-from smc_mujoco.analysis.engine.scores import METRICS, RESTING
+from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES, SETTING
+from smc_mujoco.analysis.engine.scores import RESTING, names
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.hardware import RateLimit, Sigmoid
 from smc_mujoco.metrics import catalogue
@@ -52,11 +52,11 @@ def check(plant, law, conditions, duration=10.0):
     base = smc.Scenario(plant=plant, law=law, duration=duration)
     cases = [dataclasses.replace(base, **fields) for fields in conditions.values()]
     moving = not isinstance(cases[0].references[0], smc.Constant)
-    metrics = METRICS.keys() & catalogue.CATALOGUE.keys()
+    metrics = catalogue.CATALOGUE.keys() & set(names())
     metrics = sorted(metrics.difference(RESTING if moving else ()))
     assert not any(group.why_not(case, metrics) for case in cases)
     made = group.Group(cases, metrics)
-    made.rows[:, made.places.at["logging"]] = 1.0
+    made.rows[:, SETTING.logging] = 1.0
     logs = np.full((len(cases), base.samples + 1, base.plant.n, len(LOGGED)), np.nan)
     scores = cpu.run(made.form, made.rows, made.tables, 1, logs)
     near = [_beside(cases, offset) for offset in BESIDE]

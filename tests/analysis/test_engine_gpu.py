@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
-from smc_mujoco.analysis.engine.scores import METRICS
+from smc_mujoco.analysis.engine.scores import names
 from smc_mujoco.control.law import catalogue
 
 with_cuda = pytest.mark.skipif(
@@ -62,7 +62,7 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
 @pytest.mark.parametrize(("plant", "law"), PLANTS)
 def test_every_plant_compiles_for_a_device_with_all_parts(monkeypatch, plant, law):
     friction = FRICTION.get(plant, ())
-    assert ".entry" in code(monkeypatch, plant, law, tuple(METRICS), **FULL, friction=friction)
+    assert ".entry" in code(monkeypatch, plant, law, tuple(names()), **FULL, friction=friction)
 
 
 @with_cuda

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
+from smc_mujoco.analysis.engine.form import SCORES, SETTING, Form, layout
 from smc_mujoco.analysis.engine.loop import simulation
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Array
@@ -27,7 +27,7 @@ def compiled(form: Form) -> Any:
     logs).
     """
     simulate = simulation(form, jit)
-    row_bytes = 8 * row_places(form).size
+    row_bytes = 8 * layout(form).row_size
     score_bytes = 8 * (SCORES + len(form.metrics))
 
     def runs(count, rows, tables, work, scores, logs, log_bytes):
@@ -64,7 +64,7 @@ def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None
         logs = np.zeros((len(rows), 0))
 
     def piece(part: slice) -> None:
-        work = np.zeros(work_places(form).size)
+        work = np.zeros(layout(form).work_size)
         arrays = rows[part], tables, work, scores[part], logs[part]
         made(len(rows[part]), *map(address, arrays), logs[part].strides[0])
 
@@ -85,8 +85,7 @@ def _pieces(form: Form, rows: Array, threads: int) -> Iterator[slice]:
     """Yield the runs of a call: a share for each thread, of at most PIECE_STEPS."""
     if not len(rows):
         return
-    SAMPLES, STEPS = row_places(form).of("samples", "steps")
-    longest = np.max(rows[:, SAMPLES] * rows[:, STEPS]) * form.n
+    longest = np.max(rows[:, SETTING.samples] * rows[:, SETTING.steps]) * form.n
     size = max(1, min(-(-len(rows) // threads), int(PIECE_STEPS // longest)))
     for first in range(0, len(rows), size):
         yield slice(first, first + size)

@@ -1,23 +1,54 @@
-"""What a group of runs is made of: the functions of its loop, and the places of its numbers."""
+"""What a group of runs is made of: the functions of its loop, and the places of its numbers.
+
+A place is an index, of the first number of its kind.
+"""
 
 import dataclasses
 import functools
 from typing import Any, NamedTuple
 
-from smc_mujoco.common.aliases import Fields, Names
+from smc_mujoco.common.aliases import Names
 from smc_mujoco.control.joint_law import stored_dtype
 from smc_mujoco.control.measurement import Measurement
+from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE
+from smc_mujoco.simulation.state import LOG
 
 LOGGED = ("x", "v", "u", "s", "d", "r")  # of a channel at a sample, in a log
 FAILURE, FAILED_STEP, SCORES = range(3)  # places in the scores of a run; metrics follow
-SETTINGS = ("samples", "steps", "step", "period", "delay", "jump_step", "seed", "uses_model")
-SETTINGS += ("sigma_x", "sigma_v", "jitter", "missed", "pause", "pause_samples", "pause_phase")
-SETTINGS += ("early", "late", "logging")
 ACTIVE, STREAM, PARAMETERS = range(3)  # places in the numbers of a signal
-# rest: velocities of 0
-STATE = ("x", "v", "a", "x0", "v0", "sum_v", "sum_a", "applied", "rest", "d")
-MEASURED = ("seen_x", "seen_v", "seen_a")
-SAMPLED = ("sample_x", "sample_v", "sample_d", "u", "s", "r", "last_u", "last_r")
+WIDTH = len(LOG.names or ())  # numbers of a sample of a channel
+STATES = len(CHANNEL_STATE.names or ())
+
+
+class Settings(NamedTuple):
+    """The first numbers of a run's row; most are those of `prepare.settings`."""
+
+    samples: Any  # K: they are counted from 0
+    steps: Any
+    step: Any
+    period: Any
+    delay: Any
+    jump_step: Any
+    seed: Any
+    uses_model: Any
+    sigma_x: Any
+    sigma_v: Any
+    jitter: Any
+    missed: Any
+    pause: Any
+    pause_samples: Any
+    pause_phase: Any
+    fault_step: Any
+    fault_gain: Any
+    fault_bias: Any
+    stuck: Any
+    failing: Any
+    early: Any  # the first sample after the transient
+    late: Any  # the first sample of the last part
+    logging: Any  # whether the run writes a log
+
+
+SETTING = Settings(*range(len(Settings._fields)))  # places
 
 
 class Part(NamedTuple):
@@ -37,88 +68,190 @@ class Form(NamedTuple):
     joint: bool  # whether the law is of many joints
     nominal: Part
     laws: tuple[Part, ...]  # of all channels, or one for each
-    estimators: tuple[Part, ...]  # one
-    surfaces: tuple[Part, ...]  # one or none, as are sensors and drives
-    sensors: tuple[Part, ...]
-    drives: tuple[Part, ...]  # between command and force
+    estimator: Part
+    surface: Part | None
+    sensor: Part | None
+    drive: Part | None  # between command and force
     frictions: tuple[Part, ...]
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
     disturbances: tuple[type, ...]
-    feedforwards: tuple[type, ...]  # one or none
+    feedforward: type | None
     errors: tuple[type | None, ...]  # of position and velocity
     noise: bool
     true_model: bool
     jump: bool
     delay: bool
     clock: bool
+    fails: bool
     slots: int  # commands that are under way
     metrics: Names
 
 
+class PartAt(NamedTuple):
+    """Where a part of a form has its numbers."""
+
+    part: Part
+    address: int  # in the row: of a function in C
+    numbers: int  # in the row: its parameters, of all channels or of each in turn
+    memory: int  # in the state: of each channel in turn
+
+
+class SignalAt(NamedTuple):
+    """Where a signal of a form has its numbers."""
+
+    kind: Any
+    numbers: int  # in the row: ACTIVE, STREAM, its parameters; of a series its place and its length
+    memory: int  # in the state: its last value, and its memory in each channel
+
+
+class RowPlaces(NamedTuple):
+    """Where a run's other numbers are in its row; n of each, where it says no other."""
+
+    x0: int
+    v0: int
+    limits: int
+    bands: int  # within which a channel has settled
+    known: int  # values of the plant, as the law knows them; as many as it has names
+    before: int  # and as they are until a jump
+    after: int
+    damping: int  # this and `levels` only with frictions
+    levels: int  # of dry friction
+    hinges: int  # whether a joint is one; only with a sensor
+    reach: int  # 4 numbers of an `outcome`
+
+
+class WorkPlaces(NamedTuple):
+    """Where a run's state is; n numbers of each, where it says no other."""
+
+    x: int
+    v: int
+    a: int  # of the stages of a step, as are the next four
+    x0: int
+    v0: int
+    sum_v: int
+    sum_a: int
+    rest: int  # velocities of 0
+    motor: int  # force of a drive at a stage
+    d: int  # the disturbances' force
+    seen_x: int
+    seen_v: int
+    seen_a: int
+    now: int  # LOG of each channel
+    before: int  # LOG at the sample before
+    states: int  # CHANNEL_STATE of each channel
+    ring: int  # commands of `slots` samples
+    measured: int  # what a law in C reads
+    commanded: int  # its u and s, 2 n
+
+
+class Layout(NamedTuple):
+    """Where everything of a form is."""
+
+    row: RowPlaces
+    work: WorkPlaces
+    row_size: int
+    work_size: int
+    laws: tuple[PartAt, ...]
+    estimator: PartAt
+    surface: PartAt | None
+    sensor: PartAt | None
+    drive: PartAt | None
+    frictions: tuple[PartAt, ...]
+    references: tuple[SignalAt, ...]
+    disturbances: tuple[SignalAt, ...]
+    feedforward: SignalAt | None
+    errors: tuple[SignalAt | None, ...]
+    metrics: tuple[int, ...]  # places of their numbers in the state
+
+
 class Places:
-    """Indices of named numbers in one array."""
+    """Places that are given one after another."""
 
-    def __init__(self) -> None:
-        self.size = 0
-        self.at: dict[str, int] = {}
-        self.slices: dict[str, slice] = {}
+    def __init__(self, size: int = 0) -> None:
+        self.size = size
 
-    def take(self, name: str, count: int = 1) -> None:
-        """Give the next `count` numbers a name."""
-        self.at[name] = self.size
+    def take(self, count: int = 1) -> int:
+        """Return the first of the next `count` places."""
+        first = self.size
         self.size += count
-        self.slices[name] = slice(self.at[name], self.size)
-
-    def of(self, *names: str) -> list[int]:
-        """Return the first index of each name."""
-        return [self.at[name] for name in names]
+        return first
 
 
 @functools.cache
-def row_places(form: Form) -> Places:
-    """Return where the numbers of a run are in its row."""
-    places = Places()
-    for name in SETTINGS:
-        places.take(name)
-    for name in ("x0", "v0", "limits", "bands"):
-        places.take(name, form.n)
-    for name in ("known", "before", "after"):
-        places.take(name, len(form.nominal.names))
-    for name, part in parts(form).items():
-        places.take(f"{name} address")
-        places.take(name, len(part.names) * (form.n if part.channels else 1))
-    for name in ("damping", "levels"):
-        places.take(name, form.n if form.frictions else 0)
-    places.take("hinges", form.n if form.sensors else 0)
-    for name, kind in signals(form).items():
-        places.take(name, PARAMETERS + len(parameters(kind)) + 2 * kind.series)
-    places.take("reach", 4)
-    return places
+def layout(form: Form) -> Layout:
+    """Return where the numbers of a form's runs are."""
+    row = Places(len(SETTING))
+    work = Places()
+
+    def of_part(part: Part) -> PartAt:
+        width = len(part.names) * (form.n if part.channels else 1)
+        return PartAt(part, row.take(), row.take(width), work.take(part.memory * form.n))
+
+    def of_signal(kind: Any) -> SignalAt:
+        width = PARAMETERS + len(parameters(kind)) + 2 * kind.series
+        return SignalAt(kind, row.take(width), work.take(1 + kind.memory * form.n))
+
+    return Layout(
+        row=_row_places(form, row),
+        work=_work_places(form, work),
+        laws=tuple(map(of_part, form.laws)),
+        estimator=of_part(form.estimator),
+        surface=form.surface and of_part(form.surface),
+        sensor=form.sensor and of_part(form.sensor),
+        drive=form.drive and of_part(form.drive),
+        frictions=tuple(map(of_part, form.frictions)),
+        references=tuple(map(of_signal, form.references)),
+        disturbances=tuple(map(of_signal, form.disturbances)),
+        feedforward=form.feedforward and of_signal(form.feedforward),
+        errors=tuple(kind and of_signal(kind) for kind in form.errors),
+        metrics=tuple(work.take(metric_places(name, form.n)) for name in form.metrics),
+        row_size=row.size,
+        work_size=work.size,
+    )
 
 
-@functools.cache
-def work_places(form: Form) -> Places:
-    """Return where the state of a run is."""
-    places = Places()
-    for name in (*STATE, *MEASURED, *SAMPLED):
-        places.take(name, form.n)
-    places.take("buffer", form.slots * form.n)
-    if any(law.function is None for law in form.laws):
-        places.take("commanded", 2 * form.n)
-        places.take("measured", measured_places(form))
-    for name in ("mean", "motor"):  # forces of the drives
-        if form.drives:
-            places.take(name, form.n)
-        else:
-            places.at[name] = places.at["applied"]
-    places.take("reaction", form.n if form.frictions else 0)
-    for name, part in parts(form).items():
-        places.take(name, part.memory * form.n)
-    for name, kind in signals(form).items():
-        places.take(name, 1 + kind.memory * form.n)
-    for name in form.metrics:
-        places.take(f"metric {name}", metric_places(name, form.n))
-    return places
+def _row_places(form: Form, row: Places) -> RowPlaces:
+    n = form.n
+    values = len(form.nominal.names)
+    return RowPlaces(
+        x0=row.take(n),
+        v0=row.take(n),
+        limits=row.take(n),
+        bands=row.take(n),
+        known=row.take(values),
+        before=row.take(values),
+        after=row.take(values),
+        damping=row.take(n if form.frictions else 0),
+        levels=row.take(n if form.frictions else 0),
+        hinges=row.take(n if form.sensor else 0),
+        reach=row.take(4),
+    )
+
+
+def _work_places(form: Form, work: Places) -> WorkPlaces:
+    n = form.n
+    in_c = any(law.function is None for law in form.laws)
+    return WorkPlaces(
+        x=work.take(n),
+        v=work.take(n),
+        a=work.take(n),
+        x0=work.take(n),
+        v0=work.take(n),
+        sum_v=work.take(n),
+        sum_a=work.take(n),
+        rest=work.take(n),
+        motor=work.take(n),
+        d=work.take(n),
+        seen_x=work.take(n),
+        seen_v=work.take(n),
+        seen_a=work.take(n),
+        now=work.take(WIDTH * n),
+        before=work.take(WIDTH * n),
+        states=work.take(STATES * n),
+        ring=work.take(form.slots * n),
+        measured=work.take(measured_places(form) if in_c else 0),
+        commanded=work.take(2 * n if in_c else 0),
+    )
 
 
 def metric_places(name: str, n: int) -> int:
@@ -131,25 +264,6 @@ def measured_places(form: Form) -> int:
     if form.joint:
         return stored_dtype(form.n).itemsize // 8
     return len(Measurement._fields)
-
-
-def parts(form: Form) -> dict[str, Part]:
-    """Return the functions that act on channels, by the names of their places."""
-    return _named(form, ("laws", "estimators", "surfaces", "sensors", "drives", "frictions"))
-
-
-def signals(form: Form) -> Fields:
-    """Return the kinds of a form's signals, by the names of their places."""
-    return _named(form, ("feedforwards", "references", "disturbances", "errors"))
-
-
-def _named(form: Form, names: Names) -> Fields:
-    found = {}
-    for name in names:
-        for i, item in enumerate(getattr(form, name)):
-            if item is not None:
-                found[f"{name} {i}"] = item
-    return found
 
 
 def parameters(kind: Any) -> Names:

@@ -24,7 +24,7 @@ with extra("gpu", "device 'cuda'"):
     from numba import cuda, float64, njit, types
     from numba.extending import intrinsic
 
-from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
+from smc_mujoco.analysis.engine.form import SCORES, Form, layout
 from smc_mujoco.analysis.engine.loop import simulation
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.numba_internals import cgutils
@@ -47,8 +47,8 @@ def _pointer(typingctx, array):
 def kernel(form: Form) -> Any:
     """Return the kernel of a form in Python, (rows, tables, scores)."""
     simulate = simulation(form, njit(error_model="numpy"))
-    row_size = row_places(form).size
-    work_size = work_places(form).size
+    row_size = layout(form).row_size
+    work_size = layout(form).work_size
     score_size = SCORES + len(form.metrics)
 
     def runs(rows, tables, scores):

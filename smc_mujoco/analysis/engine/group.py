@@ -12,18 +12,21 @@ from smc_mujoco.analysis.engine.form import (
     FAILED_STEP,
     FAILURE,
     SCORES,
-    SETTINGS,
+    SETTING,
     Form,
     Part,
-    row_places,
+    PartAt,
+    Settings,
+    SignalAt,
+    layout,
 )
-from smc_mujoco.analysis.engine.scores import METRICS, RESTING
+from smc_mujoco.analysis.engine.scores import RESTING, summed_up
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.hardware.drives import advanced
-from smc_mujoco.metrics.catalogue import TRANSIENT_SHARE
-from smc_mujoco.metrics.conventions import LAST_PART, ROUNDING, SETTLING_BAND, groups
+from smc_mujoco.metrics.conventions import SETTLING_BAND, groups
+from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.cfunctions import compile_component
 from smc_mujoco.simulation.prepare import known_values, references, run_of, settings
 from smc_mujoco.simulation.run import cores
@@ -32,7 +35,14 @@ from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
 
 # fields in which forms of one key may differ, at their least
-VARYING: Fields = {"noise": False, "jump": False, "delay": False, "clock": False, "slots": 1}
+VARYING: Fields = {
+    "noise": False,
+    "jump": False,
+    "delay": False,
+    "clock": False,
+    "fails": False,
+    "slots": 1,
+}
 
 
 def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu") -> str:
@@ -54,7 +64,6 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         f"its integrator is {s.integrator}": s.integrator != "RK4",
         "a law of many joints, or in C, is for the processor": device == "cuda"
         and any(_part(law).function is None for law in s.law.of_channels(plant.driven)),
-        "an actuator fails": s.fault is not None,
         "a disturbance acts on a body": any(
             d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
         ),
@@ -62,7 +71,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
     }
     moving = not all(isinstance(signal, Constant) for signal in s.references)
     for name in metrics:
-        beyond[f"it does not sum up {name}"] = name not in METRICS
+        beyond[f"it does not sum up {name}"] = not summed_up(name)
         only = f"the engine sums up {name} only for a reference at rest"
         beyond[only] = name in RESTING and moving
     return next((words for words, holds in beyond.items() if holds), "")
@@ -95,20 +104,21 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         joint=s.law.joint,
         nominal=Part(s.plant.nominal, tuple(s.plant.parameters)),
         laws=tuple(laws),
-        estimators=(_part(s.velocity),),
-        surfaces=tuple(map(_part, filter(None, [s.surface]))),
-        sensors=tuple(sensors[:1]),
-        drives=tuple(drives[:1]),
+        estimator=_part(s.velocity),
+        surface=s.surface and _part(s.surface),
+        sensor=sensors[0] if sensors else None,
+        drive=drives[0] if drives else None,
         frictions=tuple(frictions),
         references=tuple(map(type, references(s))),
         disturbances=tuple(Counter(map(type, s.disturbance)).elements()),
-        feedforwards=tuple(map(type, filter(None, [s.feedforward]))),
+        feedforward=s.feedforward and type(s.feedforward),
         errors=tuple(None if error is None else type(error) for error in s.noise.errors),
         noise=bool(s.noise.position or s.noise.velocity),
         true_model=s.model == "true",
         jump=bool(s.jump),
         delay=bool(s.delay_steps),
         clock=clock,
+        fails=s.fault is not None,
         slots=slots,
         metrics=tuple(metrics),
     )
@@ -138,7 +148,7 @@ class Group:
 
     Args:
       scenarios: of one `key`.
-      metrics: what is scored, names of `scores.METRICS`.
+      metrics: what is scored, which `scores.summed_up`.
       known: forms that are compiled already; the group's form contains them, to use their code.
     """
 
@@ -148,8 +158,8 @@ class Group:
         self.scenarios = [scenario.resolved for scenario in scenarios]
         forms = dict.fromkeys(form_of(s, metrics) for s in self.scenarios)
         self.form = functools.reduce(wider, [*forms, *known])
-        self.places = row_places(self.form)
-        self.rows = np.zeros((len(scenarios), self.places.size))
+        self.layout = layout(self.form)
+        self.rows = np.zeros((len(scenarios), self.layout.row_size))
         self._points: list[np.ndarray] = []
         self._starts: dict[int, int] = {}  # of series in the tables
         for row, s in zip(self.rows, self.scenarios, strict=True):
@@ -176,46 +186,45 @@ class Group:
             found.append((scores[SCORES:].tolist(), time))
         return found
 
-    def _put(self, row: np.ndarray, name: str, values: Any) -> None:
-        row[self.places.slices[name]][: len(values)] = values
-
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
-        t = np.arange(s.samples + 1) * s.control_period
-        numbers = settings(s) | {
-            "samples": s.samples,
-            "jump_step": s.jump_step,
-            "early": np.searchsorted(t, TRANSIENT_SHARE * (1.0 - ROUNDING) * t[-1]),
-            "late": np.searchsorted(t, t[-1] - LAST_PART * (1 + ROUNDING) * t[-1]),
-            "logging": False,
-        }
-        row[: len(SETTINGS)] = [numbers[name] for name in SETTINGS]
-        values: Fields = {"x0": s.x0, "v0": s.v0, "limits": s.limits, "bands": _bands(s)}
-        values |= {"known": known_values(s), "estimators 0": s.velocity.numbers(1)}
-        for name, step in (("before", 0), ("after", max(s.jump_step, 0))):
-            values[name] = [*vars(s.plant.values(s.factors(step))).values()]
-        if s.surface:
-            values["surfaces 0"] = s.surface.numbers(1)
-        for i, law in enumerate(s.law.of_channels(s.plant.driven)):
-            values[f"laws {i}"] = law.numbers(self._columns)
-            if self.form.laws[i].function is None:
-                values[f"laws {i} address"] = [compile_component(law).address]
+        row[: len(SETTING)] = _settings(s)
+        at = self.layout.row
+        _put(row, at.x0, s.x0)
+        _put(row, at.v0, s.v0)
+        _put(row, at.limits, s.limits)
+        _put(row, at.bands, _bands(s))
+        _put(row, at.known, known_values(s))
+        _put(row, at.before, [*vars(s.plant.values(s.factors(0))).values()])
+        _put(row, at.after, [*vars(s.plant.values(s.factors(max(s.jump_step, 0)))).values()])
         if s.sensors:
-            values["hinges"] = [unit == "rad" for unit in s.plant.units]
-        for name, numbers in values.items():
-            self._put(row, name, numbers)
+            _put(row, at.hinges, [unit == "rad" for unit in s.plant.units])
+        self._fill_law(row, s)
         self._fill_hardware(row, s)
         self._fill_signals(row, s)
 
+    def _fill_law(self, row: np.ndarray, s: Resolved) -> None:
+        _put(row, self.layout.estimator.numbers, s.velocity.numbers(1))
+        if self.layout.surface and s.surface:
+            _put(row, self.layout.surface.numbers, s.surface.numbers(1))
+        for at, law in zip(self.layout.laws, s.law.of_channels(s.plant.driven), strict=True):
+            _put(row, at.numbers, law.numbers(self._columns))
+            if at.part.function is None:
+                row[at.address] = compile_component(law).address
+
     def _fill_hardware(self, row: np.ndarray, s: Resolved) -> None:
-        parts = [("drives 0", part) for part in _drives(s)]
-        parts += [("sensors 0", part) for part in s.sensors]
-        parts += [(f"frictions {j}", part) for j, part in enumerate(s.exact_parts)]
-        for name, part in parts:
-            table = row[self.places.slices[name]].reshape(-1, len(part.names))
+        parts: list[tuple[PartAt | None, Any]] = []
+        parts += [(self.layout.drive, part) for part in _drives(s)]
+        parts += [(self.layout.sensor, part) for part in s.sensors]
+        parts += zip(self.layout.frictions, s.exact_parts, strict=True)
+        for at, part in parts:
+            assert at is not None  # one loop's scenarios have the same parts
+            names = len(part.names)
+            table = row[at.numbers : at.numbers + self.form.n * names].reshape(-1, names)
             table[[*part.channels(s.plant)]] = part.numbers(run_of(s, part))
+        places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction:
-            for name, value in zip(("damping", "levels"), part.added_to_model, strict=True):
-                row[np.add(self.places.at[name], part.channels(s.plant))] += value
+            for first, value in zip(places, part.added_to_model, strict=True):
+                row[np.add(first, part.channels(s.plant))] += value
 
     @property
     def _columns(self) -> int:
@@ -225,30 +234,32 @@ class Group:
     def gain_columns(self, name: str) -> list[int]:
         """Return where a gain of the law is in a row: of every channel."""
         found = []
-        for i, part in enumerate(self.form.laws):
-            first = self.places.at[f"laws {i}"] + part.names.index(name) * self._columns
+        for at in self.layout.laws:
+            first = at.numbers + at.part.names.index(name) * self._columns
             found += range(first, first + self._columns)
         return found
 
     def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
-        named: dict[str, Signal | None] = {"feedforwards 0": s.feedforward}
-        for i, signal in enumerate(references(s)):
-            named[f"references {i}"] = signal
-        for i, signal in enumerate(s.noise.errors):
-            named[f"errors {i}"] = signal
-        free = list(self.form.disturbances)
-        streams = {}
+        at = self.layout
+        self._fill_signal(row, at.feedforward, s.feedforward)
+        for place, signal in zip(at.references, references(s), strict=True):
+            self._fill_signal(row, place, signal)
+        for place, signal in zip(at.errors, s.noise.errors, strict=True):
+            self._fill_signal(row, place, signal)
+        free = list(at.disturbances)
         for i, signal in enumerate(s.disturbance):
-            place = free.index(type(signal))
-            free[place] = type(None)
-            named[f"disturbances {place}"] = signal
-            streams[f"disturbances {place}"] = s.noise_stream(i)
-        for name, signal in named.items():
-            if signal is not None:
-                values = [1.0, streams.get(name, 0), *signal.parameters().values()]
-                if signal.series:
-                    values += [self._table(signal.data), signal.data.shape[1]]
-                self._put(row, name, values)
+            place = next(one for one in free if one.kind is type(signal))
+            free.remove(place)
+            self._fill_signal(row, place, signal, s.noise_stream(i))
+
+    def _fill_signal(
+        self, row: np.ndarray, at: SignalAt | None, signal: Signal | None, stream: int = 0
+    ) -> None:
+        if at is not None and signal is not None:
+            values = [1.0, stream, *signal.parameters().values()]
+            if signal.series:
+                values += [self._table(signal.data), signal.data.shape[1]]
+            _put(row, at.numbers, values)
 
     def _table(self, data: np.ndarray) -> int:
         """Return where the points of a series begin in the tables."""
@@ -256,6 +267,22 @@ class Group:
             self._starts[id(data)] = sum(points.size for points in self._points)
             self._points.append(data.ravel())
         return self._starts[id(data)]
+
+
+def _put(row: np.ndarray, first: int, values: Any) -> None:
+    row[first : first + len(values)] = values
+
+
+def _settings(s: Resolved) -> Settings:
+    t = np.arange(s.samples + 1) * s.control_period
+    numbers = settings(s) | {
+        "samples": s.samples,
+        "jump_step": s.jump_step,
+        "early": first_sample("early", t),
+        "late": first_sample("late", t),
+        "logging": False,
+    }
+    return Settings(*(numbers[name] for name in Settings._fields))
 
 
 def _bands(s: Resolved) -> np.ndarray:

@@ -4,15 +4,21 @@ One rule serves the loop, where it is a metric, and traces of MuJoCo.
 """
 
 import functools
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from smc_mujoco.analysis.engine import CONVERGES, DOES_NOT, UNDECIDED
-from smc_mujoco.analysis.engine.form import Form, Places, metric_places, row_places, work_places
-from smc_mujoco.analysis.engine.scores import METRICS, own
+from smc_mujoco.analysis.engine.form import SETTING, WIDTH, Form, layout, metric_places
+from smc_mujoco.analysis.engine.scores import WRITTEN_OUT, log_in
+from smc_mujoco.common.aliases import Floats
+from smc_mujoco.common.jit import inlined, pointer
 from smc_mujoco.metrics.conventions import SETTLING_BAND
 from smc_mujoco.simulation.cfunctions import cached
+from smc_mujoco.simulation.state import LOG
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
 
 REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
 # of the squared distance (e/X)^2 + (v/V)^2, second half over first
@@ -34,25 +40,26 @@ def kept_at(n: int, first: int) -> tuple[int, ...]:
     return (*range(first, first + 7), ends, ends + SIGNALS * n)
 
 
-def taking(n: int, row_at: Places, work_at: Places, first: int) -> Any:
-    """Return a compiled function (row, work, k): take sample k of n channels."""
-    SAMPLES, LATE, REACH = row_at.of("samples", "late", "reach")
-    X, V, U, R = work_at.of("sample_x", "sample_v", "u", "r")
+def taking(n: int, reach: int, now: int, first: int) -> Any:
+    """Return a compiled function (row, work, k): take sample k of n channels, from place `now` of
+    `work` on. The row has the reach from place `reach` on.
+    """
     START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, first)
 
-    @own
+    @inlined
     def take(row, work, k):
-        count = int(row[SAMPLES]) + 1
-        late = int(row[LATE])
+        count = int(row[SETTING.samples]) + 1
+        late = int(row[SETTING.late])
         square = 0.0
         distance = 0.0
         for i in range(n):
-            e = (work[X + i] - work[R + i]) / row[REACH]
-            v = work[V + i] / row[REACH + 1]
+            sample = log_in(work, now + WIDTH * i)
+            e = (sample.x - sample.r) / row[reach]
+            v = sample.v / row[reach + 1]
             square += e * e + v * v
             distance = max(distance, abs(e), abs(v))
-            work[LARGEST_U] = max(work[LARGEST_U], abs(work[U + i]))
-            for j, value in enumerate((work[X + i], work[V + i], work[U + i])):
+            work[LARGEST_U] = max(work[LARGEST_U], abs(sample.u))
+            for j, value in enumerate((sample.x, sample.v, sample.u)):
                 at = SIGNALS * i + j
                 if k == late:
                     work[LOW + at] = value
@@ -79,16 +86,15 @@ def taking(n: int, row_at: Places, work_at: Places, first: int) -> Any:
     return take
 
 
-def judging(n: int, row_at: Places, first: int) -> Any:
+def judging(n: int, reach: int, first: int) -> Any:
     """Return a compiled function (row, work) -> verdict; UNDECIDED also where a run needs to be
     longer.
     """
-    REACH = row_at.at["reach"]
     START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, first)
 
-    @own
+    @inlined
     def judge(row, work):
-        final = row[REACH + 3] != 0.0
+        final = row[reach + 3] != 0.0
         ratio = MAX_EARLY_RATIO
         near = 0.0
         if final:
@@ -104,14 +110,14 @@ def judging(n: int, row_at: Places, first: int) -> Any:
                 if work[LARGEST + part] > MAX_EARLY_RATIO * work[LARGEST + part - 1]:
                     return DOES_NOT
             return UNDECIDED
-        bound = row[REACH + 2]
+        bound = row[reach + 2]
         if bound == np.inf:
             bound = work[LARGEST_U]
         for i in range(SIGNALS * n):
-            reach = bound
+            size = bound
             if i % SIGNALS < 2:
-                reach = row[REACH + i % SIGNALS]
-            if work[HIGH + i] - work[LOW + i] > REST_TOLERANCE * reach:
+                size = row[reach + i % SIGNALS]
+            if work[HIGH + i] - work[LOW + i] > REST_TOLERANCE * size:
                 return UNDECIDED
         return DOES_NOT
 
@@ -120,36 +126,40 @@ def judging(n: int, row_at: Places, first: int) -> Any:
 
 def outcome(form: Form, at: int) -> tuple[Any, Any]:
     """Return the verdict as a metric of the loop."""
-    row_at = row_places(form)
-    return taking(form.n, row_at, work_places(form), at), judging(form.n, row_at, at)
+    row_at, work_at = layout(form)[:2]
+    return taking(form.n, row_at.reach, work_at.now, at), judging(form.n, row_at.reach, at)
 
 
-METRICS[NAME] = outcome
+WRITTEN_OUT[NAME] = outcome
+
+
+def over_trace(trace: "Trace", late: int, reach: Floats) -> float:
+    """Return the verdict on a trace, of which samples from `late` on count, with the reach."""
+    samples, n = trace.x.shape
+    log = np.zeros((samples, n), LOG)
+    for name in ("x", "v", "u", "r"):
+        log[name] = getattr(trace, name)
+    row = np.zeros(len(SETTING) + len(reach))
+    row[SETTING.samples] = samples - 1
+    row[SETTING.late] = late
+    row[len(SETTING) :] = reach
+    return _judged(n)(row, log.view(np.float64).reshape(samples, -1))
 
 
 @functools.cache
-def over_samples(n: int) -> Any:
-    """Return a function (row, samples) -> verdict, on x, v, u and r of n channels, (K + 1, 4n).
-
-    `row` has K, the first sample that counts, and the reach.
-    """
-    row_at = Places()
-    work_at = Places()
-    for name in ("samples", "late", "reach"):
-        row_at.take(name)
-    for name in ("sample_x", "sample_v", "u", "r"):
-        work_at.take(name, n)
-    first = work_at.size
-    take = taking(n, row_at, work_at, first)
-    judge = judging(n, row_at, first)
-    size = first + metric_places(NAME, n)
+def _judged(n: int) -> Any:
+    """Return a compiled function (row, samples) -> verdict, of samples (K + 1, n WIDTH)."""
+    width = WIDTH * n
+    take = taking(n, len(SETTING), 0, width)
+    judge = judging(n, len(SETTING), width)
+    size = width + metric_places(NAME, n)
 
     def verdict(row, samples):
         work = np.zeros(size)
         for k in range(len(samples)):
-            for i in range(first):
-                work[i] = samples[k, i]
-            take(row, work, k)
+            for j in range(width):
+                work[j] = samples[k, j]
+            take(row, pointer(work.ctypes.data), k)
         return judge(row, work)
 
     return cached(verdict)

@@ -1,212 +1,282 @@
 """Metrics that a run sums up sample by sample, so that it needs no log.
 
-Each is that of `metrics`; all but settling_time, rest_share and outcome are of the channels that
-have an actuator. A metric is two compiled functions: one takes a sample into its numbers in `work`,
-the other makes the score of them at the end.
+Those of the catalogue that are folds are made here of their rows; a few more are written out. A
+metric is two compiled functions: one takes a sample into its numbers in `work`, the other makes the
+score of them at the end. All but settling_time, rest_share and outcome are of the channels that
+have an actuator.
 """
 
+import functools
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
-from numba import njit
+import numpy as np
 
-from smc_mujoco.analysis.engine.form import SCORES, Form, row_places, work_places
+from smc_mujoco.analysis.engine.form import (
+    SCORES,
+    SETTING,
+    WIDTH,
+    Form,
+    Places,
+    layout,
+    metric_places,
+)
+from smc_mujoco.common.jit import always, inlined, record_in
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import SETTLING_BAND
+from smc_mujoco.metrics.fold import Fold, first_sample
+from smc_mujoco.simulation.cfunctions import cached
+from smc_mujoco.simulation.state import LOG
 
-# without wrappers for Python, which would take half the time to compile; and LLVM inlines all of
-# them, so that no call is left in a step
-OPTIONS: dict[str, Any] = {
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "forceinline": True,
-}
-own = njit(error_model="numpy", **OPTIONS)
+log_in = record_in(LOG)
+COLUMN = {name: i for i, name in enumerate(LOG.names or ())}  # places in a sample
 RESTING = ("settling_time", "rest_share")  # of a reference that does not move
+
+
+class Samples(NamedTuple):
+    """Where a metric finds the sample that it takes, and the one before."""
+
+    n: int  # channels that it is of
+    now: int
+    before: int
+
+
+def summed_up(name: str) -> bool:
+    """Return whether the engine has a metric of this name."""
+    return name in WRITTEN_OUT or _fold(name) is not None
+
+
+def names() -> list[str]:
+    """Return the names of all metrics that the engine has."""
+    return [*WRITTEN_OUT, *filter(_fold, CATALOGUE)]
+
+
+def _fold(name: str) -> Fold | None:
+    """Return the row of a metric that is of the driven channels alone."""
+    entry = CATALOGUE.get(name)
+    return None if entry is None or entry.shared else entry.fold
 
 
 def tallying(form: Form) -> Any:
     """Return a compiled function (row, work, scores, k): take sample k into all metrics, and give
     the scores after the last.
     """
-    tally = own(lambda row, work, scores, k: None)
-    for i, name in enumerate(form.metrics):
-        tally = _and(tally, METRICS[name](form, work_places(form).at[f"metric {name}"]), i, form)
+    work_at = layout(form).work
+    samples = Samples(form.driven, work_at.now, work_at.before)
+    metrics = []
+    for name, at in zip(form.metrics, layout(form).metrics, strict=True):
+        if fold := _fold(name):
+            metrics.append(folding(fold, samples, at))
+        else:
+            metrics.append(WRITTEN_OUT[name](form, at))
+    return _together(metrics)
+
+
+def _together(metrics: Sequence[tuple[Any, Any]]) -> Any:
+    tally = always(None)
+    for i, metric in enumerate(metrics):
+        tally = _and(tally, metric, i)
     return tally
 
 
-def _and(others: Any, metric: tuple[Any, Any], i: int, form: Form) -> Any:
+def _and(others: Any, metric: tuple[Any, Any], i: int) -> Any:
     take, score = metric
-    SAMPLES = row_places(form).at["samples"]
 
-    @own
+    @inlined
     def tally(row, work, scores, k):
         take(row, work, k)
-        if k == int(row[SAMPLES]):
+        if k == int(row[SETTING.samples]):
             scores[SCORES + i] = score(row, work)
         others(row, work, scores, k)
 
     return tally
 
 
-def _integral(kind: str) -> Callable:
-    """Return an integral of the error by the trapezoid rule: ITAE, IAE or ISE."""
-    weighted = kind == "itae"
-    squared = kind == "ise"
-
-    def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.driven
-        X, R = work_places(form).of("sample_x", "r")
-        PERIOD = row_places(form).at["period"]
-
-        @own
-        def take(row, work, k):
-            now = 0.0
-            for i in range(n):
-                e = abs(work[X + i] - work[R + i])
-                now += e * e if squared else e
-            if weighted:
-                now *= k * row[PERIOD]
-            if k > 0:
-                work[at] += 0.5 * (work[at + 1] + now) * row[PERIOD]
-            work[at + 1] = now
-
-        return take, own(lambda row, work: work[at])
-
-    return made
-
-
-def _largest(column: str, late: bool = False, error: bool = False, share: bool = False) -> Callable:
-    """Return the largest |value| of a column, of the last part if `late`; minus r for an error;
-    over the scale of its channel's group for a share.
+def folding(fold: Fold, samples: Samples, at: int) -> tuple[Any, Any]:
+    """Return a fold's two functions, take(row, work, k) and score(row, work). Its numbers are in
+    `work` from place `at` on.
     """
-
-    def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.n if share else form.driven
-        VALUE, R = work_places(form).of(column, "r")
-        LATE, BANDS = row_places(form).of("late", "bands")
-
-        @own
-        def take(row, work, k):
-            if not late or k >= row[LATE]:
-                for i in range(n):
-                    value = work[VALUE + i]
-                    if error:
-                        value -= work[R + i]
-                    if share:
-                        value /= row[BANDS + i]
-                    work[at] = max(work[at], abs(value))
-
-        return take, own(lambda row, work: SETTLING_BAND * work[at] if share else work[at])
-
-    return made
+    values = _valuing(fold, samples)
+    if fold.how in ("integral", "held"):
+        return _pooling(fold, samples.n, values, at)
+    return _worst(fold, samples.n, values, at)
 
 
-def _variation(late: bool) -> Callable:
-    """Return the total variation of u, worst channel; of the last part per second if `late`."""
+def _valuing(fold: Fold, samples: Samples) -> Any:
+    """Return a function (work, i) -> what a fold takes of a sample of channel i."""
+    power = fold.power
+    change = fold.change
+    of_error = fold.signal == "e"
+    column = COLUMN["x" if of_error else fold.signal]
+    r = COLUMN["r"]
+    _, now, before = samples
 
-    def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.driven
-        U, LAST_U = work_places(form).of("u", "last_u")
-        LATE, SAMPLES, PERIOD = row_places(form).of("late", "samples", "period")
+    @inlined
+    def value(work, i):
+        sample = now + WIDTH * i
+        y = work[sample + column]
+        if of_error:
+            y -= work[sample + r]
+        if change:
+            last = before + WIDTH * i
+            y -= work[last + column]
+            if of_error:
+                y += work[last + r]
+        if power == 0:
+            return y
+        return abs(y) if power == 1 else y * y
 
-        @own
-        def take(row, work, k):
-            if k > 0 and (not late or k > row[LATE]):
-                for i in range(n):
-                    work[at + i] += abs(work[U + i] - work[LAST_U + i])
-
-        @own
-        def score(row, work):
-            largest = 0.0
-            for i in range(n):
-                largest = max(largest, work[at + i])
-            if late and row[SAMPLES] > row[LATE]:
-                largest /= (row[SAMPLES] - row[LATE]) * row[PERIOD]
-            return largest
-
-        return take, score
-
-    return made
+    return value
 
 
-def _energy(form: Form, at: int) -> tuple[Any, Any]:
-    n = form.driven
-    U = work_places(form).at["u"]
-    SAMPLES, PERIOD = row_places(form).of("samples", "period")
+def _first(fold: Fold) -> Any:
+    """Return a function (row) -> the first sample of a fold's part."""
+    if not fold.part:
+        return always(0.0)
+    first = SETTING.late if fold.part == "late" else SETTING.early
+    return inlined(lambda row: row[first])
 
-    @own
+
+def _worst(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
+    """Return the functions of a fold of the worst channel."""
+    first = _first(fold)
+    change = fold.change
+    largest = fold.how == "largest"
+    mean = fold.how == "mean"
+    root = mean and fold.power == 2
+    rate = fold.rate
+
+    @inlined
     def take(row, work, k):
-        if k < row[SAMPLES]:
-            for i in range(n):
-                work[at] += work[U + i] * work[U + i] * row[PERIOD]
-
-    return take, own(lambda row, work: work[at])
-
-
-def _mean(squared: bool) -> Callable:
-    """Return the root mean square of e after the transient, or |mean of e| in the last part, worst
-    channel.
-    """
-
-    def made(form: Form, at: int) -> tuple[Any, Any]:
-        n = form.driven
-        X, R = work_places(form).of("sample_x", "r")
-        SAMPLES = row_places(form).at["samples"]
-        FIRST = row_places(form).at["early" if squared else "late"]
-
-        @own
-        def take(row, work, k):
-            if k >= row[FIRST]:
-                for i in range(n):
-                    e = work[X + i] - work[R + i]
-                    work[at + i] += e * e if squared else e
-
-        @own
-        def score(row, work):
-            largest = 0.0
-            for i in range(n):
-                mean = work[at + i] / (row[SAMPLES] + 1.0 - row[FIRST])
-                largest = max(largest, math.sqrt(mean) if squared else abs(mean))
-            return largest
-
-        return take, score
-
-    return made
-
-
-def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
-    n = form.n
-    X, R = work_places(form).of("sample_x", "r")
-    BANDS, SAMPLES, PERIOD = row_places(form).of("bands", "samples", "period")
-
-    @own
-    def take(row, work, k):
+        if k < first(row) or (change and k == first(row)):
+            return
         for i in range(n):
-            if abs(work[X + i] - work[R + i]) > row[BANDS + i]:
-                work[at] = k + 1.0  # the first sample that may be within for good
+            if largest:
+                work[at + i] = max(work[at + i], value(work, i))
+            else:
+                work[at + i] += value(work, i)
 
-    @own
+    @inlined
     def score(row, work):
-        if work[at] > row[SAMPLES]:
-            return math.inf
-        return work[at] * row[PERIOD]
+        steps = row[SETTING.samples] - first(row)
+        worst = 0.0
+        for i in range(n):
+            found = work[at + i]
+            if mean:
+                found /= steps + 1.0
+                found = math.sqrt(found) if root else abs(found)
+            worst = max(worst, found)
+        if rate and steps > 0.0:
+            worst /= steps * row[SETTING.period]
+        return worst
 
     return take, score
 
 
-METRICS: dict[str, Callable] = {
-    "rest_share": _largest("sample_x", late=True, error=True, share=True),
-    "itae": _integral("itae"),
-    "iae": _integral("iae"),
-    "ise": _integral("ise"),
-    "tv": _variation(late=False),
-    "tv_rate": _variation(late=True),
-    "max_u": _largest("u"),
-    "peak": _largest("sample_x"),
-    "ultimate_bound": _largest("sample_x", late=True, error=True),
-    "rms_error": _mean(squared=True),
-    "steady_error": _mean(squared=False),
-    "energy": _energy,
-    "settling_time": _settling_time,
-}
+def _pooling(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
+    """Return the functions of a fold that is summed over the channels."""
+    first = _first(fold)
+    held = fold.how == "held"
+    timed = fold.timed
+
+    @inlined
+    def take(row, work, k):
+        if k < first(row) or (held and k >= row[SETTING.samples]):
+            return
+        period = row[SETTING.period]
+        now = 0.0
+        for i in range(n):
+            if held:
+                work[at] += value(work, i) * period
+            else:
+                now += value(work, i)
+        if timed:
+            now *= (k - first(row)) * period
+        if not held:
+            if k > first(row):
+                work[at] += 0.5 * (work[at + 1] + now) * period
+            work[at + 1] = now
+
+    return take, inlined(lambda row, work: work[at])
+
+
+def over_log(folds: Sequence[Fold], log: np.ndarray, n: int, period: float) -> list[float]:
+    """Return the values of folds of a run's log, (K + 1, channels) LOG, of which the first n count,
+    as the engine sums them up: terms in their order, so that the last bit is the same on every
+    machine.
+    """
+    t = period * np.arange(len(log))
+    row = np.zeros(len(SETTING))
+    row[SETTING.samples] = len(log) - 1
+    row[SETTING.period] = period
+    row[SETTING.early] = first_sample("early", t)
+    row[SETTING.late] = first_sample("late", t)
+    scores = np.zeros(SCORES + len(folds))
+    samples = np.ascontiguousarray(log).view(np.float64).reshape(len(log), -1)
+    _over_samples(tuple(folds), n)(row, samples, scores)
+    return scores[SCORES:].tolist()
+
+
+@functools.cache
+def _over_samples(folds: tuple[Fold, ...], n: int) -> Any:
+    """Return a compiled function (row, samples, scores): the folds of samples, (K + 1, n WIDTH or
+    more).
+    """
+    places = Places()
+    width = WIDTH * n
+    now = places.take(width)
+    before = places.take(width)
+    metrics = []
+    for fold in folds:
+        metrics.append(folding(fold, Samples(n, now, before), places.take(metric_places("", n))))
+    tally = _together(metrics)
+    size = places.size
+
+    def scored(row, samples, scores):
+        work = np.zeros(size)
+        for k in range(len(samples)):
+            for j in range(width):
+                work[before + j] = work[now + j]
+                work[now + j] = samples[k, j]
+            tally(row, work, scores, k)
+
+    return cached(scored)
+
+
+def _rest_share(form: Form, at: int) -> tuple[Any, Any]:
+    """Return the largest |e| of the last part over the scale of its channel's group."""
+    n = form.n
+    row_at, work_at = layout(form)[:2]
+
+    @inlined
+    def take(row, work, k):
+        for i in range(n if k >= row[SETTING.late] else 0):
+            now = log_in(work, work_at.now + WIDTH * i)
+            work[at] = max(work[at], abs((now.x - now.r) / row[row_at.bands + i]))
+
+    return take, inlined(lambda row, work: SETTLING_BAND * work[at])
+
+
+def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
+    n = form.n
+    row_at, work_at = layout(form)[:2]
+
+    @inlined
+    def take(row, work, k):
+        for i in range(n):
+            now = log_in(work, work_at.now + WIDTH * i)
+            if abs(now.x - now.r) > row[row_at.bands + i]:
+                work[at] = k + 1.0  # the first sample that may be within for good
+
+    @inlined
+    def score(row, work):
+        if work[at] > row[SETTING.samples]:
+            return math.inf
+        return work[at] * row[SETTING.period]
+
+    return take, score
+
+
+# name -> function (form, place) -> its two functions, of metrics that are no folds
+WRITTEN_OUT: dict[str, Callable] = {"rest_share": _rest_share, "settling_time": _settling_time}

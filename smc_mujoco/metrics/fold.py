@@ -1,0 +1,75 @@
+"""Metrics that take one sample after the other: each is one row, a `Fold`, beside its name.
+
+Two read a row: `Fold.of` with numpy, over a trace, and the fast engine, which folds while it runs
+(see `analysis/engine/scores.py`). Metrics that need a second pass or the whole series stay
+functions of a trace, in the catalogue.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.aliases import Array
+
+LAST_PART = 0.2  # of the run's duration
+ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
+TRANSIENT_SHARE = 0.25  # of the run, which an "early" part leaves out
+
+
+class Fold(NamedTuple):
+    """A metric as a row: what is taken of each sample, and how samples are put together."""
+
+    signal: str  # "e", or a column of a trace
+    # of the worst channel: "largest", "sum", "mean"; summed over the channels: "integral" by the
+    # trapezoid rule, "held" of a signal that is held between samples
+    how: Literal["largest", "sum", "mean", "integral", "held"]
+    power: int = 1  # of the signal's magnitude; of a mean 2 with its root, and 0 with its sign
+    part: Literal["", "early", "late"] = ""  # all samples; all but the transient; the last part
+    change: bool = False  # whether it is of the change from the sample before
+    timed: bool = False  # whether it is weighted by the time since the start
+    rate: bool = False  # whether it is over the time of its part
+
+    def of(self, t: Array, signal: Array) -> float:
+        """Return the value for times t, (K + 1,), and a signal, (K + 1, n)."""
+        if self.how in ("largest", "sum", "mean"):
+            return self.channels(t, signal).max()
+        t, y = self._taken(t, signal)
+        total = y.sum(axis=1)
+        if self.timed:
+            total = (t - t[0]) * total
+        return np.trapezoid(total, t) if self.how == "integral" else total[:-1] @ np.diff(t)
+
+    def channels(self, t: Array, signal: Array) -> Array:
+        """Return the value of each channel, (n,), of a fold of the worst channel."""
+        t, y = self._taken(t, signal)
+        if self.how == "largest":
+            return y.max(axis=0, initial=0.0)
+        if self.how == "mean":
+            mean = y.mean(axis=0)
+            return np.sqrt(mean) if self.power == 2 else np.abs(mean)
+        total = y.sum(axis=0)
+        return total / ((t[-1] - t[0]) or np.inf) if self.rate else total
+
+    def _taken(self, t: Array, signal: Array) -> tuple[Array, Array]:
+        """Return the times of the part, and what is taken of each sample in it."""
+        first = first_sample(self.part, t)
+        y = signal[first:]
+        if self.change:
+            y = np.diff(y, axis=0)
+        if self.power:
+            y = np.abs(y) ** self.power
+        return t[first:], y
+
+
+def first_sample(part: str, t: Array) -> int:
+    """Return the index of the first sample of a part of a run with these times, (K + 1,)."""
+    if not part:
+        return 0
+    start, end = t[[0, -1]]
+    if part == "late":
+        since = end - LAST_PART * (1 + ROUNDING) * (end - start)
+    else:
+        since = start + TRANSIENT_SHARE * (1.0 - ROUNDING) * (end - start)
+    return int(np.searchsorted(t, since))
