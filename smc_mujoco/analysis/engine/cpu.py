@@ -73,7 +73,7 @@ def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None
             piece(part)
 
     def stop() -> None:
-        rows[:, row_places(form).at["step"]] = np.nan  # a run ends where its state is not finite
+        rows[:, SETTING.step] = np.nan  # a run ends where its state is not finite
 
     pieces = list(_pieces(form, rows, threads))
     parts = iter(pieces)
