@@ -24,6 +24,7 @@ from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template, gain_text
 from smc_mujoco.control.properties import PROPERTIES, suitable
+from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -143,6 +144,7 @@ def which(
     seed: DrawSeed = 0,
     device: Device = "cpu",
     executor: Workers | None = None,
+    falling: Boolean = False,
 ) -> Advice:
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
     how certain the answer is.
@@ -161,12 +163,17 @@ def which(
         model also a shorter objective, and by default the laws of the report's first page. There
         one search and six runs in each condition come first, and the best five laws go on.
       defaults: whether a law may win over rivals whose gains are their defaults.
+      falling: whether to go on where the base of your model falls while its joints are held, so
+        that no law of a joint can be judged.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Raises:
-      ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
+      ScenarioError: an unknown name, no law that suits, a need without a number on this plant, or
+        a base that falls.
     """
     machine = as_plant(plant)
+    if not falling and (why := falls(machine)):
+        raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
     compared, properties = _asked(machine, needs)
     brief = quick and machine.is_user_model
     chosen = _suited(machine, properties, laws)

@@ -56,7 +56,7 @@ CALLS = {
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
     "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2 --device cuda "
-    "--executor dask://h:1": ["studies.which.which"],
+    "--executor dask://h:1 --falling": ["studies.which.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],

@@ -48,6 +48,9 @@ def which(
     threads: options.Threads = None,
     device: options.Device = "cpu",
     executor: options.Executor = None,
+    falling: Annotated[
+        bool, typer.Option("--falling", help="Go on where the base of your model falls.")
+    ] = False,
 ) -> None:
     """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
     choice is.
@@ -83,6 +86,7 @@ def which(
         seed=seed,
         device=device,
         executor=executor,
+        falling=falling,
     )
     terminal.print(advice)
     _finish(advice.table, out, terminal)

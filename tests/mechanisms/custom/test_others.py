@@ -323,7 +323,7 @@ def test_a_light_base_on_springs_does_not_fall_and_its_bound_is_told_once(capfd)
     assert len(told) == 1
 
 
-def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch):
+def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch, tmp_path):
     standing = plant("walker", "held")
     assert scales.falls(standing) == ""
     text = WALKER.format(
@@ -340,6 +340,11 @@ def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch):
     monkeypatch.setattr(search, "_failure_of_law", None)  # told before the first run of a search
     with pytest.warns(ScenarioWarning, match="'locked'"), pytest.raises(TypeError, match="NoneT"):
         smc.tune(limp, "pid", searches=1)
+    asked = {"laws": ["pid"], "quick": True, "out": tmp_path}
+    with pytest.raises(smc.ScenarioError, match="no law of a joint .* falling=True"):
+        smc.which(limp, **asked)
+    with pytest.warns(ScenarioWarning, match="'locked'"), pytest.raises(TypeError, match="NoneT"):
+        smc.which(limp, falling=True, **asked)
     assert scales.falls(plant("walker", "locked")) == ""
 
 
