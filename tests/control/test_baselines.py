@@ -71,6 +71,17 @@ def test_pid_on_a_free_mass_moves_as_its_three_poles_say():
     np.testing.assert_allclose(trace.x[::200, 0], exact[:, 1], atol=1e-3)
 
 
+@pytest.mark.parametrize("ki", [1e-9, 1e-6, 1e-3])
+def test_a_tiny_integral_gain_of_pid_is_as_good_as_none_after_saturation(ki):
+    runs = []
+    for gain in (0.0, ki):
+        law = smc.law("pid", kp=30.0, ki=gain, kd=6.0)
+        runs.append(smc.Scenario(plant="inverted_pendulum", law=law, x0=1.2))
+    none, tiny = smc.run(runs)
+    assert np.abs(none.u).max() == 6.0
+    assert smc.score(tiny)["itae"] < 1.3 * smc.score(none)["itae"]
+
+
 def test_only_the_integral_leaves_no_error_under_a_constant_force():
     """Without it the mass rests where kp e = d."""
     with_it = smc.law("pid")

@@ -3,8 +3,9 @@
 A baseline without a sliding mode. The filter tau limits the amplification of noise by the
 derivative. Back-calculation prevents wind-up: while u is beyond the bound +-u_max, w tends with the
 time constant tt to the value that brings u back to its bound; with ki = 0, w = 0. What it leaves in
-w goes with the time constant kp / ki, so a tiny ki keeps an error for long. On M x'' = u the loop
-is stable if and only if kp kd > M ki (Routh, tau = 0), and a constant disturbance leaves no error.
+w goes with the time constant kp / ki. Where that is longer than 60 s, only the share
+60 s ki / kp of it is brought back, so that a tiny ki is as good as none. On M x'' = u the loop is
+stable if and only if kp kd > M ki (Routh, tau = 0), and a constant disturbance leaves no error.
 D is computed by the implicit (backward) Euler method, starting at the first de, and w by the
 explicit one. The trace's s is kp e + kd D.
 Gains: kp, proportional [N/m]; ki, integral [N/(m s)]; kd, derivative [N s/m]; tau, of the filter
@@ -15,6 +16,8 @@ sections 3.4 (derivative) and 3.5 (integrator windup).
 
 from smc_mujoco.control.law import command, excess, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, TIME, Gain, Unit
+
+LONGEST = 60.0  # s, chosen: what takes longer to go would stay for the run
 
 
 @law_function(
@@ -45,7 +48,10 @@ def pid(y, gains, memory):
     s = gains.kp * y.e + gains.kd * D
     u = command(y, w - s)
     if gains.ki != 0.0:  # else nothing would take w back
-        w += y.dt * (excess(y, u) / gains.tt - gains.ki * y.e)
+        back = excess(y, u) / gains.tt
+        if gains.kp > LONGEST * gains.ki:
+            back *= LONGEST * gains.ki / gains.kp
+        w += y.dt * (back - gains.ki * y.e)
     memory[0] = 1.0
     memory[1] = w
     memory[2] = D

@@ -109,7 +109,7 @@ class DCMotor(Actuator):
     V = scale u, the voltage whose stall torque is u; or V = u.
 
         L i' = V - R i - gear k v        |V| <= voltage; x, v: of the joint
-        torque = gear k i + gear cogging sin(gear poles x)        |torque| <= gear k current
+        torque = gear k i + gear cogging sin(gear poles x)        |gear k i| <= gear k current
         inertia added at the joint: gear^2 rotor_inertia
 
     The law does not know it: back-EMF takes (gear k)^2/R v, inductance delays by L/R. Without

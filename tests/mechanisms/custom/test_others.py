@@ -341,7 +341,7 @@ def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch, tmp_path):
     with pytest.warns(ScenarioWarning, match="'locked'"), pytest.raises(TypeError, match="NoneT"):
         smc.tune(limp, "pid", searches=1)
     asked = {"laws": ["pid"], "quick": True, "out": tmp_path}
-    with pytest.raises(smc.ScenarioError, match="no law of a joint .* falling=True"):
+    with pytest.raises(smc.ScenarioError, match=r"no law of a joint .* falling=True"):
         smc.which(limp, **asked)
     with pytest.warns(ScenarioWarning, match="'locked'"), pytest.raises(TypeError, match="NoneT"):
         smc.which(limp, falling=True, **asked)
