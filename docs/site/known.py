@@ -174,7 +174,7 @@ def decisions() -> Iterator[str]:
         yield f'\n??? note "{about.authors}: {about.title}"\n'
         yield f"    `{name}`: {_plain(about.source)}. Read: {about.read}; {_plain(about.access)}.\n"
         yield "    | claim | verdict | decided by |\n    |---|---|---|"
-        for id, (verdict, decided) in shown.items():
+        for id, (verdict, decided, _) in shown.items():
             claim = about.claims[id]
             whose = f", {WHOSE_WORDS[claim.whose]}" * (claim.whose != PAPER)
             immune = f". No broken law can lose it: {claim.immune}" * bool(claim.immune)

@@ -282,6 +282,14 @@ class Claim(Statement):
     flips: bool  # whether the verdict depends on the set
 
     @property
+    def for_every_set(self) -> bool:
+        """Whether every set of gains that was run has the same verdict, and not by a search over
+        the law's gains.
+        """
+        searched = self.over == "some" and not self.rivals
+        return not self.flips and not searched
+
+    @property
     def parts(self) -> dict[str, str]:
         """What a reader is told of it beside the numbers, without what it lacks."""
         parts = {
@@ -368,10 +376,10 @@ def summary(claims: Sequence[Claim]) -> str:
 def over_gains(claims: Sequence[Claim]) -> str:
     """Return a sentence on how many supported sentences hold under every set of gains."""
     supported = [one for one in claims if one.whose == PAPER and one.verdict == SUPPORTED]
-    same = sum(not claim.flips for claim in supported)
+    same = sum(claim.for_every_set for claim in supported)
     return (
         f"Of the paper's {len(supported)} supported sentences {same} hold under every set of gains "
-        f"that was run, and {len(supported) - same} under some."
+        f"that was run, and {len(supported) - same} for some gains."
     )
 
 

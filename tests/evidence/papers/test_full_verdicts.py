@@ -22,7 +22,8 @@ SHOWN = ROOT / "docs" / "site" / "verdicts.json"
 PAPERS = [name for name in shipped() if name != "gaber"]
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 
-Shown = dict[str, list[str]]  # claim -> verdict, and the check that decides
+# claim -> verdict, the check that decides, and whether every set of gains has that verdict
+Shown = dict[str, tuple[str, str, bool]]
 
 
 def known(name: str) -> Shown:
@@ -32,7 +33,7 @@ def known(name: str) -> Shown:
 
 def full(name: str) -> Shown:
     """Return what the page is to show of a paper."""
-    return {claim.id: [claim.verdict, decided(claim)] for claim in audit(name).claims}
+    return {one.id: (one.verdict, decided(one), one.for_every_set) for one in audit(name).claims}
 
 
 def decided(claim: Claim) -> str:
@@ -57,10 +58,19 @@ def test_readme_counts_the_claims_of_gaber_s_paper():
     own = []
     for id, claim in paper("gaber").claims.items():
         if claim.whose == "paper":
-            own.append(known("gaber")[id][0])
-    sentence = r"(?s)Of the (\d+) claims .*?, (\d+) are refuted, .*?(\d+) is not\s+shown"
-    reported = re.findall(sentence, (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert reported == [(str(len(own)), str(own.count("refuted")), str(own.count("not shown")))]
+            own.append(known("gaber")[id])
+    verdicts = [verdict for verdict, *_ in own]
+    everywhere = [verdict for verdict, _, every_set in own if every_set]
+    counts = [len(own)]
+    for kind in ("supported", "partly supported", "refuted", "not shown", "not as measured"):
+        counts.append(verdicts.count(kind))
+    counts.append(everywhere.count("supported"))
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    sentence = (
+        r"Of the (\d+) claims .*?, (\d+) hold for some gains, (\d+) hold in part, (\d+) are "
+        r"refuted, (\d+) is not shown to hold, and (\d+) cannot be judged. (\d+) of the "
+    )
+    assert [tuple(map(str, counts))] == re.findall(sentence, text)
 
 
 @pytest.mark.slow
@@ -69,8 +79,9 @@ def test_full_verdicts_are_those_of_the_page(name):
     found = full(name)
     shown = known(name)
     assert [*found] == [*shown]
-    for id, (verdict, words) in found.items():
-        reported, said = shown[id]
+    for id, (verdict, words, everywhere) in found.items():
+        reported, said, known_everywhere = shown[id]
+        assert everywhere == known_everywhere
         assert (verdict, NUMBER.split(words)) == (reported, NUMBER.split(said)), id
         numbers = []
         for text in (words, said):
