@@ -18,7 +18,7 @@ import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import numba
@@ -32,7 +32,7 @@ from smc_mujoco.common.attended import attended
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.process import free_after_fork
-from smc_mujoco.common.rebuild import rebuild
+from smc_mujoco.common.rebuild import helpers, names_in, rebuild, values_in
 
 # Without wrappers for Python, which take half the time to compile, and copied by LLVM to where it
 # is called: numba's own `inline="always"` takes twice the time to compile.
@@ -45,6 +45,9 @@ SEAL_SIZE = hashlib.sha256().digest_size
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
     r"TypingError: Failed|raised from|During|File |>>>|\[1\]|def |\^|<source"
+)
+PLAIN_HELPER = re.compile(
+    r"Untyped global name '(\w+)': Cannot determine Numba type of <class 'function'>"
 )
 COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEME is set
 
@@ -528,6 +531,8 @@ def reason(error: Exception) -> str:
     """Return the line of a compiler's error that says what is wrong, printable even if it quotes a
     user's text.
     """
+    if plain := PLAIN_HELPER.search(COLOURS.sub("", str(error))):
+        return f"it calls {plain[1]}, a plain function: put @numba.njit on {plain[1]}"
     first = ""
     for line in map(str.strip, COLOURS.sub("", str(error)).splitlines()):
         if line.strip(" ^~."):
@@ -543,6 +548,8 @@ def reason(error: Exception) -> str:
 OPTIONS: dict[str, Any] = {"error_model": "python", "boundscheck": True}
 OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 checked = njit(**OPTIONS)
+# of numpy: numba compiles them without checks of bounds
+UNCHECKED = "flat", "bincount", "as_strided", "take_along_axis"
 _shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once for all laws
 
 
@@ -551,6 +558,8 @@ def jit(function: Callable) -> Callable:
     """Compile a function, and the compiled functions that it calls, to raise out of bounds and at
     division by zero.
     """
+    if isinstance(function, FunctionType):
+        _refuse_unchecked(function, ())
     with internals.global_compiler_lock:
         copies = dict(_shared)
         try:
@@ -562,3 +571,22 @@ def jit(function: Callable) -> Callable:
             if (original.__module__ or "").startswith("smc_mujoco."):
                 _shared[original] = copy
         return made
+
+
+def _refuse_unchecked(function: FunctionType, callers: tuple[FunctionType, ...]) -> None:
+    """Raise NotCompilable for what compiled code would do without a check, here and in the compiled
+    functions that are called: it would end the process, or read what is not the law's.
+    """
+    if function in callers:
+        raise NotCompilable(
+            f"{function.__name__} calls itself, and compiled code has no bound on how often"
+        )
+    names = names_in(function.__code__)
+    used = names.variables | names.attributes
+    used |= {getattr(value, "__name__", "") for value in values_in(function)}
+    for name in UNCHECKED:
+        if name in used:
+            raise NotCompilable(f"it uses {name}, whose indices compiled code does not check")
+    for helper in helpers(function):
+        if not (helper.__module__ or "").startswith("smc_mujoco."):
+            _refuse_unchecked(helper, (*callers, function))

@@ -77,15 +77,27 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
 
 def _calls_compiled(function: FunctionType) -> bool:
     """Return whether a function refers to a compiled function, by name or in a module."""
+    return bool(helpers(function))
+
+
+def helpers(function: FunctionType) -> list[FunctionType]:
+    """Return the compiled functions to which a function refers, by name or in a module, as they
+    were written.
+    """
+    names = names_in(function.__code__)
+    found: list[Any] = []
+    for value in values_in(function):
+        found.append(value)
+        if isinstance(value, ModuleType):
+            found += [vars(value).get(name) for name in names.attributes]
+    return [value.py_func for value in found if is_jitted(value)]
+
+
+def values_in(function: FunctionType) -> list[Any]:
+    """Return the values of the global variables and of the closure of a function."""
     names = names_in(function.__code__)
     values: list[Any] = [function.__globals__.get(name) for name in names.variables]
-    values += [cell.cell_contents for cell in function.__closure__ or ()]
-    for value in values:
-        if is_jitted(value):
-            return True
-        if isinstance(value, ModuleType) and _holds(value, names.attributes):
-            return True
-    return False
+    return values + [cell.cell_contents for cell in function.__closure__ or ()]
 
 
 def _holds(module: ModuleType, names: set[str]) -> bool:

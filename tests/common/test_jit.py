@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from numba import njit
 from numba.core import utils
@@ -14,7 +15,8 @@ from numba.core.codegen import CPUCodeLibrary, RuntimeLinker
 
 import smc_mujoco as smc
 from smc_mujoco.common import numba_internals as internals
-from smc_mujoco.common.jit import Numbers, _complete, jit, reason
+from smc_mujoco.common.jit import NotCompilable, Numbers, _complete, jit, reason
+from smc_mujoco.simulation.cfunctions import compile_component
 
 pytestmark = pytest.mark.quick
 
@@ -100,3 +102,56 @@ def test_private_names_of_numba_stand_in_one_module():
         if "from numba.core" in file.read_text(encoding="utf-8"):
             reaching.append(file.name)
     assert reaching == ["numba_internals.py"]
+
+
+def plain_helper(x):
+    return 2.0 * x
+
+
+@njit
+def recursive(x):
+    return x if x < 1.0 else recursive(x - 1.0)
+
+
+@njit
+def to_odd(x):
+    return x if x < 1.0 else to_even(x - 1.0)
+
+
+@njit
+def to_even(x):
+    return x if x < 1.0 else to_odd(x - 1.0)
+
+
+@njit
+def reads_flat(memory):
+    return memory.flat[99]
+
+
+counts = np.bincount  # under another name
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (lambda y, gains, memory: (recursive(y.x), 0.0), "recursive calls itself"),
+        (lambda y, gains, memory: (to_even(y.x), 0.0), "to_even calls itself"),
+        (lambda y, gains, memory: (reads_flat(memory), 0.0), "it uses flat"),
+        (lambda y, gains, memory: (1.0 * counts(memory)[0], 0.0), "it uses bincount"),
+    ],
+)
+def test_what_compiled_code_does_not_check_is_called_in_python(law, words):
+    with pytest.raises(NotCompilable, match=words):
+        jit(law)
+
+
+def test_a_plain_helper_of_a_law_is_named_with_its_cure():
+    def inner(x):
+        return x
+
+    for law, name in (
+        (lambda y, gains, memory: (plain_helper(y.x), 0.0), "plain_helper"),
+        (lambda y, gains, memory: (inner(y.x), 0.0), "inner"),
+    ):
+        with pytest.raises(NotCompilable, match=f"put @numba.njit on {name}"):
+            compile_component(smc.law_function(law)())

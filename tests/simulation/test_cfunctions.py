@@ -66,11 +66,6 @@ def ratio_to(x):
     return FACTOR / x[0]
 
 
-@njit
-def factorial(n):
-    return 1.0 if n < 2 else n * factorial(n - 1)
-
-
 def test_a_law_is_compiled_once_for_all_processes():
     assert [hits(smc.law("classical").function, gains=("k", "c")) for _ in range(2)] == [0, 1]
 
@@ -250,10 +245,9 @@ def doubled_by_sorting(x):
     [
         ("thing(gains.k)", ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: 2.0 * x)),
         ("thing[0] * gains.k", np.full(1_000_000, 2.0)),  # too large to be copied into code
-        ("thing(3) * gains.k / 3.0", factorial),
         ("thing(gains.k)", doubled_by_sorting),
     ],
-    ids=["function", "array", "function that calls itself", "function that was compiled before"],
+    ids=["function", "array", "function that was compiled before"],
 )
 def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cache, body, thing):
     """It would be another one in the next process.

@@ -189,10 +189,12 @@ def factorial(n):
     return n * factorial(n - 1)
 
 
-def test_a_helper_that_calls_itself_compiles():
-    # a warning would be an error
-    trace = smc.run(scenario(made(lambda y, gains, memory: (0.0, factorial(4)))))
+def test_a_helper_that_calls_itself_is_called_in_python():
+    with pytest.warns(smc.errors.PlainLoopWarning, match="factorial calls itself"):
+        trace = smc.run(scenario(made(lambda y, gains, memory: (0.0, factorial(4)))))
     assert (trace.s == 24.0).all()
+    endless = scenario(made(lambda y, gains, memory: (0.0, factorial(1e9))))
+    assert "RecursionError" in str(plainly(endless).failure)
 
 
 # (c) what a law returns
