@@ -5,11 +5,12 @@ numba.np the kernel of functions of whole arrays, and `ensure_blas`, see jit.py.
 """
 
 # ruff: noqa: F401
-from numba.core import cgutils
+from numba.core import cgutils, ir
 from numba.core.bytecode import FunctionIdentity
 from numba.core.ccallback import CFunc
-from numba.core.compiler import CompileResult
+from numba.core.compiler import CompileResult, run_frontend
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.ir_utils import find_const, guard
 from numba.core.serialize import dumps
 from numba.core.typing.templates import builtin_registry
 from numba.np import arrayobj

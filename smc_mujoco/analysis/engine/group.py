@@ -21,6 +21,7 @@ from smc_mujoco.analysis.engine.form import (
     layout,
 )
 from smc_mujoco.analysis.engine.scores import RESTING, summed_up
+from smc_mujoco.common import fingerprint, indices
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component
@@ -64,6 +65,9 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         f"its integrator is {s.integrator}": s.integrator != "RK4",
         "a law of many joints, or in C, is for the processor": device == "cuda"
         and any(_part(law).function is None for law in s.law.of_channels(plant.driven)),
+        "a function of its user's may index beyond its memory, which only the processor checks": (
+            device == "cuda" and not all(map(_indexes_within, _users(s)))
+        ),
         "a disturbance acts on a body": any(
             d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
         ),
@@ -75,6 +79,21 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         only = f"the engine sums up {name} only for a reference at rest"
         beyond[only] = name in RESTING and moving
     return next((words for words, holds in beyond.items() if holds), "")
+
+
+def _users(s: Resolved) -> list[tuple[Any, int]]:
+    """Return the functions of a run that are not this package's, each with its memory."""
+    components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
+    found = [(part.function, part.memory) for part in components]
+    signals = (*s.references, *s.disturbance, s.feedforward, *s.noise.errors)
+    found += [(type(one).value, one.memory) for one in signals if one is not None]
+    found += [(part.read, part.memory) for part in s.sensors]
+    found += [(part.stage_force, part.memory) for part in s.exact_parts]
+    return [(function, memory) for function, memory in found if not fingerprint.ours(function)]
+
+
+def _indexes_within(user: tuple[Any, int]) -> bool:
+    return indices.within(*user)
 
 
 def key(scenario: Scenario) -> Hashable:
