@@ -10,6 +10,7 @@ import json
 import math
 import os
 import re
+import stat
 import tempfile
 import uuid
 import zipfile
@@ -278,3 +279,17 @@ def replacing(path: Path) -> Iterator[Path]:
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
+
+
+def own(path: Path) -> bool:
+    """Return whether nobody but this user, and the administrator, can have written a file or a
+    folder.
+
+    Raises:
+      OSError: there is none.
+    """
+    about = path.stat()
+    if os.name != "posix":
+        return True
+    others = stat.S_IWGRP | stat.S_IWOTH
+    return about.st_uid in (os.getuid(), 0) and not about.st_mode & others

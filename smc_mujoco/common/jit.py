@@ -30,7 +30,7 @@ from numba.extending import intrinsic
 from smc_mujoco.common import numba_internals as internals
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.errors import ScenarioError, printable
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import own, replacing
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import helpers, names_in, rebuild, values_in
 
@@ -415,7 +415,8 @@ class Cache:
     """A compiled function on disk, in place of numba's own cache.
 
     Numba's own would take it for outdated if a line of its file changed, and for current if a
-    function that it calls changed. A damaged file counts as missing; a full disk is not an error.
+    function that it calls changed. A damaged file counts as missing, and so does one that another
+    user may have written, as a pickle runs code; a full disk is not an error.
     """
 
     def __init__(self, key: Key):
@@ -433,16 +434,17 @@ class Cache:
         target.refresh()
         path = self._path(signature, target.codegen())
         try:
+            if not (own(path.parent) and own(path)):
+                return None
             content = path.read_bytes()
         except OSError:
             return None
         result = content[SEAL_SIZE:]
         if _seal(path, result) != content[:SEAL_SIZE]:
             return None
-        try:
+        with contextlib.suppress(Exception):  # whatever it holds: it is compiled anew
             return internals.CompileResult._rebuild(target, *pickle.loads(result))
-        except ModuleNotFoundError:  # of the law that another process compiled
-            return None
+        return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Write numba's result for a signature, unless no other process could load it."""
@@ -452,8 +454,11 @@ class Cache:
         path = self._path(signature, library.codegen)
         content = internals.dumps(result._reduce())
         # there may be nowhere to write
+        with contextlib.suppress(OSError):
+            self.folder.mkdir(0o700, parents=True, exist_ok=True)
         with contextlib.suppress(OSError, ScenarioError), replacing(path) as file:
             file.write_bytes(_seal(path, content) + content)
+            file.chmod(0o600)
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         """Return the path of a signature's file for this machine."""

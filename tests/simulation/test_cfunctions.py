@@ -4,6 +4,7 @@ reaches is not.
 
 import ctypes
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -158,6 +159,35 @@ def test_code_of_another_law_under_the_name_of_this_one_is_not_run(cache):
     (theirs,) = {*cache.rglob("*.code")} - {ours}
     ours.write_bytes(theirs.read_bytes())  # its seal is of its name, too
     assert hits(mine("gains.k")) == 0
+    assert force(mine("gains.k")) == 3.0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="rights of POSIX")
+def test_code_that_another_user_may_have_written_is_not_loaded(cache, monkeypatch):
+    """It is a pickle, which runs what it holds."""
+    force(mine("gains.k"))
+    (kept,) = cache.rglob("*.code")
+    assert hits(mine("gains.k")) == 1
+    for path in (kept, cache):
+        mode = path.stat().st_mode
+        for right in (0o020, 0o002):
+            path.chmod(mode | right)
+            assert hits(mine("gains.k")) == 0
+            kept.chmod(0o600)
+            cache.chmod(0o700)
+    assert hits(mine("gains.k")) == 1
+    monkeypatch.setattr(os, "getuid", lambda: 12345)
+    if kept.stat().st_uid != 0:
+        assert hits(mine("gains.k")) == 0
+
+
+@pytest.mark.parametrize("error", [AttributeError, ImportError, SystemError])
+def test_code_that_cannot_be_loaded_is_compiled_anew(error, monkeypatch):
+    def damaged(*_):
+        raise error
+
+    force(mine("gains.k"))
+    monkeypatch.setattr(pickle, "loads", damaged)
     assert force(mine("gains.k")) == 3.0
 
 
