@@ -57,7 +57,8 @@ def view(
 
     The second law's machine is the transparent one. The panel "Laws" has the laws, their gains,
     what acts on the runs, u, s and e, and "save as scene". Double-click a body, hold Ctrl and drag
-    with the right mouse button: it is pushed when you let go. The tab needs MuJoCo 4. Only this
+    with the right mouse button: it is pushed when you let go. The tab needs MuJoCo 4.0.1, which
+    is not on the package index yet. Only this
     machine can open its address, which holds a secret word; keep it to yourself.
 
     Args:
@@ -67,12 +68,13 @@ def view(
       open_browser: whether to open the tab.
 
     Raises:
-      ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit
-        the machine.
+      ScenarioError: MuJoCo is older than 4.0.1, this process had a view already, or a law does not
+        suit the machine.
     """
     if importlib.util.find_spec("mujoco.studio") is None:
         raise ScenarioError(
-            f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'"
+            f"no view: MuJoCo {mujoco.__version__} has no Studio: it comes with MuJoCo 4.0.1, "
+            "which is not on the package index yet"
         )
     runs = runs_of(scenario, laws)
     from mujoco.studio import app, launch_web, viewer_protocol, web_viewer

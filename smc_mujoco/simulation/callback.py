@@ -18,6 +18,7 @@ wrongly.
 import contextlib
 import ctypes
 import functools
+import warnings
 from collections import namedtuple
 from collections.abc import Iterator
 from typing import Any
@@ -28,7 +29,7 @@ from mujoco.introspect import ast_nodes, structs
 from numba import njit, types
 
 from smc_mujoco.common import fingerprint, mjcb
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
 from smc_mujoco.common.jit import Key, compiled, integers, pointer
 from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
@@ -51,6 +52,7 @@ C_TYPES = {
     "uintptr_t": ctypes.c_size_t,
     "uint64_t": ctypes.c_uint64,
 }
+WRONG_MUJOCO = "4.0.0"  # pyproject.toml excludes it
 MAGIC = 7263.0  # the first number of this package's userdata: chosen
 PROBE_MODEL = """<mujoco><size nuserdata="12345" nuser_actuator="1" nuser_body="1"/>
   <worldbody><body><joint name="j" frictionloss="1"/><geom size="1"/></body></worldbody>
@@ -121,7 +123,14 @@ def checked_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
 
 @functools.cache
 def offsets() -> Offsets:
-    """Return the offsets, checked with a small model."""
+    """Return the offsets, checked with a small model. Warn of a MuJoCo that computes wrongly."""
+    if mujoco.__version__ == WRONG_MUJOCO:
+        warnings.warn(
+            f"MuJoCo {WRONG_MUJOCO} solves models of 60 coupled joints and more wrongly: install "
+            "another version",
+            ScenarioWarning,
+            users_stacklevel(),
+        )
     model = mujoco.MjModel.from_xml_string(PROBE_MODEL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)  # which has the arrays of constraints

@@ -1,6 +1,6 @@
 """`smc-mujoco view` in a real browser: the page shows the machine.
 
-It needs MuJoCo 4, Chromium, playwright.
+It needs MuJoCo 4.0.1, Chromium, playwright.
 """
 
 import io

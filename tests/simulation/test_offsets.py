@@ -204,3 +204,11 @@ def test_userdata_without_an_address_is_never_read_as_ours():
     with callback.installed():
         mujoco.mj_step(model, data)
     np.testing.assert_array_equal(data.userdata, before)
+
+
+def test_the_mujoco_whose_solver_is_wrong_is_named_at_the_first_run(monkeypatch):
+    monkeypatch.setattr(mujoco, "__version__", callback.WRONG_MUJOCO)
+    callback.offsets.cache_clear()
+    with pytest.warns(smc.errors.ScenarioWarning, match=r"MuJoCo 4\.0\.0 solves .* wrongly"):
+        callback.offsets()
+    callback.offsets()

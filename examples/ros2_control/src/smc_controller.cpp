@@ -54,23 +54,30 @@ public:
   {
     controller_start();
     t_ = 0.0;
-    reference_ = state_interfaces_[0].get_value();  // hold the pose until a reference comes
+    const auto x = state_interfaces_[0].get_optional();
+    if (!x) {
+      return CallbackReturn::ERROR;
+    }
+    reference_ = *x;  // hold the pose until a reference comes
     return CallbackReturn::SUCCESS;
   }
 
   CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override
   {
-    command_interfaces_[0].set_value(0.0);
-    return CallbackReturn::SUCCESS;
+    return command_interfaces_[0].set_value(0.0) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
   }
 
   return_type update(const rclcpp::Time &, const rclcpp::Duration & period) override
   {
+    const auto x = state_interfaces_[0].get_optional();
+    const auto v = state_interfaces_[1].get_optional();
+    if (!x || !v) {  // the hardware holds them: the law is not called without a measurement
+      return return_type::ERROR;
+    }
     double u, s;
-    controller(t_, state_interfaces_[0].get_value(), state_interfaces_[1].get_value(), reference_, 0.0, &u, &s);
-    command_interfaces_[0].set_value(u);
+    controller(t_, *x, *v, reference_, 0.0, &u, &s);
     t_ += period.seconds();
-    return return_type::OK;
+    return command_interfaces_[0].set_value(u) ? return_type::OK : return_type::ERROR;
   }
 
 private:

@@ -151,7 +151,7 @@ def view(
 
     To push a body, double-click it, hold Ctrl, and drag with the right mouse button.
 
-    The command needs MuJoCo 4. Ctrl-C ends it.
+    The command needs MuJoCo 4.0.1, which is not on the package index yet. Ctrl-C ends it.
 
     Example: smc-mujoco view duffing --law super_twisting,pid
 

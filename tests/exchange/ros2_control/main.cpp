@@ -28,6 +28,12 @@ int main()
     controller->update({}, {1e-3});
     std::printf("%.17g\n", controller->command_interfaces_[0].value);
   }
-  controller->on_deactivate({});
+  using controller_interface::return_type;
+  for (auto * interface : {&controller->state_interfaces_[1], &controller->command_interfaces_[0]}) {
+    interface->held = true;
+    if (controller->update({}, {1e-3}) != return_type::ERROR) return 3;
+    interface->held = false;
+  }
+  if (controller->on_deactivate({}) != CallbackReturn::SUCCESS) return 4;
   return controller->command_interfaces_[0].value != 0.0;
 }

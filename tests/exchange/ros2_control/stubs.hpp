@@ -2,6 +2,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,12 +30,19 @@ struct Node
     return last = std::make_shared<rclcpp::Subscription<M>>(rclcpp::Subscription<M>{f});
   }
 };
-struct Interface { double value; double get_value() const { return value; } void set_value(double x) { value = x; } };
+// as in ros2_control of 2026-08, where get_value() is gone
+struct Interface
+{
+  double value;
+  bool held = false;  // by the hardware
+  [[nodiscard]] std::optional<double> get_optional() const { return held ? std::nullopt : std::optional<double>(value); }
+  [[nodiscard]] bool set_value(double x) { value = held ? value : x; return !held; }
+};
 namespace controller_interface
 {
 enum class CallbackReturn { SUCCESS, ERROR };
 enum class interface_configuration_type { INDIVIDUAL };
-enum class return_type { OK };
+enum class return_type { OK, ERROR };
 struct InterfaceConfiguration { interface_configuration_type type; std::vector<std::string> names; };
 struct ControllerInterface
 {
@@ -51,7 +59,7 @@ struct ControllerInterface
   unsigned get_update_rate() const { return rate; }
   std::shared_ptr<Node> node = std::make_shared<Node>();
   unsigned rate = 1000;
-  std::vector<Interface> state_interfaces_{2}, command_interfaces_{1};
+  std::vector<Interface> state_interfaces_ = std::vector<Interface>(2), command_interfaces_ = std::vector<Interface>(1);
 };
 }
 #define RCLCPP_ERROR(logger, text) (void)(logger), (void)(text)
