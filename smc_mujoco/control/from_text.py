@@ -11,6 +11,7 @@ wrote is restored by serialise.py, which runs no files.
 """
 
 import ast
+import contextlib
 import dataclasses
 import os
 import re
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common import annexes
+from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.files import read_json, reading
 from smc_mujoco.common.scripts import execute
@@ -27,6 +29,7 @@ from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 # pid(kp=50,ki=50,kd=8)
 NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
@@ -111,7 +114,16 @@ def laws(text: object) -> list[str | Law]:
         return [law(labelled["rest"]).named(labelled["label"].strip())]
     elif tuned := FILE_AND_TUNING.fullmatch(text):
         found = _tuned(tuned["tuning"])
-        return [dataclasses.replace(law(tuned["file"], **found.gains), source=found.source)]
+        own = law(tuned["file"])
+        module = getattr(own.function, "__module__", "")
+        # a law that has another name by `named` is still of its module
+        if own.name != found.name and module != _described(tuned["tuning"])["law"].get("module"):
+            raise ScenarioError(
+                f"{tuned['tuning']} has gains of law {found.name!r}, and {tuned['file']} has law "
+                f"{own.name!r}: give the file of the same law"
+            )
+        serialise.check_gains(found.name, found.gains, own.gains)
+        return [dataclasses.replace(_with_gains(own, found.gains), source=found.source)]
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     if read := _reader(head):
@@ -200,11 +212,23 @@ def _of_tuning(path: str) -> list[Law]:
 
 def _tuned(path: str) -> Law:
     """Return the law of a tuning, with its search as the source of the gains."""
-    with reading(
-        path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote"
-    ) as file:
-        scenario = read_json(file)["scenario"]
-        return serialise.law(scenario["law"], scenario["source"])
+    scenario = _described(path)
+    with _reading(path):
+        found = serialise.law(scenario["law"], scenario["source"])
+        of_library = scenario["plant"]["module"].startswith("smc_mujoco.mechanisms.plants.")
+    if of_library:
+        find(f"plant of {path}", scenario["plant"]["name"], plants_known())
+    return found
+
+
+def _described(path: str) -> Data:
+    """Return the scenario of a tuning, as data."""
+    with _reading(path) as file:
+        return read_json(file)["scenario"]
+
+
+def _reading(path: str) -> contextlib.AbstractContextManager[Path]:
+    return reading(path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote")
 
 
 def _of_c(path: str) -> list[Law]:

@@ -1,10 +1,12 @@
 """A component as JSON data and back."""
 
 import dataclasses
+from collections.abc import Iterable
 
 from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Data, Fields
 from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws
@@ -42,19 +44,35 @@ def law(data: Data, source: Data | None) -> Component:
 def restore(data: Data, kind: str, known: Catalogue[Template]) -> Component:
     """Return the component that `describe` wrote, without its function if that is not among the
     known ones.
+
+    Raises:
+      ScenarioError: it lacks a gain of the known one, or has another.
     """
     module = data["module"]
-    candidates = known.own.values()  # a law may have another name, see `named`
+    candidates = [  # a law may have another name, see `named`
+        template for template in known.own.values() if {*template.gains} == {*data["gains"]}
+    ]
     if data["name"] in known:
         candidates = [known[data["name"]]]
     for template in candidates:
-        if template.function.__module__ == module and {*data["gains"]} <= {*template.gains}:
+        if template.function.__module__ == module:
+            check_gains(data["name"], data["gains"], template.gains)
             component = template.bind(data["gains"])
             if component.name == data["name"]:
                 return component
             return component.named(data["name"])
     stored = {name: data[name] for name in ("name", "gains", "memory")}
     return Component(kind=kind, relative_degree=data["degree"], function=None, **stored)
+
+
+def check_gains(name: str, given: Iterable[str], own: Iterable[str]) -> None:
+    """Raise ScenarioError unless the gains of a file are those of its law."""
+    for which, names in (("lacks", {*own} - {*given}), ("has", {*given} - {*own})):
+        if names:
+            raise ScenarioError(
+                f"the file {which} {', '.join(sorted(names))}, and {name!r} has the gains "
+                f"{', '.join(own)}: make the file again"
+            )
 
 
 def _laws_of_annex(module: str) -> dict[str, Template]:

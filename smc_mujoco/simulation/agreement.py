@@ -92,7 +92,7 @@ class NoDynamics:
         raise ValueError("there is no tip")
 
 
-def _known(made: Function, function: Callable) -> bool:
+def _known(made: Function, function: Any) -> bool:
     """Return whether a function needs no check: it had one, or is of this package."""
     return made.checked or fingerprint.ours(function)
 

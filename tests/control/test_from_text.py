@@ -1,5 +1,9 @@
 """Laws as text: names, gains in brackets, and files, at every door that takes a law."""
 
+import copy
+import json
+from pathlib import Path
+
 import pyarrow.parquet
 import pytest
 
@@ -7,6 +11,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.control import surface
 from smc_mujoco.control.from_text import component, parsed_gains
+from smc_mujoco.simulation import serialise
 
 MINE = """
 import smc_mujoco as smc
@@ -29,7 +34,8 @@ law = its = smc.law_from(other, name="theirs")
 """
 
 TUNED = """{"scenario": {"source": null, "law": {
-  "name": "mine", "module": "mine", "gains": {"k": 7.0, "c": 1.5}, "memory": 0, "degree": 1}}}"""
+  "name": "mine", "module": "mine", "gains": {"k": 7.0, "c": 1.5}, "memory": 0, "degree": 1},
+  "plant": {"name": "duffing", "module": "smc_mujoco.mechanisms.plants.duffing"}}}"""
 
 
 @pytest.fixture
@@ -76,6 +82,40 @@ def test_a_text_is_its_law(files, text, name, gains):
     assert law.name == name
     assert {each: law.gains[each] for each in gains} == gains
     assert law.source.kind == ("yours" if "(" in text else "default" if law.gains else "none")
+
+
+SHIPPED = serialise.describe(
+    smc.Scenario(plant="duffing", law=smc.law("pid", plant="duffing"), duration=0.1)
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda data: data["law"]["gains"].pop("kd"),
+            "the file lacks kd, and 'pid' has the gains kp",
+        ),
+        (lambda data: data["plant"].update(name="duffin"), "unknown plant of .*did you mean"),
+    ],
+)
+def test_a_tuning_that_lost_something_is_refused(files, change, words):
+    Path("good.json").write_text(json.dumps({"scenario": SHIPPED}))
+    assert smc.law("good.json").source.kind == "shipped"
+    data = copy.deepcopy(SHIPPED)
+    change(data)
+    Path("bad.json").write_text(json.dumps({"scenario": data}))
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.law("bad.json")
+
+
+def test_a_tuning_of_another_law_is_refused(files):
+    Path("other.py").write_text(MINE.replace("mine", "other"))
+    with pytest.raises(smc.ScenarioError, match="gains of law 'mine', and other"):
+        smc.law("other.py(mine.json)")
+    Path("less.json").write_text(TUNED.replace('"k"', '"q"'))
+    with pytest.raises(smc.ScenarioError, match="lacks k"):
+        smc.law("mine.py(less.json)")
 
 
 @pytest.mark.slow
