@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build report gains gallery bench size gpu lock setup
+.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build gains gallery bench size gpu lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -70,9 +70,6 @@ tagged: ## whether TAG, such as v0.1.0, is the tag of this version
 build: setup ## the wheel and the source archive, in dist/
 	$(BIN)/python -m hatchling build
 
-report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
-	$(BIN)/smc-mujoco report
-
 gains: setup ## the laws' gains again, tuned by one rule (within 90 minutes on two cores)
 	$(BIN)/python benchmarks/gains.py --all
 
@@ -103,7 +100,7 @@ gpu: ## the fast engine on a CUDA device, beside the processor; "no device" else
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }
-	$(LOCK) pyproject.toml --extra dm --extra film --extra report --extra rl --group use -o requirements.lock
+	$(LOCK) pyproject.toml --extra dm --extra film --extra site --extra rl --group use -o requirements.lock
 	@# the other locks leave out what requirements.lock has, except what it has only for Windows
 	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
 	$(LOCK) pyproject.toml --extra all --group test --group check $$beside -o requirements-test.lock && \

@@ -5,7 +5,7 @@
     python benchmarks/gains.py my_law       # only those of some laws
     python benchmarks/gains.py --all        # all of them
 
-Every law by the same rule: twelve searches for the laws of the report's first page, which come
+Every law by the same rule: twelve searches for the usual laws, which come
 first, three for all others and for the set "tracking". The gains of a law on a plant are stored as
 soon as their searches end, so this may be stopped at any time, and goes on there. Gains that
 another rule found stay, with that rule beside them, until this rule has found some.

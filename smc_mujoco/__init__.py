@@ -28,7 +28,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
 
 What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, series),
 `smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
-attraction), `smc.accuracy` (orders, half steps), `smc.audits`, `smc.fidelity`, `smc.metrics` (of
+attraction), `smc.accuracy` (orders, half steps), `smc.fidelity`, `smc.metrics` (of
 joints and tips), `smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents)
 and `smc.errors` (warnings).
 

@@ -1,6 +1,5 @@
 import smc_mujoco.simulation.gaber_study
 from smc_mujoco import accuracy as accuracy
-from smc_mujoco import audits as audits
 from smc_mujoco import design as design
 from smc_mujoco import envs as envs
 from smc_mujoco import errors as errors

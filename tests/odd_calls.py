@@ -111,7 +111,6 @@ LINES = {  # command -> its shortest right lines, "?" for what is always odd
     "export": ["pid out.c", "pid out.fmu --no-binary", "? out.c", "?"],
     "enter": ["?", "folder", "a.py", "pid --suite ?", "pid --against ?"],
     "claims": ["--papers", "?", "--paper ?", "--check ?", "1 --gains ?"],
-    "report": ["--law ?"],
     "rig": ["?", "emps ?", "emps a.csv", "emps a.csv --fit", "duffing ? --fit"],
 }
 

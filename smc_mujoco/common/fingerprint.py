@@ -40,7 +40,6 @@ PACKAGE = Path(__file__).parents[1]
 BESIDE_PACKAGE = ("models", "scenes", "benchmarks")
 PAPERS = "benchmarks/papers"
 PRESENTATION = (
-    "evidence/report",
     "evidence/commands",
     "exchange/commands.py",
     "cli",

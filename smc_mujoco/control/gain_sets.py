@@ -39,7 +39,7 @@ SETS = ("study", "tuned", "tracking")
 KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
 NameOfSet = Annotated[str, OneOf(names=(*KNOWN_SETS,))]
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
-# The laws on the report's first page, which are compared where none are named: the four of the
+# The usual laws, which are compared where none are named: the four of the
 # paper, two more of its first study, and the first law of each other family in the table of
 # docs/catalogue.md, which was written before any tuning; then laws without a sliding mode that want
 # to win, written for that after the others were tuned.

@@ -229,7 +229,7 @@ def palette() -> dict[str, dict[str, str]]:
     """Return the colours of the library's laws: those that they state, and those chosen for the
     others, each the farthest from all before it.
 
-    The report's laws are first, then baselines. A law without a colour here gets one by its name.
+    The usual laws are first, then baselines. A law without a colour here gets one by its name.
     """
     return json.loads(Path(__file__).with_name("law_colours.json").read_text(encoding="utf-8"))
 

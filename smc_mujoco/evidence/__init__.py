@@ -1,1 +1,1 @@
-"""Audits, real machines, the report. An annex: nothing in the core imports it."""
+"""Audits, real machines. An annex: nothing in the core imports it."""

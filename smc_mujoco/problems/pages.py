@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import replacing, slug
 from smc_mujoco.common.text import number
 from smc_mujoco.problems import suite
@@ -71,10 +71,20 @@ def _write(
 
 
 def _environment() -> "Environment":
-    """Return the jinja2 environment of the templates."""
-    from markupsafe import Markup
+    """Return the jinja2 environment of the templates: what they insert is escaped, a missing name
+    an error.
+    """
+    with extra("site", "a page of results"):
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
+        from markupsafe import Markup
 
-    made = html.environment(TEMPLATES)
+    made = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.globals |= {
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         "titles": TITLES,

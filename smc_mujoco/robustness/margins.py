@@ -298,7 +298,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         put=_with_lost_gain,
     ),
 }
-# those of the report, and the default
+# the usual ones, and the default
 KINDS = "delay", "disturbance", "friction", "mass", "noise"
 
 

@@ -11,6 +11,7 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
+from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
@@ -158,6 +159,34 @@ class Compared(Tables):
                 file.write_text(text, encoding="utf-8")
         return text
 
+    def to_html(self, path: AnyPath) -> Path:
+        """Write the comparison as one page that needs no other file: the figure of `plot` with
+        every metric compared, tables and verdicts.
+
+        The page suits a phone, and follows the browser's dark mode.
+
+            compared.to_html("compared.html")
+
+        Args:
+          path: of the file.
+
+        Returns:
+          The path.
+
+        Raises:
+          ScenarioError: a file that cannot be written.
+        """
+        about = "Medians with their intervals by condition, as in the tables"
+        figure = html.picture(
+            lambda file, size: self.plot(file, self._metrics, size=size, format="svg"), about
+        )
+        laws = dict.fromkeys(law for gains in self.gains.values() for law in gains)
+        title = f"{joined([*laws])} on {joined([*self.gains])}"
+        page = html.page(title, [figure, *(table._repr_html_() for table in self.tables)])
+        with replacing(Path(path)) as file:
+            file.write_text(page, encoding="utf-8")
+        return Path(path)
+
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.
 
@@ -193,6 +222,13 @@ class Compared(Tables):
                     "winner": board.winner == entry.law,
                 }
 
+    @property
+    def _metrics(self) -> list[str]:
+        """The metrics compared, without J."""
+        compared = dict.fromkeys(board.metric for board in self.leaderboard)
+        compared.pop(paired_runs.OBJECTIVE, None)
+        return [*compared]
+
     def plot(
         self,
         path: AnyPath | None = None,
@@ -213,10 +249,8 @@ class Compared(Tables):
         if not names:
             width, _ = page.measure(options.get("size"), options.get("fig"))
             most = 3 if width < page.NARROW else 5
-            compared = {board.metric: None for board in self.leaderboard}
-            compared.pop(paired_runs.OBJECTIVE, None)
-            names = [*compared][:most]
-            if others := [*compared][most:]:
+            names = self._metrics[:most]
+            if others := self._metrics[most:]:
                 warn_once(f"plot leaves out {joined(others)}: draw the rest with metrics={others}")
         return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
 
@@ -255,7 +289,7 @@ def compare(
     search and each run: after a kill, the same call resumes there.
 
     Args:
-      laws: names, or your own laws. Default: those of the report's first page, of these the ones
+      laws: names, or your own laws. Default: the usual ones, of these the ones
         that come with gains for the plant, if any do; or else all that suit the plant.
       plants: names, or Plants, such as one from your own MJCF. Default: the paper's five.
       conditions: names, such as "noise + coulomb", texts, or your own, see `condition`. Default:

@@ -160,7 +160,7 @@ def which(
       duration: of a run, s. Default: 5, or 3 if quick.
       out: folder for gains and runs, which another call reads.
       quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64. On your own
-        model also a shorter objective, and by default the laws of the report's first page. There
+        model also a shorter objective, and by default the usual laws. There
         one search and six runs in each condition come first, and the best five laws go on.
       defaults: whether a law may win over rivals whose gains are their defaults.
       falling: whether to go on where the base of your model falls while its joints are held, so

@@ -370,7 +370,7 @@ def test_every_command_that_prints_tables_takes_json():
     without = {
         name for name, (_, command) in COMMANDS.items() if "--json" not in parameters(command)
     }
-    assert without == {"enter", "export", "report", "view"}
+    assert without == {"enter", "export", "view"}
 
 
 # what is printed and written

@@ -181,9 +181,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
             "counts": {"supported": 2},
         },
     },
-    "report": {
-        "evidence.report.report": lambda *_, **__: Path("report.html"),
-    },
     "rig": {
         "identification.identify.identify": lambda of, many, *_, **__: identified(len(many)),
         "identification.rig.rig": repeated,
@@ -254,13 +251,6 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             ": 2 supported",
         ],
     ),
-    "report --quick --out there --seeds 2 --law pid,lqr": (
-        0,
-        [
-            "report(Path(there), True, 2, None, progress=True, laws=['pid', 'lqr'])",
-            "wrote report.html (0.3 MB)",
-        ],
-    ),
     (
         "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set "
         "mass=5 --starts 2 --seed 3"
@@ -328,8 +318,6 @@ def called(tmp_path, monkeypatch, capsys):
         monkeypatch.setenv("COLUMNS", "80")
         monkeypatch.setattr("warnings.showwarning", None)
         notes, (command, *_) = Notes(), line.split()
-        if command == "report":
-            Path("report.html").write_bytes(bytes(260_000))
         monkeypatch.setattr("smc_mujoco.common.progress.bar", notes.bar)
         for name, gives in STUBS.get(command, {}).items():
             notes.stub(monkeypatch, name, gives)

@@ -282,7 +282,7 @@ def test_an_object_that_changed_is_another():
     assert fingerprint.of(policy) != before
 
 
-def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(
+def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_commands(
     monkeypatch, tmp_path
 ):
     scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=1.0)
@@ -297,13 +297,13 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
         return key(scenario)
 
     same = now()
-    (package / "evidence" / "report" / "words.py").write_text("# other words")
+    (package / "evidence" / "commands" / "words.py").write_text("# other words")
     (package / "evidence" / "papers" / "measures.py").write_text("# other measures")
     assert now() == same
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same
     fingerprint.package.cache_clear()
-    before = fingerprint.package()  # the key of a report's verdicts
+    before = fingerprint.package()  # the key of an audit's verdicts
     (package / "evidence" / "papers" / "gaber" / "paper.toml").write_text("# other thresholds")
     fingerprint.package.cache_clear()
     assert fingerprint.package() != before

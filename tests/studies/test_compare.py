@@ -5,18 +5,22 @@ folder.
 import functools
 import math
 import os
+import re
 import time
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.browser import browser
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import options
+from smc_mujoco.common import html
+from smc_mujoco.common.tabular import Cell
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.robustness import worst_case
@@ -114,6 +118,38 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
     assert found.traces[0].scenario == found.table.scenario(0)
     assert len(found.traces) == 12
+
+
+def test_its_page_has_every_median_and_verdict_and_needs_no_other_file(found, tmp_path):
+    file = found.to_html(tmp_path / "page.html")
+    text = file.read_text(encoding="utf-8")
+    assert "default-src 'none'" in text
+    assert {at[:5] for at in re.findall(r' (?:src|srcset|href)="([^"]*)"', text)} == {"data:"}
+    for table in found.tables:
+        for cell in (cell for row in table.rows for cell in row if isinstance(cell, Cell)):
+            assert f"{html.text(cell.text)}" in text
+        for note in table.notes:  # verdicts
+            assert html.text(note) in text
+
+
+@pytest.mark.slow
+def test_its_page_fits_a_phone_and_turns_dark(found, tmp_path):
+    file = found.to_html(tmp_path / "page.html")
+    with browser() as chromium:
+        phone = chromium.new_page(viewport={"width": 390, "height": 800}, color_scheme="dark")
+        failures = []
+        phone.on("console", lambda message: failures.append(message.text))
+        phone.on("pageerror", lambda error: failures.append(str(error)))
+        phone.goto(file.as_uri())
+        assert failures == []
+        assert phone.evaluate("document.documentElement.scrollWidth") == 390
+        widths = "all => all.map(one => [one.naturalWidth, one.getBoundingClientRect().width])"
+        ((natural, shown),) = phone.eval_on_selector_all("img", widths)
+        assert natural < 390
+        assert 0 < shown <= 358
+        notes = "all => all.map(one => one.getBoundingClientRect().right)"
+        assert max(phone.eval_on_selector_all("td[colspan] div", notes)) <= 390
+        assert phone.evaluate("getComputedStyle(document.body).color") == "rgb(255, 255, 255)"
 
 
 def test_a_law_that_fails_in_every_run_arrives_in_none_of_j(found):

@@ -155,7 +155,7 @@ def compare(
     Gains that you give in brackets are kept. Any other law, including one from your own file, uses
     the package's gains for the plant. If there are none, it is tuned by the rule that found the
     package's gains, which takes seconds to minutes for each law and plant. A stopped command
-    resumes when you start it again. Without --law, the report's laws that suit the plant are
+    resumes when you start it again. Without --law, the usual laws that suit the plant are
     compared; --law all compares every general-purpose law.
 
     A rig is a real machine whose parameters were identified. With --rig, its parameter sets replace

@@ -1,1 +1,0 @@
-from smc_mujoco.evidence.report import report as report
