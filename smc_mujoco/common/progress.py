@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 # called with the work done and the whole work, which may be an estimate
 Report = Callable[[float, float], None]
 MIN_PIECE = 0.1  # s; a piece of work that took less was read from a file: it tells no speed
+MIN_SHARE = 0.1  # of the work, before which no time is estimated; chosen
 LINE_PERIOD = 10.0  # s between two lines of a log
 
 
@@ -75,8 +76,12 @@ class Bar:
 
     @property
     def left(self) -> str:
-        """The time that is left in words, such as "12 s left"; "" if nothing is known."""
+        """The time that is left in words, such as "12 s left"; "" before a share of MIN_SHARE is
+        done, as first estimates were 10 to 30 times too long.
+        """
         now = time.monotonic()
+        if self.whole and self.share < MIN_SHARE:
+            return ""
         if self.end is not None:
             seconds = max(0.0, self.end - now)
         elif self.share:
@@ -92,12 +97,6 @@ class Bar:
         if self.counted:
             text = f"{self.what} {self.done:g}/{self.whole:g}"
         return ", ".join(filter(None, (text, self.left)))
-
-
-def told(what: str, seconds: float) -> None:
-    """Tell about how long something may take, before it starts, if that is long."""
-    if seconds > LINE_PERIOD:
-        print(f"{what} takes up to about {length(seconds)}", file=sys.stderr)
 
 
 def length(seconds: float) -> str:

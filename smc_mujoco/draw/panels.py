@@ -23,7 +23,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.mechanisms.layout import channel_names
-from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
+from smc_mujoco.metrics.conventions import Group, group_trace, scale, settling_band
 from smc_mujoco.metrics.tip import contacts, knows_contacts, tip_error
 from smc_mujoco.simulation.trace import Trace
 
@@ -650,7 +650,7 @@ def target(ax: Axes, panel: Panel) -> None:
     bottom, top = ax.get_ylim()
     for trace, times, values in references(panel.traces):
         t, r = line(times, values if panel.quantity == "x" else 0.0 * values, 2)
-        half = SETTLING_BAND * scale(trace)
+        half = settling_band(trace.scenario, scale(trace))
         if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
         look = {"lw": style.points(0.8), "ls": DASHES, "zorder": 3, "gid": REFERENCE}

@@ -546,7 +546,8 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     plants = sorted({trace.scenario.plant.name for trace in traces})
     if len(plants) > 1:
         raise ScenarioError(
-            f"traces of {' and '.join(plants)} share no axes: draw one plant at a time"
+            f"traces of {' and '.join(plants)} share no axes: draw one plant at a time, "
+            f"such as [t for t in traces if t.scenario.plant.name == {plants[0]!r}]"
         )
     kinds = set()
     for trace in traces:

@@ -123,20 +123,23 @@ def trends(trace: Trace) -> dict[str, float]:
     return found
 
 
+def _band(trace: Trace) -> float:
+    return conventions.settling_band(trace.scenario, scale(trace))
+
+
 @metric("s", need="fast", error=True)
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
-    Last exit of max_i |e_i| from 2 % of the scale. The time counts from t[0], even if r steps
+    Last exit of max_i |e_i| from 2 % of the scale, or from 5 standard deviations of the noise if
+    the run starts within 15. The time counts from t[0], even if r steps
     later. NaN where the reference travels, as in a speed loop: no time is known for that.
     """
     if travels(trace):
         return np.nan
     if conventions.leans(trace):
         return np.inf
-    return last_exit(
-        trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace)
-    )
+    return last_exit(trace.t, conventions.row_max(np.abs(error(trace))), _band(trace))
 
 
 @metric("s")
@@ -363,13 +366,13 @@ def reversal_rate(trace: Trace) -> float:
 @metric("s", network=True)
 def mean_settling_time(trace: Trace) -> float:
     """Time from which |mean of e over the channels| stays in the settling band."""
-    return last_exit(trace.t, np.abs(error(trace).mean(axis=1)), SETTLING_BAND * scale(trace))
+    return last_exit(trace.t, np.abs(error(trace).mean(axis=1)), _band(trace))
 
 
 @metric("s", network=True)
 def spread_settling_time(trace: Trace) -> float:
     """Time from which max_i x_i - min_i x_i stays within 2 % of the scale."""
-    return last_exit(trace.t, np.ptp(trace.x, axis=1), SETTLING_BAND * scale(trace))
+    return last_exit(trace.t, np.ptp(trace.x, axis=1), _band(trace))
 
 
 @metric("{x}", network=True, late=True)

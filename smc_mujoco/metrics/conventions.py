@@ -21,7 +21,8 @@ project:
 
 - scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over
   them if that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
-- settling band: |e| <= 2 % of the scale.
+- settling band: |e| <= 2 % of the scale; of a run that starts within 15 standard deviations of the
+  noise, 5 of them, as no law knows the error better.
 - leaning: a joint of a user's model whose u stays at one bound for half of the last part, or whose
   base falls, has neither settled nor arrived.
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which
@@ -73,6 +74,8 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
 SETTLING_BAND = 0.02  # of the scale
+# standard deviations of the noise; within so many a start tells no law where it is, chosen
+NEAR_NOISE = 15.0
 LEANS = 0.5  # of the last part, chosen: an honest law has left its bound by then
 ARRIVAL_BAND = 0.1  # of the scale
 ARRIVAL_COUNTS = 5.0  # of what the sensor tells apart
@@ -419,6 +422,14 @@ def resolution(scenario: Scenario, group: Group) -> float:
         if (sensor := scenario.encoder(i)) is not None:
             apart = max(apart, sensor.quantum(group.unit == "rad") / 2)
     return apart
+
+
+def settling_band(scenario: Scenario, largest: float) -> float:
+    """Return the settling band of a group with a scale, in its unit."""
+    sigma = scenario.noise.velocity if scenario.tracks == "speed" else scenario.noise.position
+    if largest < NEAR_NOISE * sigma:
+        return ARRIVAL_COUNTS * sigma
+    return SETTLING_BAND * largest
 
 
 def last_exit(t: Array, magnitude: Array, band: float) -> float:

@@ -36,8 +36,8 @@ MEDIANS = (
 )
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "J, which tuning minimises, is time-weighted relative error plus weighted variation of "
-    "u. Unseen runs were not used in tuning.",
+    "J (": "Tuning minimises J (time-weighted relative error plus weighted variation of u); the "
+    "table's J is from other runs.",
     "shipped": "Shipped gains come with the package.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",

@@ -29,7 +29,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import DURATION, WorstCase, WorstCases
-from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
+from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
@@ -87,6 +87,9 @@ class Compared(Tables):
     def traces(self) -> list[Trace]:
         """The traces of the first seed: of each plant, in each condition, of each law; computed
         when first used.
+
+        A figure has one plant: `smc.figure([t for t in compared.traces if t.scenario.plant.name ==
+        "duffing" and t.scenario.condition == "friction"])`.
         """
         seeds = self.table.column("seed")
         rows = (seeds == seeds.min()).nonzero()[0].tolist()
@@ -305,8 +308,9 @@ def compare(
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      searches: independent searches of a tuning. Default: 12, or 6 if quick, from which few
-        verdicts follow.
+      searches: independent searches of a tuning. Laws with fewer shipped sets of gains are tuned
+        too; of laws with more, that many sets run. Default: 12, or 6 if quick, from which few
+        verdicts follow, and shipped sets as they are.
       budget: largest number of sets of gains that a search tries, for each gain.
       quick: shorter runs and fewer searches; by default three plants and three conditions.
       threads, progress: as in `run`.
@@ -328,18 +332,18 @@ def compare(
         as_plant(plant) for plant in listed("plants", extent.plants if plants is None else plants)
     ]
     length = duration or extent.duration
-    if conditions is None:
-        conditions = applicable(extent.conditions, machines, length)
-    trial = Trial(
-        plants=machines,
-        conditions=[find_condition(name) for name in listed("conditions", conditions)],
-        duration=length,
+    trial = Trial.of(
+        machines,
+        conditions,
+        extent.conditions,
+        length,
+        out,
         starts=starts,
-        folder=Path(out),
         threads=threads,
         progress=progress,
         defaults=defaults,
-        searches=searches or (QUICK_SEARCHES if quick else SEARCHES),
+        asked=searches,
+        usual=QUICK_SEARCHES if quick else SEARCHES,
         budget=budget,
         tune=tune and gains == "tuned",
         gain_set=gains,
@@ -355,7 +359,7 @@ def compare(
     for plant in machines:
         chosen[plant.name] = of_all or [law_or_template(law) for law in _usual(plant)]
     trial.check(chosen)
-    candidates = trial.candidates(chosen)
+    candidates = trial.candidates(chosen, seeds)
     table = trial.run(candidates, seeds)
     found = {}
     if worst:

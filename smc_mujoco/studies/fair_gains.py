@@ -14,13 +14,15 @@ import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.ranking import needed_to_win
 from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import (
     MAX_ITEMS,
@@ -28,8 +30,8 @@ from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
 )
-from smc_mujoco.common.progress import bar, told
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import counted, joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue, known_laws
@@ -38,8 +40,8 @@ from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import WorstCase, cached_worst_case
 from smc_mujoco.simulation import coerce, run_key
-from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
-from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names
+from smc_mujoco.simulation.conditions import NAMED, Condition, applicable, find_condition
+from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names, listed
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
@@ -92,8 +94,12 @@ def law_or_template(law: Component | Template | str) -> Component | Template:
     return given
 
 
-def _without_search(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
-    """Return a law whose gains need no search; None for one that must be tuned."""
+def _without_search(
+    plant: Plant, law: Component | Template, gains: str, asked: int | None
+) -> Candidate | None:
+    """Return a law whose gains need no search; None for one that must be tuned, which is also one
+    with fewer shipped sets of gains than are `asked` for. Of more sets the first are used.
+    """
     if isinstance(law, Component):
         return Candidate(law, (law,))
     if not law.gains or gains == "default":
@@ -105,6 +111,10 @@ def _without_search(plant: Plant, law: Component | Template, gains: str) -> Cand
         count = 1
         if gains != "study":
             count = len(gain_sets.tuned(plant, law.name, gains).sets)
+            if asked and gains == "tuned":
+                if count < asked:
+                    return None
+                count = asked
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(gain_sets.law(plant, law.name, gains), sets)
     return None
@@ -130,7 +140,8 @@ class Trial(NamedTuple):
     progress: bool
     # whether a law may win over rivals that have their defaults
     defaults: bool = False
-    searches: int = SEARCHES
+    asked: int | None = None  # number of searches that the user asked for
+    usual: int = SEARCHES  # number of searches if the user asked for none
     budget: int = BUDGET  # sets of gains that a search tries at most, for each gain
     tune: bool = True  # whether laws without gains are tuned
     gain_set: str = "tuned"  # of the package's gains
@@ -138,6 +149,30 @@ class Trial(NamedTuple):
     brief: bool = False  # whether searches have BRIEF as objective
     device: str = "cpu"  # on which the fast engine searches
     executor: Workers | None = None  # where searches and runs are made
+
+    @classmethod
+    def of(
+        cls,
+        plants: Sequence[Plant],
+        conditions: object,
+        known: Sequence[str],
+        duration: float,
+        out: AnyPath,
+        **fields: Any,
+    ) -> "Trial":
+        """Return a trial in conditions, or where these are None in those of the `known` ones that
+        suit the plants, with other fields as given.
+        """
+        given = conditions
+        if given is None:
+            given = applicable(known, plants, duration)
+        found = [find_condition(name) for name in listed("conditions", given)]
+        return cls(plants=plants, conditions=found, duration=duration, folder=Path(out), **fields)
+
+    @property
+    def searches(self) -> int:
+        """The number of searches that tune a law."""
+        return self.asked or self.usual
 
     def seeds(self, count: int) -> range:
         """Return the seeds of that many runs, which are also the numbers of unseen instances."""
@@ -167,9 +202,9 @@ class Trial(NamedTuple):
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
 
-    def candidates(self, laws: Mapping[str, Laws]) -> dict[str, list[Candidate]]:
-        """Return plant -> its laws with gains: given, shipped, tuned or default ones, in this order
-        of preference.
+    def candidates(self, laws: Mapping[str, Laws], seeds: int) -> dict[str, list[Candidate]]:
+        """Return plant -> its laws with gains for that many runs in each condition: given, shipped,
+        tuned or default ones, in this order of preference.
 
         If some laws have shipped gains, the others are tuned from the starts of those. The folder
         keeps each search.
@@ -181,7 +216,10 @@ class Trial(NamedTuple):
         known: dict[str, list[Candidate | None]] = {}
         starts: dict[str, Starts | None] = {}
         for plant in self.plants:
-            candidates = [_without_search(plant, law, self.gain_set) for law in laws[plant.name]]
+            asked = self.asked if self.tune else None
+            candidates = [
+                _without_search(plant, law, self.gain_set, asked) for law in laws[plant.name]
+            ]
             kinds = {candidate.law.source.kind for candidate in candidates if candidate}
             known[plant.name] = candidates
             if source.SHIPPED in kinds:
@@ -190,33 +228,35 @@ class Trial(NamedTuple):
                 starts[plant.name] = self.starts
             if self.tune and not self.defaults:
                 self._check_tunable(plant, laws[plant.name], candidates, starts[plant.name])
-        made: dict[str, list[Candidate]] = {}
-        count = sum(of_plant.count(None) for of_plant in known.values())
-        begun = 0
-        if self.progress and self.tune and count > 1:
+        if self.progress:
             for plant in self.plants:
-                tried = zip(laws[plant.name], known[plant.name], strict=True)
-                untuned = [law for law, found in tried if found is None]
-                seconds, size = self.expected(plant, untuned, starts[plant.name])
-                told(f"tuning for {plant.name}", seconds * self.searches * size)
+                self._say_if_few(known[plant.name], seeds)
+        made: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             made[plant.name] = []
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
                 candidate = found or _default(law)
                 if found is None and self.tune:
-                    begun += 1
-                    if self.progress:
-                        print(f"tuning law {begun} of {count}", file=sys.stderr)
                     candidate = self.search_gains(plant, law, starts[plant.name])
                 made[plant.name].append(candidate)
         return made
 
-    def expected(self, plant: Plant, laws: Laws, starts: Starts | None) -> tuple[float, int]:
-        """Return how long an evaluation takes, s, and how many one search of each law makes at
-        most, in all.
-        """
-        goal = self._goal(plant, starts)
-        return search.expected_of(plant, laws, goal, self.budget, self.threads)
+    def _say_if_few(self, known: Sequence[Candidate | None], seeds: int) -> None:
+        """Say before minutes of tuning that so few sets of gains or runs can name no winner."""
+        samples = []
+        for candidate in known:
+            sets = self.searches if self.tune else 1
+            if candidate:
+                sets = len(candidate.sets)
+            samples.append(min(sets, seeds) if sets > 1 else seeds)
+        blocks = len(self.plants) * len(self.conditions)
+        least = needed_to_win(blocks)
+        if len(samples) > 1 and sorted(samples)[-2] < least:
+            print(
+                f"{max(samples)} sets of gains or runs cannot rank {len(samples)} laws in "
+                f"{counted(blocks, 'condition')}; {least} can",
+                file=sys.stderr,
+            )
 
     def _check_tunable(
         self,
@@ -268,8 +308,10 @@ class Trial(NamedTuple):
             template = default.template
         ranges = template and (dict(template.gains), dict(template.conditions))
         folder = self.folder / "gains"
+        known = [f"gains of {default.name} for {plant.name} are kept in {folder}"]
 
         def searched() -> result.Tuned:
+            known.clear()
             with warnings.catch_warnings():  # the remark says so
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
                 warnings.filterwarnings(
@@ -303,6 +345,9 @@ class Trial(NamedTuple):
             raise
         except ScenarioError as error:
             return _default(law, f"{NOT_TUNED}{error}")
+        if self.progress:
+            for words in known:
+                print(words, file=sys.stderr)
         return candidate_of(default, tuned)
 
     def run(
@@ -345,12 +390,30 @@ class Trial(NamedTuple):
                 runs = Holdout({}, {}, {}, {}, least)
                 with contextlib.suppress(ScenarioError):
                     for candidate in candidates[plant.name]:
-                        parts = candidate.holdout(plant, goal, self.seeds(count), self.threads)
+                        parts = self._holdout(plant, candidate, goal, self.seeds(count))
                         for of_law, values in zip(runs[:4], parts, strict=True):
                             of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
                         shown.advance(1.0)
                     found[plant.name] = runs
         return found
+
+    def _holdout(
+        self, plant: Plant, candidate: Candidate, goal: Objective, instances: range
+    ) -> tuple[np.ndarray, ...]:
+        """Return what `Candidate.holdout` does, which the folder keeps."""
+        keys = [run_key.key(goal.scenarios(plant, law)[0]) for law in candidate.sets]
+
+        def load(path: Path) -> tuple[np.ndarray, ...]:
+            with np.load(path) as parts:
+                return tuple(parts[name] for name in parts.files)
+
+        return cached(
+            self.folder / "unseen" / f"{plant.name}-{candidate.law.name}.npz",
+            [keys, goal.describe(), str(instances)],
+            lambda: candidate.holdout(plant, goal, instances, self.threads),
+            lambda parts, path: np.savez(path, *parts),
+            load,
+        )
 
     def attack(
         self, name: str, scenario: Scenario, within: Uncertainty | None, budget: int | None = None

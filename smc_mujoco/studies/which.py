@@ -19,7 +19,6 @@ from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.progress import told
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template, gain_text
@@ -28,12 +27,12 @@ from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
-from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
+from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.compare import DrawSeed
-from smc_mujoco.studies.fair_gains import BRIEF, Laws, Trial, law_or_template
+from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.table import Table
 
@@ -181,14 +180,13 @@ def which(
         known = [law for law in chosen if law.name in gain_sets.COMPARED]
         chosen = known or chosen
     length = duration or (3.0 if quick else 5.0)
-    if conditions is None:
-        conditions = applicable(DEFAULT_CONDITIONS, [machine], length)
-    trial = Trial(
-        plants=[machine],
-        conditions=[find_condition(name) for name in listed("conditions", conditions)],
-        duration=length,
+    trial = Trial.of(
+        [machine],
+        conditions,
+        DEFAULT_CONDITIONS,
+        length,
+        out,
         starts=starts,
-        folder=Path(out),
         threads=threads,
         progress=progress,
         defaults=defaults,
@@ -198,7 +196,7 @@ def which(
         executor=executor,
     )
     if quick:
-        trial = trial._replace(searches=QUICK_SEARCHES, budget=QUICK_BUDGET)
+        trial = trial._replace(usual=QUICK_SEARCHES, budget=QUICK_BUDGET)
     trial.check({machine.name: chosen})
 
     def judged(table: Table) -> tuple[dict[str, float], Boards]:
@@ -210,16 +208,14 @@ def which(
             )
         return settles, boards
 
-    if brief and progress:
-        _tell_time(trial, machine, chosen, seeds)
     left_out: list[str] = []
     if brief and len(chosen) > FINALISTS:
-        first = trial._replace(searches=1).candidates({machine.name: chosen})
+        first = trial._replace(usual=1).candidates({machine.name: chosen}, FEW)
         _, boards = judged(trial.run(first, min(FEW, seeds), half_steps=False))
         best = boards.order[:FINALISTS]
         left_out = [law.name for law in chosen if law.name not in best]
         chosen = [law for law in chosen if law.name in best]
-    candidates = trial.candidates({machine.name: chosen})
+    candidates = trial.candidates({machine.name: chosen}, seeds)
     table = trial.run(candidates, seeds)
     settles, boards = judged(table)
     found = {law.name: law for law, _, _ in candidates[machine.name]}
@@ -242,16 +238,6 @@ def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[st
         if why := CATALOGUE[metric].refusal(plant):
             raise ScenarioError(why)
     return compared or [NEEDS[name] for name in DEFAULT_NEEDS], properties
-
-
-def _tell_time(trial: Trial, plant: Plant, laws: Laws, seeds: int) -> None:
-    """Tell how long the quick answer for a user's model takes at most, by timing one evaluation."""
-    seconds, size = trial.expected(plant, laws, trial.starts)
-    last = min(FINALISTS, len(laws))
-    searches = size * (1.0 + (QUICK_SEARCHES - 1) * last / len(laws))
-    runs = len(laws) * FEW + 3 * last * seeds  # each of these also at half the step
-    length = len(trial.conditions) * trial.duration / (len(BRIEF.conditions) * BRIEF.duration)
-    told(f"choosing a law for {plant.name}", seconds * (searches + length * runs))
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:

@@ -928,3 +928,25 @@ def test_a_run_has_arrived_within_ten_percent_of_its_start_or_five_sigma(ending,
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "cart_pole", "quadrotor"])
 def test_without_a_law_no_plant_that_falls_or_swings_has_arrived(plant):
     assert not m.arrived(smc.run(smc.Scenario(plant=plant, law="none", duration=3.0)))
+
+
+@pytest.mark.parametrize(
+    ("sigma", "start", "settles"),
+    [
+        (0.0, 0.1, False),  # the rest, .003, is above 2 %
+        (1e-3, 0.1, False),  # and far from the noise
+        (1e-3, 0.0101, True),  # 55 of 10,000 runs missed their goal so, by less than the noise
+        (1e-3, 0.0149, True),
+        (1e-3, 0.0151, False),
+    ],
+)
+def test_a_run_that_starts_near_the_noise_settles_within_five_of_its_deviations(
+    sigma, start, settles
+):
+    run = smc.Scenario(plant="duffing", law="none", x0=start, duration=1.0, noise=smc.Noise(sigma))
+    t = np.linspace(0.0, 1.0, 1001)
+    x = np.where(t < 0.5, start, 0.003)[:, None]
+    made = dataclasses.replace(smc.run(run), x=x)
+    assert (m.settling_time(made) < math.inf) == settles
+    if settles:
+        assert m.settling_time(made) == pytest.approx(0.5)

@@ -8,14 +8,16 @@ import types
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
+from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.studies import fair_gains
-from smc_mujoco.studies.fair_gains import Trial
+from smc_mujoco.studies.fair_gains import Candidate, Trial
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 DUFFING = smc.plant("duffing")
@@ -36,7 +38,7 @@ def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_co
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
-        trial(Path("gains"), [plant], other, defaults=True).candidates({"duffing": laws})
+        trial(Path("gains"), [plant], other, defaults=True).candidates({"duffing": laws}, 12)
     assert asked == [None, other, other]
 
 
@@ -59,8 +61,8 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
     # no catalogue has it, so its name says nothing to what reads the file of a tuning
     heavy = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
     for _ in range(2):
-        searched = trial(tmp_path, [heavy], searches=2, budget=8)
-        (found,) = searched.candidates({"mine": [my_pd]})["mine"]
+        searched = trial(tmp_path, [heavy], usual=2, budget=8)
+        (found,) = searched.candidates({"mine": [my_pd]}, 12)["mine"]
         assert found.law.function is my_pd.function
         assert found.law.gains == tuned[0].law.gains != my_pd.defaults
         assert [dict(law.gains) for law in found.sets] == [
@@ -129,3 +131,43 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     # also with another seed of the comparison run i has the gains of search i
     for first in (0, 1_000_000):
         assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]
+
+
+def test_a_law_with_fewer_shipped_sets_than_searches_asked_for_is_tuned_too(monkeypatch):
+    """It kept its three sets, whatever number was given."""
+    laws = [catalogue()[name] for name in ("fixed_time", "pid")]
+    monkeypatch.setattr(Trial, "search_gains", lambda self, plant, law, starts: law.name)
+    for asked, tuned, kept in ((None, 3, 12), (3, 3, 3), (6, "fixed_time", 6)):
+        few, many = trial(Path("gains"), [DUFFING], asked=asked).candidates({"duffing": laws}, 12)[
+            "duffing"
+        ]
+        assert (few if asked == 6 else len(few.sets)) == tuned
+        assert len(many.sets) == kept
+    untuned = trial(Path("gains"), [DUFFING], asked=6, tune=False)
+    assert len(untuned.candidates({"duffing": laws}, 12)["duffing"][0].sets) == 3
+
+
+def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys):
+    mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
+    monkeypatch.setattr(Trial, "search_gains", lambda *given: capsys.readouterr().err)
+    for usual, words in (
+        (12, ""),
+        (5, "5 sets of gains or runs cannot rank 2 laws in 1 condition; 6"),
+    ):
+        asked = trial(Path("gains"), [DUFFING], usual=usual)._replace(
+            progress=True, conditions=[NAMED["noise"]], defaults=True
+        )
+        (said, _) = asked.candidates({"duffing": [mine, mine]}, 12)["duffing"]
+        assert said.startswith(words)
+        assert bool(said) == bool(words)
+
+
+def test_j_on_unseen_runs_is_kept(tmp_path, monkeypatch):
+    candidates = {"duffing": [Candidate(FAST, (FAST, smc.law("observer_free", lam=6.0, k1=2.5)))]}
+    here = trial(tmp_path, [DUFFING])
+    monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=0.3))
+    first = here.holdout(candidates, 3)["duffing"]
+    monkeypatch.setattr(fair_gains, "objectives", None)
+    again = here.holdout(candidates, 3)["duffing"]
+    for old, new in zip(first[:4], again[:4], strict=True):
+        np.testing.assert_array_equal(old["observer_free"], new["observer_free"])

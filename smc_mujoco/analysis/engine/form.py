@@ -111,6 +111,7 @@ class RowPlaces(NamedTuple):
     v0: int
     limits: int
     bands: int  # within which a channel has settled
+    shares: int  # 2 % of the scale of a channel's group
     known: int  # values of the plant, as the law knows them; as many as it has names
     before: int  # and as they are until a jump
     after: int
@@ -218,6 +219,7 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         v0=row.take(n),
         limits=row.take(n),
         bands=row.take(n),
+        shares=row.take(n),
         known=row.take(values),
         before=row.take(values),
         after=row.take(values),

@@ -26,7 +26,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.hardware.drives import advanced
-from smc_mujoco.metrics.conventions import SETTLING_BAND, groups
+from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, settling_band
 from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.cfunctions import compile_component
 from smc_mujoco.simulation.prepare import known_values, references, run_of, settings
@@ -211,7 +211,9 @@ class Group:
         _put(row, at.x0, s.x0)
         _put(row, at.v0, s.v0)
         _put(row, at.limits, s.limits)
-        _put(row, at.bands, _bands(s))
+        scales = _scales(s)
+        _put(row, at.bands, np.array([settling_band(s, scale) for scale in scales]))
+        _put(row, at.shares, SETTLING_BAND * scales)
         _put(row, at.known, known_values(s))
         _put(row, at.before, [*vars(s.plant.values(s.factors(0))).values()])
         _put(row, at.after, [*vars(s.plant.values(s.factors(max(s.jump_step, 0)))).values()])
@@ -304,15 +306,15 @@ def _settings(s: Resolved) -> Settings:
     return Settings(*(numbers[name] for name in Settings._fields))
 
 
-def _bands(s: Resolved) -> np.ndarray:
-    """Return the settling band of every channel, (n,); NaN where a reference moves."""
+def _scales(s: Resolved) -> np.ndarray:
+    """Return the scale of every channel's group, (n,); NaN where a reference moves."""
     goals = np.zeros(s.plant.n)
     for i, signal in enumerate(s.references):
         goals[i] = math.nan
         if isinstance(signal, Constant):
             goals[i] = signal.amplitude
-    bands = np.abs(np.subtract(s.x0, goals))
+    scales = np.abs(np.subtract(s.x0, goals))
     for group in groups(s):
         channels = list(group.channels)
-        bands[channels] = SETTLING_BAND * (bands[channels].max() or 1.0)
-    return bands
+        scales[channels] = scales[channels].max() or 1.0
+    return scales

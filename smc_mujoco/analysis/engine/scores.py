@@ -253,7 +253,7 @@ def _rest_share(form: Form, at: int) -> tuple[Any, Any]:
     def take(row, work, k):
         for i in range(n if k >= row[SETTING.late] else 0):
             now = log_in(work, work_at.now + WIDTH * i)
-            work[at] = max(work[at], abs((now.x - now.r) / row[row_at.bands + i]))
+            work[at] = max(work[at], abs((now.x - now.r) / row[row_at.shares + i]))
 
     return take, inlined(lambda row, work: SETTLING_BAND * work[at])
 

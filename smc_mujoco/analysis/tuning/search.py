@@ -66,7 +66,7 @@ from smc_mujoco.common.errors import (
     users_stacklevel,
 )
 from smc_mujoco.common.files import writable
-from smc_mujoco.common.progress import Bar, bar, told
+from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.custom.scales import falls
@@ -169,10 +169,7 @@ def tune(
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
-    words = f"tuning {task.law.name} for {task.plant.name}"
-    if progress:
-        told(words, expected(task, searches))
-    words += ": evaluation"
+    words = f"tuning {task.law.name} for {task.plant.name}: evaluation"
     with bar(words, searches * task.size, shown=progress, counted=True) as shown:
         files = [] if folder is None else task.files(searches, folder)
         found = {i: made for i, file in enumerate(files) if (made := file.read())}
@@ -235,37 +232,6 @@ def searched(
     if task.codes() != codes:
         raise ScenarioError(f"a worker has other code for {law.name}: install the same there")
     return task.search(i, failure, lambda count: None)
-
-
-def expected(task: "Task", searches: int) -> float:
-    """Return how long searches take at most, s, by timing an evaluation of the law's own gains."""
-    names = tuple(task.box)
-    evaluate = Evaluator(task.goal, task.cases(0), names, task.threads, by_equation=True)
-    gains: Any = tuple(task.law.gains[name] for name in names)
-    evaluate([gains])  # compiles
-    start = time.perf_counter()
-    evaluate([gains])
-    return (time.perf_counter() - start) * searches * task.size
-
-
-def expected_of(
-    plant: Plant,
-    laws: Sequence[Component | Template],
-    goal: Objective,
-    budget: int,
-    threads: int | None,
-) -> tuple[float, int]:
-    """Return how long an evaluation of the first law that can be tuned takes, s, and how many a
-    search of each law makes at most, in all.
-    """
-    seconds = 0.0
-    size = 0
-    for law in laws:
-        with contextlib.suppress(ScenarioError):
-            task = task_of(plant, coerce.law(law), goal, budget, 0, threads)
-            size += task.size
-            seconds = seconds or expected(task, 1) / task.size
-    return seconds, size
 
 
 @dataclasses.dataclass

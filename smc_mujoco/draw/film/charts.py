@@ -27,7 +27,7 @@ from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.film import arrows, flight
 from smc_mujoco.draw.film.caption import fitted
 from smc_mujoco.draw.panels import Panel
-from smc_mujoco.metrics.conventions import SETTLING_BAND, last_exit, scale
+from smc_mujoco.metrics.conventions import last_exit, scale, settling_band
 from smc_mujoco.simulation.trace import Trace
 
 # Numbers of presentation here are chosen.
@@ -235,7 +235,7 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
     look = {"ms": style.points(7), "mec": style.PAPER, "mew": style.points(0.7)}
     for trace, colour in zip(panel.traces, colours, strict=True):
         error = np.abs(trace.x - trace.r).max(axis=1)
-        time = last_exit(trace.t, error, SETTLING_BAND * scale(trace))
+        time = last_exit(trace.t, error, settling_band(trace.scenario, scale(trace)))
         if trace.diverged_at is None and 0.0 < time < trace.t[-1]:
             y = float(np.interp(time, trace.t, trace.x.mean(axis=1)))
             marks += ax.plot(time, y, "v", color=colour, zorder=6, clip_on=False, **look)
