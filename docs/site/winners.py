@@ -42,7 +42,7 @@ def verdict(comparison: Comparison) -> str:
         return f"{winner} beats B"
     if comparison.level[0, 0, 1]:
         return f"level within {100 * LEVEL_SHARE:.0f} %"
-    return f"no verdict (detectable lead {100 * comparison.visible(0, 'A', 'B'):.0f} %)"
+    return f"no verdict (resolves {100 * comparison.visible(0, 'A', 'B'):.0f} %)"
 
 
 def draw(file: Path = FILE) -> None:

@@ -353,7 +353,7 @@ class Board(Tables):
             return ""
         few = self._counted(self._samples)
         least = max(least, self._samples + 1)
-        return f"{few} cannot rank {len(self.entries)} laws here; {self._cure(least)}"
+        return f"{few} cannot rank {len(self.entries)} laws here; {least} can ({self._cure(least)})"
 
     @property
     def _too_few_to_rank(self) -> str:
@@ -362,14 +362,14 @@ class Board(Tables):
         if self._samples >= least:
             return ""
         few = self._counted(self._samples)
-        return f"no law beats all others, and {few} cannot rank them; {self._cure(least)}"
+        cannot = f"no law beats all others, and {few} cannot rank them"
+        return f"{cannot}; {least} can ({self._cure(least)})"
 
     def _cure(self, least: int) -> str:
-        """How many samples are enough, and how to have them."""
-        cure = f"seeds={least}"
-        if max(block.runs for block in self.blocks) >= least:
-            cure = f"searches={least} in compare"
-        return f"{least} can ({cure})"
+        """How to have so many samples."""
+        if max(block.runs for block in self.blocks) < least:
+            return f"seeds={least}"
+        return f"searches={least} in compare"
 
     def _counted(self, count: int) -> str:
         """Return a number of samples, such as "3 sets of gains"."""
@@ -384,7 +384,8 @@ class Board(Tables):
         for law, count in self.few.items():
             words.append(f"{law} ({self._counted(count)})")
         least = min(needed_to_win(self.family), needed_to_rank(len(self.entries)))
-        return f"{joined(words)} {_are(words)} not ranked; {self._cure(least)}"
+        not_ranked = f"{joined(words)} {_are(words)} not ranked"
+        return f"{not_ranked}, which needs {least} ({self._cure(least)})"
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, have not arrived, or never reach a time, such as
