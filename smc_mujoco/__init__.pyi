@@ -4,7 +4,6 @@ from smc_mujoco import design as design
 from smc_mujoco import envs as envs
 from smc_mujoco import errors as errors
 from smc_mujoco import exchange as exchange
-from smc_mujoco import fidelity as fidelity
 from smc_mujoco import hardware as hardware
 from smc_mujoco import metrics as metrics
 from smc_mujoco import signals as signals

@@ -64,7 +64,7 @@ STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
 PROTOCOLS = {*vars(Part), *vars(Friction), *vars(Actuator)}
 PROTOCOLS |= {"value", "bounds", "parameters", "edit_on", "placed", "meets"}
 # modules of public names, which anything may import
-SHELVES = {"accuracy", "signals", "hardware", "errors", "design", "fidelity"}
+SHELVES = {"accuracy", "signals", "hardware", "errors", "design"}
 PUBLIC = {*smc._LAZY.origins, *smc._LAZY.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))

@@ -30,7 +30,6 @@ SHELVES = {  # module of public names -> title of its page
     "hardware": "Real mechanisms",
     "design": "Gains from theory, chattering, regions of attraction",
     "accuracy": "Accuracy",
-    "fidelity": "Fidelity",
     "metrics": "Scores of joints and tips",
     "exchange": "Laws from and to C and FMUs",
     "envs": "Environments for agents",

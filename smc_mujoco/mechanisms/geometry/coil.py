@@ -1,6 +1,4 @@
-"""Drawings of springs and dampers: a helix of wire or a tube whose ends follow two bodies. No mass,
-no force.
-"""
+"""Drawings of springs: a helix of wire whose ends follow two bodies. No mass, no force."""
 
 import numpy as np
 
@@ -15,7 +13,10 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     every joint at 0. A point at s in [0, 1] between them follows the bodies with weights 1 - s and
     s, so the coil stretches evenly.
     """
-    first, last, axis, up = _line(start, end)
+    first = np.array(start[2], float)
+    last = np.array(end[2], float)
+    axis = (last - first) / np.linalg.norm(last - first)
+    up = np.array([0.0, 0.0, 1.0])
     s = np.linspace(0.0, 1.0, turns * STEPS_PER_TURN + 1)
     turn = 2 * np.pi * turns * s[:, None]
     outward = np.cos(turn) * up + np.sin(turn) * np.cross(axis, up)
@@ -23,26 +24,6 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     centre = first + s[:, None] * (last - first) + radius * outward
     vertices = centre[:, None] + wire * (np.cos(around) * outward[:, None] + np.sin(around) * axis)
     _skin(spec, name, start, end, material, vertices, s)
-
-
-def tube(spec, name, start, end, *, span, radius, material):
-    """Add a round tube to spec, on the part `span`, (from, to) in [0, 1], of the line from start to
-    end; see `draw`.
-    """
-    first, last, axis, up = _line(start, end)
-    s = np.array([span[0], span[0], span[1], span[1]])
-    around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
-    outward = np.cos(around) * up + np.sin(around) * np.cross(axis, up)
-    size = radius * np.array([1e-3, 1.0, 1.0, 1e-3])  # closed at both ends
-    vertices = (first + s[:, None] * (last - first))[:, None] + size[:, None, None] * outward
-    _skin(spec, name, start, end, material, vertices, s)
-
-
-def _line(start, end):
-    """Return the ends of the line between two positions in the world, its direction, and up."""
-    first = np.array(start[2], float)
-    last = np.array(end[2], float)
-    return first, last, (last - first) / np.linalg.norm(last - first), np.array([0.0, 0.0, 1.0])
 
 
 def _skin(spec, name, start, end, material, vertices, s):

@@ -136,7 +136,7 @@ def test_a_block_breaks_away_at_mu_m_g(name):
 @pytest.mark.parametrize(
     ("name", "mechanism"),
     [
-        ("duffing", "springs"),
+        ("duffing", "equation"),
         ("van_der_pol", "equation"),
     ],
 )

@@ -349,7 +349,7 @@ def test_your_own_robot_of_one_joint_has_it_too():
         {"friction": smc.hardware.LuGre(0.1, 0.2, 0.05)},
         {"friction": (smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05))},
         {"friction": smc.Viscous(0.1)},
-        {"mechanism": "springs"},
+        {"plant": "pendulum_network", "mechanism": "springs"},
         {"disturbance": smc.signals.Push("cart", 1.0, 0.0, 0.0)},
         {"plant": "cart_pole"},
     ],
