@@ -190,7 +190,10 @@ class Tabular:
         Words in cells of numbers become letters, which a line under the table explains.
         """
         marks: dict[str, str] = {}
-        lines = [f"% {text}" for text in (self.title, *self.notes, "needs booktabs") if text]
+        lines = []
+        for text in (self.title, *self.notes, "needs booktabs"):
+            if text:
+                lines.append(f"% {text}".replace("\n", " "))  # or what follows were no comment
         lines += [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",

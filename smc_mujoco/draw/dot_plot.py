@@ -210,10 +210,10 @@ def _panel(
     for j in range(1, len(conditions)):
         ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
     if len(conditions) == 1:
-        ax.set_yticks(range(len(looks)), map(style.law_name, looks))
+        ax.set_yticks(range(len(looks)), map(style.law_name, looks), parse_math=False)
     else:
         middles = height * (np.arange(len(conditions)) + 0.5) - 1
-        ax.set_yticks(middles, np.char.replace(conditions, "_", " "))
+        ax.set_yticks(middles, np.char.replace(conditions, "_", " "), parse_math=False)
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)

@@ -76,7 +76,7 @@ def _bars(ax: Axes, found: SobolResult, colour: str, pale: str) -> None:
     ax.barh(rows, median, 0.62, color=pale)
     ax.barh(rows, 100 * np.clip(first, 0.0, 1.0), 0.3, color=colour)
     ax.hlines(rows, low, high, color=style.INK, lw=style.points(1.2))
-    ax.set_yticks(rows, [in_words(axis.name) for axis in found.axes])
+    ax.set_yticks(rows, [in_words(axis.name) for axis in found.axes], parse_math=False)
     ax.set(
         xlim=(0.0, 100.0), xlabel=f"share of the variance of {CATALOGUE[found.metric].label} (%)"
     )

@@ -204,6 +204,22 @@ def test_a_plot_has_a_ring_around_each_winner_and_no_other_dot():
     assert rings[1] == []
 
 
+def test_a_name_is_no_formula_in_a_plot_and_no_command_in_latex():
+    """One ended in matplotlib's ValueError, another lost its dollars."""
+    table = made(conditions=("nominal\n\\end{document}", "noise"))
+    names = dict(zip(LAWS, (r"$\write18{id}$", "a $5$ b", "third"), strict=True))
+    table.columns["law"] = np.array([names[law] for law in table.column("law")])
+    drawn = dot_plot.plot(table, metrics=["itae"])
+    drawn.canvas.draw()
+    shown = [text for ax in drawn.axes for text in ax.get_yticklabels()]
+    assert not any(text.get_parse_math() for text in shown)
+    latex = leaderboard(table, ["itae"], by=("plant", "condition")).to_latex()
+    assert r"\$\textbackslash{}write18\{id\}\$" in latex
+    assert r"a \$5\$ b" in latex
+    for line in latex.splitlines():
+        assert line.startswith("%") or r"\end{document}" not in line
+
+
 def test_half_a_step_that_moves_a_median_is_an_alarm():
     table = made()
     halves = []
