@@ -1,7 +1,9 @@
 """How fast: the callback path beside bare mj_step, threads, networks, and other packages, all in
 one run.
 
-    make bench            or            python benchmarks/speed.py [--quick]
+    make bench            or            python benchmarks/speed.py [--quick] [--write]
+
+README's figures are those of benchmarks/speed.json, which --write writes.
 
 Times are of the processor, so that other work on the machine counts little; those of two threads
 are elapsed. A ratio is the median over rounds that alternate between the two sides. A peer that is
@@ -16,11 +18,13 @@ import contextlib
 import dataclasses
 import functools
 import importlib.util
+import json
 import statistics
 import sys
 import time
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -39,7 +43,9 @@ QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 9
 STEPS = 2_000 if QUICK else 10_000
 BARE = functools.partial(mjcb.installed, None)  # neither the callback nor MuJoCo's timers
+MEASURED = Path(__file__).with_suffix(".json")
 console = Console()
+measured: dict[str, float] = {}  # what --write writes: time of a step over that of a bare one
 
 
 def seconds(action: Callable[[], object], clock: Callable[[], float]) -> float:
@@ -145,6 +151,8 @@ def callback_against_mj_step(table: Table) -> None:
             ):
                 a, b, r = ratio(with_law, steps)
                 row(table, f"callback / {other}, {integrator}, {name}", a * per, b * per, r, goal)
+                if other == "bare mj_step":
+                    measured[f"{integrator}, {name}"] = round(r, 3)
 
 
 def threads(table: Table) -> None:
@@ -254,6 +262,8 @@ if __name__ == "__main__":
     for part in (callback_against_mj_step, threads, networks, peers):
         part(table)
     console.print(table)
+    if "--write" in sys.argv:
+        MEASURED.write_text(json.dumps(measured, indent=1) + "\n")
     console.print(
         f"mujoco {mujoco.__version__}, median of {ROUNDS} alternating rounds, one machine, one run"
     )

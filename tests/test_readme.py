@@ -4,6 +4,7 @@ name.
 
 import contextlib
 import io
+import json
 import re
 import runpy
 import shlex
@@ -180,6 +181,14 @@ def test_readme_s_command_gives_the_winners_of_its_table(tmp_path):
         r"`(\w+)` has the \w+ (\w[\w ]*), (\S+) times that of `(\w+)`", " ".join(README.split())
     )
     assert sorted((law, metric, *rest) for metric, law, *rest in printed) == sorted(shown)
+
+
+def test_readme_s_cost_of_a_law_is_that_of_the_benchmark():
+    measured = json.loads((ROOT / "benchmarks" / "speed.json").read_text(encoding="utf-8"))
+    cases = [f"{how}, {what}" for what in ("alone", "with noise and disturbance") for how in ("RK4", "Euler")]
+    added = [f"{100.0 * (measured[case] - 1.0):.0f}" for case in cases]
+    sentence = r"compiled law adds (\d+) % .* RK4 and (\d+) % under Euler, .* (\d+) % and (\d+) %"
+    assert list(re.search(sentence, " ".join(README.split())).groups()) == added
 
 
 def results(folder: Path) -> set[str]:
