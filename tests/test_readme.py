@@ -185,7 +185,11 @@ def test_readme_s_command_gives_the_winners_of_its_table(tmp_path):
 
 def test_readme_s_cost_of_a_law_is_that_of_the_benchmark():
     measured = json.loads((ROOT / "benchmarks" / "speed.json").read_text(encoding="utf-8"))
-    cases = [f"{how}, {what}" for what in ("alone", "with noise and disturbance") for how in ("RK4", "Euler")]
+    cases = [
+        f"{how}, {what}"
+        for what in ("alone", "with noise and disturbance")
+        for how in ("RK4", "Euler")
+    ]
     added = [f"{100.0 * (measured[case] - 1.0):.0f}" for case in cases]
     sentence = r"compiled law adds (\d+) % .* RK4 and (\d+) % under Euler, .* (\d+) % and (\d+) %"
     assert list(re.search(sentence, " ".join(README.split())).groups()) == added

@@ -27,6 +27,23 @@ from smc_mujoco.envs.vector_env import BatchEnv  # noqa: E402
 
 PENDULUM = dataclasses.replace(smc.plant("inverted_pendulum"), x0=(0.2,))
 
+
+@pytest.mark.quick
+def test_films_of_an_environment_run_at_the_rate_of_its_controller():
+    slow = PlantEnv("duffing", changes={"control_period": 0.02})
+    assert slow.metadata["render_fps"] == 50
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(("reach", "applies"), [(4.0, True), (1.0, False)])
+def test_a_swing_up_needs_every_toppling_joint_to_hang(reach, applies, monkeypatch):
+    plant = smc.plant("inverted_pendulum")
+    ranges = np.array([-4.0, -reach]), np.array([4.0, reach])
+    monkeypatch.setattr(tasks, "toppling", lambda plant: np.array([True, True]))
+    monkeypatch.setattr(tasks, "_ranges", lambda plant: ranges)
+    assert tasks.SwingUp().applies_to(plant) == applies
+
+
 # the physics are the benchmark's
 
 

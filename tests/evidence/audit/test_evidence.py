@@ -16,7 +16,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
-from smc_mujoco.evidence.audit import evidence
+from smc_mujoco.evidence.audit import evidence, runs
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import REFUTED
 from smc_mujoco.simulation import serialise
@@ -226,3 +226,9 @@ def test_the_command_writes_evidence_and_checks_the_seal(folder, tmp_path):
     broken = CliRunner().invoke(main.app, ["claims", "--paper", str(tmp_path)])
     assert broken.exit_code == 2
     assert "no paper at" in broken.stderr
+
+
+@pytest.mark.quick
+def test_the_hash_of_some_bytes_depends_on_each_of_them():
+    hashes = {runs._hash(*parts) for parts in ((b"a", b"b"), (b"c", b"b"), (b"a", b"c"), (b"a",))}
+    assert len(hashes) == 4

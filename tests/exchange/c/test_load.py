@@ -208,6 +208,19 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
     assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
 
 
+@pytest.mark.quick
+def test_two_laws_of_one_library_are_two_laws(file, tmp_path):
+    both = law("out[0] = -1.0 * y->e;").replace("smc_law(", "first(")
+    both += law("out[0] = -2.0 * y->e;").replace("smc_law(", "second(").partition("\n")[2]
+    target = tmp_path / "both.so"
+    shared(file(both, "both.c"), target)
+    first, second = (
+        scenario(smc.exchange.law_from_c(target, symbol=name)) for name in ("first", "second")
+    )
+    assert first != second
+    assert run_key.key(first) != run_key.key(second)
+
+
 def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
     path = file(MINE)
     first = scenario(smc.exchange.law_from_c(path)(lam=4.0))

@@ -1,0 +1,116 @@
+"""What a command prints is what its file holds, in the unit that the head names: a table a command,
+read from its end.
+"""
+
+import json
+import math
+import re
+from pathlib import Path
+
+import pytest
+from pyarrow import parquet
+
+from smc_mujoco.cli import main
+
+pytestmark = pytest.mark.quick
+
+FAILS = """
+import math
+import smc_mujoco as smc
+
+@smc.law_function
+def fails(y, gains, memory):
+    return math.nan, y.e
+"""
+
+
+@pytest.fixture
+def printed(tmp_path, monkeypatch, capsys):
+    """A function that runs a command line in an empty folder and returns what it prints."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def run(line: str) -> str:
+        with pytest.raises(SystemExit) as end:
+            main.main(line.split())
+        assert not end.value.code
+        return capsys.readouterr().out
+
+    return run
+
+
+def row(out: str, *starts: str) -> list[str]:
+    """Return the words of the first line of a table that begins with these words, without rules."""
+    for line in out.splitlines():
+        words = re.sub("[│|]", " ", line).split()
+        if words[: len(starts)] == [*starts]:
+            return words
+    raise AssertionError(f"no line begins with {starts} in {out}")
+
+
+def near(word: str, value: float) -> bool:
+    """Whether a printed number has the first three digits of a value."""
+    return math.isclose(float(word), value, rel_tol=6e-3)
+
+
+def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
+    Path("fails.py").write_text(FAILS)
+    out = printed(
+        "compare duffing --law classical,pid,fails.py --gains default --no-tune --condition nominal"
+        " --seeds 3 --duration 0.3 --out there --metrics itae,rms_error"
+    )
+    rows = parquet.read_table("there/results.parquet").to_pylist()
+    failed = sum(one["failure"] is not None for one in rows)
+    assert failed == 3
+    assert re.search(rf"^{len(rows)} runs, {failed} failed,", out, re.MULTILINE)
+    of_runs = out[out.index("duffing, nominal") :]
+    for law in ("classical", "pid"):
+        its = [one for one in rows if one["law"] == law]
+        values = []
+        for name in ("itae", "rms_error"):
+            values.append(sorted(one[name] for one in its)[1])
+        found = [word for word in row(of_runs, law) if re.fullmatch(r"[\d.e-]+", word)]
+        assert all(map(near, found, values)), (found, values)
+    assert "3 of 3" in of_runs[of_runs.index("fails") :]
+
+
+def test_margins_are_printed_in_their_unit(printed):
+    out = printed("margins duffing --law pid --kinds delay,mass --quick --json m.json")
+    for one in json.loads(Path("m.json").read_text()):
+        block = out[out.index(f"largest {one['kind']}") :]
+        words = row(block, "duffing", "pid")
+        assert near(words[2], one["value"])
+        assert near(words[3], one["resolution"])
+        assert words[-1] == one["unit"]
+
+
+def test_worst_prints_what_its_file_holds(printed):
+    out = printed(
+        "worst duffing --law classical,pid --budget 3 --duration 0.2 --gains default --json w.json"
+    )
+    for one in json.loads(Path("w.json").read_text()):
+        words = row(out, one["scenario"]["law"]["name"])
+        assert near(words[1], one["value"])
+        assert near(words[2], one["median"])
+    assert f"{one['metric'].replace('_', ' ')}".removeprefix("rms ") in out
+    assert f" in {one['unit']}," in out
+
+
+def test_sensitivity_prints_shares_in_per_cent_and_ranges_in_their_unit(printed):
+    out = printed(
+        "sensitivity duffing --law classical --bound mass=0.7:1.3,delay=0:0.02 --points 16 "
+        "--duration 0.3 --json s.json"
+    )
+    found = json.loads(Path("s.json").read_text())
+    assert row(out, "delay")[:5] == ["delay", "0", "s", "20", "ms"]
+    for one in found["axes"]:
+        words = row(out, one["name"])
+        shares = [round(100.0 * one[kind]["median"]) for kind in ("first", "total")]
+        assert [*map(str, shares)] == [word for word in words[-3:] if word.isdigit()][-2:]
+
+
+def test_tune_prints_the_gains_of_its_file(printed):
+    out = printed("tune duffing classical --searches 2 --budget 8 --condition nominal --out g.json")
+    gains = json.loads(Path("g.json").read_text())["scenario"]["law"]["gains"]
+    for name, value in gains.items():
+        assert float(row(out, name)[1]) == value
