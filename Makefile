@@ -103,7 +103,7 @@ lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to u
 	$(LOCK) pyproject.toml --extra dm --extra film --extra site --extra rl --group use -o requirements.lock
 	@# the other locks leave out what requirements.lock has, except what it has only for Windows
 	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
-	$(LOCK) pyproject.toml --extra all --group test --group check $$beside -o requirements-test.lock && \
+	$(LOCK) pyproject.toml --extra all --extra cluster --group test --group check $$beside -o requirements-test.lock && \
 	for group in bench docs; do \
 		$(LOCK) --group $$group $$beside -c requirements-test.lock -o requirements-$$group.lock || exit; done
 

@@ -248,7 +248,7 @@ def _compute(
     plants: run_key.Hashes,
     threads: int,
     progress: bool,
-    executor: Workers | None,
+    executor: Any,
 ) -> None:
     """Compute runs, given by key, and store their rows as they finish."""
     # made before any run: a law may change its globals

@@ -200,7 +200,7 @@ def _searched_here(
 
 
 def _searched_elsewhere(
-    task: "Task", missing: Sequence[int], failure: str, shown: Bar, executor: Workers
+    task: "Task", missing: Sequence[int], failure: str, shown: Bar, executor: Any
 ) -> Iterator[tuple[int, SearchResult]]:
     """Have workers make searches side by side, and yield the number and the result of each."""
     made_of = task.plant, task.law, task.goal, task.budget, task.seed
