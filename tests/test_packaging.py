@@ -215,7 +215,7 @@ def without_extras(code: str, folder: Path) -> str:
 def test_the_core_runs_scores_draws_and_plays_a_scene_but_for_its_film_without_any_extra(tmp_path):
     (tmp_path / "short.py").write_text("""
 import smc_mujoco as smc
-run = smc.Scenario(plant="duffing", law="classical", duration=0.05)
+run = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.05)
 scene = smc.Scene(title="Short", conditions={"nominal": {"only": run}})
 """)
     code = """
@@ -224,7 +224,7 @@ from smc_mujoco.envs import *
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common import gl
 names = [name for name in plants() if name != "quadrotor"]
-traces = run([Scenario(plant=name, law="classical", duration=0.01) for name in names])
+traces = run([Scenario(plant=name, law=law("classical"), duration=0.01) for name in names])
 table = study(grid(["duffing"], ["classical"], ["nominal"], seeds=2, duration=0.05), "study")
 print(len(traces) + 1 == len(plants()) > 10, score(traces[0])["itae"] > 0.0, len(table), flush=True)
 gl.missing = lambda: None

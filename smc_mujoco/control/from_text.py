@@ -72,7 +72,9 @@ def law(
       GainWarning: gains that violate a condition of the law's theorem.
       ScenarioWarning: a plant whose parameters are not those for which gains were tuned.
     """
-    if plant is not None:
+    if plant is not None and "plant" in getattr(text, "gains", ()):  # a gain of one's own law
+        gains = {"plant": plant, **gains}  # pyright: ignore[reportAssignmentType]
+    elif plant is not None:
         return _shipped(text, as_plant(plant), gains)
     if isinstance(text, Template) and text.kind == "law":
         return _with_gains(text(), gains)

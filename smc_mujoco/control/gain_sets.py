@@ -243,12 +243,12 @@ def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
     """
     if (stored := _package_gains(gains).get((plant, name))) is not None:
         return stored
-    code = []
+    files = []
     if catalogue().package(name) and (template := catalogue().get(name)):
-        code.append(template.function)
+        files.append(Path(inspect.getfile(template.function)))
     if plants_known().package(plant) and (known_plant := plants_known().get(plant)):
-        code.append(known_plant.build)
-    for folder in (Path(inspect.getfile(function)).parent for function in code):
+        files.append(known_plant.file)
+    for folder in (file.parent for file in files):
         if (path := folder / "tuned_gains" / gains / f"{plant}-{name}.json").is_file():
             record = read_json(path)["record"]
             return _from_record(record, record["rule"])

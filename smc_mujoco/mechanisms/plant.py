@@ -9,6 +9,7 @@ found in the compiled model.
 
 import dataclasses
 import functools
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -297,6 +298,12 @@ class Plant:
     def spec(self) -> mujoco.MjSpec:
         """Return the mechanism as an editable MjSpec, with default parameters."""
         return self.build(self.n)
+
+    @property
+    def file(self) -> Path:
+        """The file that has the code of its builder, or a user's model."""
+        code = self.build if inspect.isroutine(self.build) else type(self.build)
+        return Path(getattr(self.build, "file", "") or inspect.getfile(code))
 
     def load(
         self,

@@ -15,6 +15,14 @@ from smc_mujoco.common.cached import cached_property
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and forks of POSIX")
 
 
+@pytest.fixture(autouse=True)
+def _heard(monkeypatch):
+    """Ctrl-C is heard, also where the tests run in a shell's background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 class Job:
     """Work that lasts until it is stopped."""
 

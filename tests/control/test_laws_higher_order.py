@@ -430,7 +430,7 @@ def test_laws_of_degree_3_settle_a_plant_behind_an_actuator_lag(plant, L, name):
     """With a differentiator of order 2 whose L is of the size of x''': claim 15 of the paper."""
     common = {
         "plant": plant,
-        "law": name,
+        "law": smc.law(name),
         "actuator": smc.Lag(0.05),
     }
     trace = smc.run(smc.Scenario(velocity=smc.estimator("levant", order=2, L=L), **common))

@@ -85,7 +85,7 @@ def test_what_makes_a_mechanism_real_is_in_the_environment_too(changes):
 def test_an_agent_has_the_memories_model_surface_and_estimator_of_its_law(law, fields):
     environment = suite.load("duffing", "track", changes={"duration": 0.2, "x0": 0.7})
     trace = smc.run(run_of(environment.task.setting, smc.law(law), fields))
-    act = smc.envs.agent(law, environment, **fields)
+    act = smc.envs.agent(smc.law(law), environment, **fields)
     first = driven_by_dm(environment, act)
     second = driven_by_dm(environment, act)
     assert np.abs(first - columns(trace)).max() < 1e-9

@@ -751,7 +751,7 @@ def test_a_start_inside_an_obstacle_is_refused_before_anything_runs(refused):
         inside = smc.Scenario(law="none", duration=0.01, **fields)
         free = smc.Scenario(plant="van_der_pol", law="none", duration=0.01)
         words = (
-            f"x0 {inside.x0} puts {fields['plant']}'s",
+            f"at x0 {inside.x0} of {fields['plant']} ",
             f"of contact {fields['contact']!r}: give another x0",
         )
         refused(lambda runs=(free, inside): next(iter(smc.stream(runs))), *words)

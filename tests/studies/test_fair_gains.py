@@ -7,7 +7,6 @@ import functools
 import types
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 import smc_mujoco as smc
@@ -81,7 +80,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         return -gains.kp * y.e - gains.kd * y.de, y.e
 
     def build(n):
-        return mujoco.MjSpec.from_string("<mujoco/>")
+        return DUFFING.build(n)
 
     asked = []
 

@@ -34,6 +34,11 @@ class UserModel:
     others: str = ""  # one of others.OTHERS, or "" if not given
     measured: Names = ()  # joints that are measured beside the channels
 
+    @property
+    def file(self) -> str:
+        """The file of the model; "" for a text."""
+        return self.source.path
+
     def edited(self) -> mujoco.MjSpec:
         """Return the model without sensors, and with its other joints as wanted."""
         spec = self.source.spec()

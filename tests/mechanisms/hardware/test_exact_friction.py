@@ -200,7 +200,7 @@ CASES = [
 def test_motion_and_rest_are_those_of_an_integration_by_events(plant, law, x0, level, d):
     scenario = smc.Scenario(
         plant=plant,
-        law=law,
+        law=smc.law(law),
         x0=x0,
         duration=0.2,
         friction=smc.Coulomb(level),
