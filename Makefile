@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest entered tagged build gains gallery bench size gpu lock setup
+.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -21,7 +21,7 @@ test: ## all tests but the slow ones, a file of them at a time on each core
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
-slow: ## the tests of more than about 0.3 s each whose lines faster ones run, too; for releases, and weekly
+slow: ## the tests of more than about 0.3 s each whose lines faster ones run, too; for releases, and daily
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
@@ -54,11 +54,19 @@ docs: ## the documentation as a site, site/index.html
 	@# this variable leaves out the theme's notice that it is maintained until May 2027; --quiet would hide warnings from --strict
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
 
+without: ## the quick tests in a copy without ANNEX=evidence and its tests, in .cache/without
+	@./setup.sh requirements-test.lock
+	@rm -rf .cache/without
+	@mkdir -p .cache/without
+	@git ls-files -z | tar --null --files-from - --create | tar --extract --directory .cache/without
+	@rm -r ".cache/without/smc_mujoco/$(ANNEX)" ".cache/without/tests/$(ANNEX)"
+	cd .cache/without && PYTHONPATH=. ../../$(BIN)/python -m pytest --quick
+
 lowest: ## the quick tests under the oldest versions that pyproject.toml allows, in .cache/lowest
 	@python3 -m venv --clear .cache/lowest
 	@.cache/lowest/bin/python -m pip install --quiet uv
 	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all]" --group test
-	.cache/lowest/bin/python -m pytest --quick
+	NUMBA_CACHE_DIR=.cache/lowest/numba .cache/lowest/bin/python -m pytest --quick
 
 entered: setup ## the one entry that the last commit or merge brings, in a suite
 	$(BIN)/python .github/entered.py

@@ -4,8 +4,8 @@ testing plugins.
     pytest --quick            # the first case of each test, in files that are marked quick
     pytest -m "not slow"      # without tests of over 0.3 s whose lines faster ones run, too
 
-Compiled code is kept in one folder, so that all workers, all child processes, and copies of the
-package that tests install elsewhere compile a function once. Bytecode is kept too: otherwise each
+Compiled code is kept in the user's cache, see `common.jit.Cache`, so that all workers, child
+processes, clones, and copies of the package that tests install elsewhere compile a function once. Bytecode is kept too: otherwise each
 worker would compile all tests again.
 """
 
@@ -27,7 +27,6 @@ settings.load_profile("any_clock")
 
 ROOT = Path(__file__).parents[1]
 CURE = re.compile(r": \S")  # after what is wrong stands what to do
-os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba"))
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 

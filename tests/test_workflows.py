@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 from helpers.sources import loaded
+from test_architecture import ANNEXES
 
 import smc_mujoco
 
@@ -94,7 +95,27 @@ def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_sha
     for command in made:
         if command.startswith("make "):
             targets.add(command.split()[1])
-    assert targets == {*promised.split(), "slow"}  # the slow tests have a job of their own
+    assert targets == {*promised.split()}
+
+
+def test_what_only_slow_tests_hold_runs_once_a_day_and_so_does_the_rest_without_an_annex():
+    daily = ROOT / ".github" / "workflows" / "daily.yml"
+    made = set()
+    for job in jobs(daily).values():
+        made.add(job["steps"][-1]["run"])
+    assert made == {"make slow", "make without"}
+    assert jobs(daily)["without"]["strategy"]["matrix"]["annex"] == sorted(ANNEXES)
+    for annex in ANNEXES:
+        assert (ROOT / "smc_mujoco" / annex).is_dir()
+        assert (ROOT / "tests" / annex).is_dir()
+
+
+def test_compiled_code_is_kept_from_one_job_to_the_next_where_its_path_is():
+    for _, step in STEPS:
+        if "actions/cache@" in step.get("uses", ""):
+            assert step["with"]["path"] == "~/.cache/smc_mujoco/numba"
+    text = (ROOT / ".github" / "workflows" / "weekly.yml").read_text(encoding="utf-8")
+    assert "actions/cache" not in text
 
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)

@@ -15,6 +15,7 @@ import pickle
 import re
 import secrets
 import sys
+import time
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -40,6 +41,7 @@ inlined = njit(
     error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
+UNREAD = 30 * 86400.0  # s after which a compiled function is deleted
 SEAL_SIZE = hashlib.sha256().digest_size
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
@@ -421,13 +423,11 @@ class Cache:
 
     def __init__(self, key: Key):
         self.key = key
-        package = Path(__file__).parents[1]
         if folder := getattr(numba.config, "CACHE_DIR", ""):
             self.folder = Path(folder)
-        elif os.access(package, os.W_OK):
-            self.folder = package / "__pycache__"
         else:
-            self.folder = Path(os.path.expanduser("~/.cache/smc_mujoco"))
+            kept = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+            self.folder = Path(kept, "smc_mujoco", "numba")
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Return numba's result for a signature, or None."""
@@ -437,6 +437,7 @@ class Cache:
             if not (own(path.parent) and own(path)):
                 return None
             content = path.read_bytes()
+            os.utime(path)  # read today: see `delete_unread`
         except OSError:
             return None
         result = content[SEAL_SIZE:]
@@ -456,6 +457,7 @@ class Cache:
         # there may be nowhere to write
         with contextlib.suppress(OSError):
             self.folder.mkdir(0o700, parents=True, exist_ok=True)
+            delete_unread(self.folder)
         with contextlib.suppress(OSError, ScenarioError), replacing(path) as file:
             file.write_bytes(_seal(path, content) + content)
             file.chmod(0o600)
@@ -466,6 +468,16 @@ class Cache:
         digest = hashlib.sha256(repr(made_by).encode()).hexdigest()
         # a file's name has 255 bytes at most
         return self.folder / f"{self.key.name[:80]}-{digest[:32]}.code"
+
+
+@functools.cache
+def delete_unread(folder: Path) -> None:
+    """Delete the compiled functions of a folder that no process has read for 30 days."""
+    oldest = time.time() - UNREAD
+    for path in folder.glob("*.code"):
+        with contextlib.suppress(OSError):  # another process may delete it, too
+            if path.stat().st_mtime < oldest:
+                path.unlink()
 
 
 def _seal(path: Path, content: bytes) -> bytes:

@@ -2,7 +2,7 @@
 
 opensmc counts its error the other way round, e = r - x, and its default plant is x'' = u + d: at r
 = 0 its controllers' u is ours with the nominal model f = 0, g = 1; its reaching laws give our
-model-free u. Left out where opensmc is not installed (make bench installs it).
+model-free u. Left out where opensmc is not installed.
 """
 
 import numpy as np

@@ -31,7 +31,7 @@ from helpers.runs import made, plainly, same, scenario
 from numba.core.compiler_lock import global_compiler_lock
 
 import smc_mujoco as smc
-from smc_mujoco.common import fingerprint, numba_internals
+from smc_mujoco.common import fingerprint, jit, numba_internals
 from smc_mujoco.common.jit import Key, compiled
 from smc_mujoco.control.law import Measurement, catalogue
 from smc_mujoco.mechanisms.hardware import moments
@@ -836,6 +836,29 @@ def test_a_damaged_cache_is_written_again(tmp_path, monkeypatch):
     for damaged in (b"", data[: len(data) // 2], flipped(data), b"garbage" * 99):
         path.write_bytes(damaged)
         assert [hits(), hits()] == [0, 1]
+
+
+def test_without_a_folder_code_is_kept_in_the_users_cache(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert [hits(), hits()] == [0, 1]
+    assert list(tmp_path.rglob("*.code")) == list((tmp_path / "smc_mujoco" / "numba").iterdir())
+
+
+def test_compiled_code_that_no_process_reads_for_thirty_days_is_deleted(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    assert hits() == 0
+    (kept,) = tmp_path.iterdir()
+    forgotten, other = tmp_path / "forgotten.code", tmp_path / "notes.txt"
+    day = 86400.0
+    for path, age in ((kept, 29), (forgotten, 31), (other, 31)):
+        path.touch()
+        os.utime(path, (time.time() - age * day,) * 2)
+    assert hits() == 1  # which reads it
+    assert time.time() - kept.stat().st_mtime < day
+    jit.delete_unread.cache_clear()
+    jit.delete_unread(tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted([kept, other])
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
