@@ -20,12 +20,6 @@ def path() -> Path:
     return files[0]
 
 
-def plugins() -> list[Path]:
-    """Return the paths of the plugins that the package mujoco loads when it is imported."""
-    folder = Path(mujoco.__file__).parent / "plugin"
-    return sorted(path for path in folder.glob("*") if path.suffix in (".so", ".dylib", ".dll"))
-
-
 @functools.cache
 def library() -> ctypes.CDLL:
     """Return the loaded library."""

@@ -12,7 +12,6 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, guard, process
-from smc_mujoco.mechanisms.custom import mjcf
 
 PACKAGE = Path(smc.__file__).parent
 POSITION = {"read_text": 0, "write_text": 1}  # of the encoding among the arguments
@@ -96,21 +95,6 @@ def test_other_systems_than_linux_keep_mujoco_s_own_choice_of_opengl(platform, m
 def test_without_limits_of_memory_a_model_is_tried_all_the_same(monkeypatch):
     without_module("resource", monkeypatch)
     guard.limit()
-
-
-def test_without_sigkill_a_model_s_error_is_not_one_of_memory(monkeypatch):
-    """Windows has no SIGKILL; a trial that ends well has exit code 0."""
-    monkeypatch.delattr(mjcf.signal, "SIGKILL")
-    monkeypatch.setattr(
-        mjcf.signal, "Signals", [one for one in mjcf.signal.Signals if one.name != "SIGKILL"]
-    )
-    source = mjcf.Source("arm.xml", "")
-    error = mjcf._complaint(
-        source, guard.Failed("reading", "unrecognized element, line 3", 0, 1.0), 1.0
-    )
-    assert str(error) == "MuJoCo cannot read arm.xml (unrecognized element, line 3): fix the file"
-    crashed = mjcf._complaint(source, guard.Failed("compiling", "", 0xC0000005, 1.0), 1.0)
-    assert "ends MuJoCo with exit code 3221225477" in str(crashed)
 
 
 def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):

@@ -1,10 +1,4 @@
-"""Users' models: read from a file, text, MjSpec or PyMJCF, tried in a child process, checked,
-identified by a hash.
-
-A model may crash the process that compiles it, or fill its memory. So `compile_isolated` first
-compiles each model once in a child process, with bounds on time and memory. That takes some
-hundredths of a second.
-"""
+"""Users' models: read from a file, text, MjSpec or PyMJCF, checked, identified by a hash."""
 
 import contextlib
 import dataclasses
@@ -12,8 +6,6 @@ import functools
 import glob
 import hashlib
 import os
-import re
-import signal
 import sys
 import threading
 import xml.etree.ElementTree as ET
@@ -24,10 +16,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import guard, libmujoco, mjcb, process
+from smc_mujoco.common import libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.files import no_room, scratch
-from smc_mujoco.mechanisms.custom import mjcf_trial, urdf
+from smc_mujoco.mechanisms.custom import urdf
 from smc_mujoco.mechanisms.layout import PLAY, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
@@ -56,7 +47,6 @@ MAX_KEPT = 16  # models that are kept as they were read; chosen
 Stamp = dict[str, tuple[int, int]]  # file -> time of its last change, ns, and size
 
 _stamps: dict[str, Stamp] = {}  # of a hash, when it was taken
-_passed: set[str] = set()  # hashes of models that passed
 _known: dict[str, Path] = {}  # hash of a file that this process has read -> where it was
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
 process.free_after_fork(_lock)
@@ -294,58 +284,6 @@ def fields(model: mujoco.MjModel) -> list[str]:
     """Return the names of the model's arrays of numbers."""
     names = [name for name in dir(model) if name[0] != "_"]
     return [name for name in names if isinstance(getattr(model, name), np.ndarray)]
-
-
-def compile_isolated(source: Source, timeout: float) -> None:
-    """Compile a model in a child process within a timeout, s, unless this process has done so
-    before.
-    """
-    if source.sha256 in _passed:
-        return
-    with scratch() as folder, no_room():
-        copies = {name: str(folder / str(i)) for i, (name, _) in enumerate(source.assets)}
-        for name, content in source.assets:
-            Path(copies[name]).write_bytes(content)
-        path = source.path
-        text = source.text
-        if path and (made := urdf.read(Path(path))):
-            path = ""
-            text = made.text
-            copies = {name: str(file) for name, file in made.meshes.items()}
-        (folder / "text").write_text(text, encoding="utf-8", errors="surrogatepass")
-        order = {"path": path, "text": str(folder / "text"), "assets": copies}
-        order |= {"library": str(libmujoco.path()), "plugins": [*map(str, libmujoco.plugins())]}
-        try:
-            guard.run_isolated(mjcf_trial.__name__, order, timeout)
-        except OSError:  # this process may not start others
-            return
-        except guard.Failed as failed:
-            if failed.stage == "loading" or (
-                failed.stage == "reading" and "plugin" in failed.fault
-            ):
-                # MuJoCo did not load, which is not the model's fault, or the user has loaded this
-                # plugin here
-                return
-            raise _complaint(source, failed, timeout) from None
-    _passed.add(source.sha256)
-
-
-def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:
-    """Return the error for a model, from its trial."""
-    names = {-known.value: known.name for known in signal.Signals}
-    cause = ""
-    if failed.code is not None:
-        cause = names.get(failed.code, f"exit code {failed.code}")
-    too_much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
-    if cause == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
-        return ScenarioError(f"{source.label} takes MuJoCo {too_much}: make it smaller")
-    if failed.fault:
-        return broken(source.path or source.label, failed.fault)
-    if not cause:
-        slow = f"takes MuJoCo more than {timeout:g} s to compile"
-        return ScenarioError(f"{source.label} {slow}: make it smaller, or give timeout=")
-    hint = too_much if cause == "SIGABRT" else "a model that attaches itself"
-    return ScenarioError(f"{source.label} ends MuJoCo with {cause}, as does {hint}: fix the model")
 
 
 def broken(where: str, error: str) -> ScenarioError:

@@ -30,7 +30,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import Fields, Names
-from smc_mujoco.common.constraints import OneOf, Timeout, constrained
+from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
@@ -65,7 +65,6 @@ def plant_from(
     name: str | None = None,
     keyframe: str | None = None,
     assets: Mapping[str, bytes | str] | None = None,
-    timeout: Timeout = 20.0,
     tip: str | None = None,
     others: Annotated[str, OneOf(names=OTHERS)] | None = None,
     measured: Iterable[str] | None = None,
@@ -95,12 +94,11 @@ def plant_from(
         joint, or "base" for the model's only one, gives six channels, base_x to base_rz: position,
         rotation vector and their rates as of a free body. Its x and y count only in runs whose
         reference names a measured channel.
-      timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:
-      ScenarioError: a model that cannot be read, crashes MuJoCo, or takes more time or memory (4
-        GiB) than allowed; a number in it that is NaN, infinite or beyond 1e15; an unknown or
-        unsuitable joint, actuator or keyframe; or an x0 outside its joint's range.
+      ScenarioError: a model that cannot be read; a number in it that is NaN, infinite or beyond
+        1e15; an unknown or unsuitable joint, actuator or keyframe; or an x0 outside its joint's
+        range.
 
     Warns:
       ScenarioWarning: what is changed in a URDF; constraints that give way, or dry friction that
@@ -112,7 +110,6 @@ def plant_from(
     model in its own colours; those of several laws are mixed with the laws' colours.
     """
     source = mjcf.source(path, assets)
-    mjcf.compile_isolated(source, timeout)
     # laws and gains refer to plants by name
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")

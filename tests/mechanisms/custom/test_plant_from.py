@@ -899,8 +899,6 @@ WRONG = {
     "x0": {"channels": {"elbow": {"x0": "a"}}},
     "partner's x0 beyond": {"channels": {"elbow": {"partner": "shoulder", "partner_x0": -2e6}}},
     "name": {"name": "duffing"},
-    "timeout": {"timeout": 0.0},
-    "long timeout": {"timeout": 86_401.0},
     "flag": {"rest": f'{ACTUATED}<option><flag actuation="disable"/></option>'},
     "broken": {"rest": "<actuator>\n<mtor/></actuator>"},
     "unclosed": {"rest": "<actuator>\n<motor></actuator>"},
@@ -923,25 +921,12 @@ def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
         arm(rest='<include file="part.xml"/>')
 
 
-# models that harm
+# models that harm a run
 
 HARM = {  # what the model has, and words of the sentence
-    "attaches itself": (
-        '<asset><model name="m" file="arm.xml"/></asset>'
-        '<worldbody><attach model="m" body="upper" prefix="x"/></worldbody>',
-        "arm.xml ends MuJoCo with SIG.*attaches itself: fix the model",
-    ),
-    "slow": (
-        '<size nkey="2000000000"/>',
-        "arm.xml takes MuJoCo more than (1 s to compile|4 GiB of memory): make it sm",
-    ),
-    "data": (
-        '<size memory="100G"/>',
-        "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller",
-    ),
     "nan": (
         '<default><joint damping="nan"/></default>',
-        r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): fix the file",
+        r"arm.xml is nan: give finite numbers",
     ),
     "mass": (
         '<default><geom density="1e300"/></default>'
@@ -960,16 +945,12 @@ HARM = {  # what the model has, and words of the sentence
 
 
 @pytest.mark.parametrize("name", HARM)
-def test_a_model_that_would_harm_this_process_is_one_sentence(arm, tmp_path, monkeypatch, name):
+def test_a_model_that_would_harm_a_run_is_one_sentence(arm, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     rest, words = HARM[name]
     with pytest.raises(smc.ScenarioError, match=words) as caught:
-        arm(
-            rest=ACTUATED + rest,
-            timeout=1.0 if name == "slow" else 20.0,
-        )
+        arm(rest=ACTUATED + rest)
     assert "\n" not in str(caught.value)
-    assert [path.name for path in tmp_path.iterdir()] == ["arm.xml"]  # and no log of MuJoCo's
 
 
 def test_numbers_that_may_be_infinite_are_ranges_alone(arm):
