@@ -10,8 +10,9 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from smc_mujoco.common.aliases import AnyPath, Pair
+from smc_mujoco.common.aliases import AnyPath, Data, Pair
 from smc_mujoco.common.errors import ScenarioError, find, items_of
+from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -40,20 +41,44 @@ BLOCK_WIDTHS = (1.4, 1.0, 1.0)  # relative: of panels over time, of single contr
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
 LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
-ROW_FILLED = 0.82  # part of a row that its axes fill
 SLIDE_PANELS = "x", "u", "settling", "channels"
 
 
 class DrawnRuns(NamedTuple):
-    """Runs of a figure; `changes` are marks by time, s; `span` is the time that panels show, and
-    the whole time, s.
+    """Runs of a figure or a film, with the names, colours and looks of their lines; `events` are
+    what happens to their plants; `span` is the time that panels show, and the whole time, s.
     """
 
     traces: Sequence[Trace]
     names: Sequence[str]
     colours: Sequence[str]
-    changes: Mapping[float, str]
+    looks: Sequence[Data]
+    head: str  # what they are of
+    gains: str  # where these come from
+    events: Sequence[style.Event]
+    marks: Mapping[float, str]  # what happens by its time, s
     span: Pair
+
+    @classmethod
+    def of(cls, traces: Trace | Sequence[Trace], labels: Sequence[str] | None) -> "DrawnRuns":
+        """Return traces of one plant, up to where they are finite, as they are drawn."""
+        traces = style.same_plant(traces)
+        names = style.labels(traces, labels)
+        scenarios = [trace.scenario for trace in traces]
+        sources = [scenario.law.source.words for scenario in scenarios]
+        shown = list(map(finite, traces))
+        events = style.events(traces, names)
+        return cls(
+            shown,
+            names,
+            style.trace_colours(traces),
+            style.looks(traces),
+            style.head(scenarios),
+            by_words(dict(zip(names, sources, strict=True))),
+            events,
+            style.marks(events),
+            (drawing.horizon(shown), end(shown)),
+        )
 
 
 def figure(
@@ -104,11 +129,9 @@ def figure(
     """
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    traces = style.same_plant(traces)
-    names = style.labels(traces, labels)
-    colours = style.trace_colours(traces)
-    traces = list(map(finite, traces))
+    runs = DrawnRuns.of(traces, labels)
     if panels is None:
+        traces = runs.traces
         chosen = _default(traces, width)
         if traces[0].scenario.tracks == "speed":  # x is x', which has no portrait
             chosen = [name for name in chosen if name != "phase"]
@@ -116,9 +139,6 @@ def figure(
             chosen = [name for name in chosen if name in SLIDE_PANELS]
     else:
         chosen = [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
-    runs = DrawnRuns(
-        traces, names, colours, style.marks(traces, names), (drawing.horizon(traces), end(traces))
-    )
     with style.page(width):
         page = _composed_page(runs, chosen, (width, height), title, fig)
         return pages.write(page, paths)
@@ -192,9 +212,7 @@ def _composed_page(
         words = drawing.titles(panels, (pitch * np.array(blocks[k])).tolist())
         _draw_over_time(page, cells[k], list(zip(panels, words, strict=True)), runs, k == 0)
     _draw_beside(page, cells[2], beside, (groups[0], *portraits), runs)
-    pages.set_head(
-        page, width, title or style.head([trace.scenario for trace in traces]), handles, gains
-    )
+    pages.set_head(page, width, title or runs.head, handles, gains)
     page.set_label("; ".join(str(one.get_label()) for one in key))
     pages.space_ticks(page)
     return page
@@ -284,7 +302,7 @@ def _draw_over_time(
             axes.append(ax)
             ax.set_xlim(0.0, runs.span[0])
             drawing.over_time(ax, part, colours, among=panel.traces, names=runs.names)
-            drawing.mark(ax, runs.changes, named=named and ax is axes[0])
+            drawing.mark(ax, runs.marks, named=named and ax is axes[0])
             ax.tick_params(labelbottom=False)
         _equal_ranges(frame, rows)
     if axes:
@@ -303,36 +321,29 @@ def _rows(
     panel: Panel,
     runs: DrawnRuns,
     share: Axes | None = None,
-) -> tuple[Axes, list[tuple[Axes, Panel, Sequence[str]]]]:
-    """Return the axes that have the label of a panel, and its rows: axes, the panel they show, and
-    its colours.
+) -> tuple[Axes, list[drawing.Row]]:
+    """Return the axes that have the label of a panel, and its rows.
 
     A crowded panel has a row for each trace, with the trace's name in it. Others have one row.
     """
     if not drawing.crowded(panel):
         ax = page.add_subplot(cell, sharex=share)
-        return ax, [(ax, panel, runs.colours)]
+        return ax, [drawing.Row(ax, panel, runs.colours)]
     frame = page.add_subplot(cell, frameon=False, xticks=[])
-    pitch = 1.0 / len(panel.traces)
     size = style.points(8.5)
     room = 72 * cell.get_position(page).width * page.bbox.width / page.dpi - 4.0 * size
     look = {"fontsize": size, "edgecolor": "none", "borderaxespad": 0.2, "borderpad": 0.0}
     look |= {"loc": "upper right", "frameon": True, "framealpha": 0.75}
-    rows = []
-    runs_of_rows = zip(panel.traces, runs.names, runs.colours, strict=True)
-    for i, (trace, name, colour) in enumerate(runs_of_rows, 1):
-        ax = frame.inset_axes((0.0, 1.0 - i * pitch, 1.0, ROW_FILLED * pitch), sharex=share)
-        line = pages.entry(".", colour)
-        key = ax.legend(handles=[line], handlelength=1.0, **look)
+    rows = drawing.rows(frame, panel, runs.colours, share=share)
+    for row, name in zip(rows, runs.names, strict=True):
+        key = row.axes.legend(handles=[pages.entry(".", row.colours[0])], handlelength=1.0, **look)
         key.get_texts()[0].set_text(style.cropped(name, room, size))
         key.get_texts()[0].set_parse_math(False)
         key.set_in_layout(False)
-        rows.append((ax, panel._replace(traces=[trace]), [colour]))
-        share = ax
     return frame, rows
 
 
-def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]) -> None:
+def _equal_ranges(frame: Axes, rows: Sequence[drawing.Row]) -> None:
     """Give several rows of a panel the range of the runs that last, and ticks near its ends: of u,
     at its bounds.
     """

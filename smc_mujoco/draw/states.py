@@ -1,24 +1,27 @@
-"""States of a machine over time: whether it sticks or slides, touches something, and where it lies
-in its backlash.
+"""States of a machine over time: whether it sticks, hits or touches something, and where it lies in
+its backlash.
 
-No state is shown for less than MIN_STATE_TIME: a blow of 5 ms is shown for that time, and rest only
-if it lasts so long. `metrics.conventions.at_rest` defines rest. Contact is what MuJoCo's collision
-detection says of the scenario's model, posed at each sample. The flank of a backlash is the sign of
-the joint's reaction. Friction and contacts are in the reaction too: with them the flank is the sign
-of the actuator's force, which does not tell when a rotor is in play.
+A state is shown for MIN_STATE_TIME of the film at least, whatever its speed: a blow of 5 ms fades
+over that time, and rest is shown only if it lasts so long. `metrics.conventions.at_rest` defines
+rest. Contact is what MuJoCo's collision detection says of the scenario's model, posed at each
+sample. The flank of a backlash is the sign of the joint's reaction. Friction and contacts are in
+the reaction too: with them the flank is the sign of the actuator's force, which does not tell when
+a rotor is in play.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.text import joined
+from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import HIT, RUB
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
-from smc_mujoco.mechanisms.layout import joint_ids
+from smc_mujoco.mechanisms.layout import channel_names, joint_ids
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
@@ -26,16 +29,17 @@ from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-MIN_STATE_TIME = 0.15  # s, chosen: nine frames at 60 fps, and long enough to read a word
-CALM, STUCK, STRUCK = range(3)  # moods
+MIN_STATE_TIME = 0.15  # s of a film, chosen: nine frames at 60 fps, long enough to read a word
+HIT_TIME = 0.1  # s of the run: a contact that lasts longer is no hit; chosen
 SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
 class State(NamedTuple):
-    """The state of a machine in words, and its mood, which sets the colour."""
+    """The state of a machine in words, with their colour and their opacity, 0 .. 1."""
 
     words: str
-    mood: int
+    colour: str
+    opacity: float = 1.0
 
 
 class Shape(NamedTuple):
@@ -56,31 +60,85 @@ def shapes(scenario: Scenario) -> list[Shape]:
     return found
 
 
-def timeline(trace: Trace, times: Array, hold: float = MIN_STATE_TIME) -> list[State | None]:
-    """Return the state at each time, s; None for a machine without states, and after its run
-    failed.
+def timeline(
+    trace: Trace, times: Array, played: Callable[[Array], Array] | None = None
+) -> list[State | None]:
+    """Return the state at each time, s; None where there is nothing to say.
+
+    `played` gives the time of the film, s, at times of the run, s; by default they are the same.
     """
-    dry = has_dry_friction(trace.scenario)
+    if trace.scenario.plant.tip:  # its forces have their numbers
+        return [ended(trace, time) for time in times.tolist()]
+    shown = played(trace.t) if played else trace.t
     gap = backlash_gap(trace.scenario)
-    contact = np.any(np.stack([extended(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
-    sliding = np.array([extended(~on, trace.t, hold) for on in at_rest(trace).T])
-    sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T])
+    hits = contacts(trace, shown)
+    rest = np.array([~extended(~on, shown, MIN_STATE_TIME) for on in at_rest(trace).T])
+    rest &= has_dry_friction(trace.scenario)
+    sides = np.array([backlash_side(flank, shown, MIN_STATE_TIME) for flank in flanks(trace).T])
+    plant = trace.scenario.plant
+    names = () if plant.network and not plant.direct else channel_names(plant)
     states: list[State | None] = []
     for time in times.tolist():
         k = int(np.searchsorted(trace.t, time + 1e-9)) - 1
+        sticks = rest[:, k]
         words = []
-        if dry:
-            words.append(stick_words(~sliding[:, k]))
+        if sticks.any():
+            words.append(stick_words(sticks, names))
         if gap:
             words.append(backlash_words(sides[:, k]))
-        if trace.diverged_at is not None and time >= trace.diverged_at:
-            states.append(None)
-        elif contact[k]:
-            states.append(State("contact", STRUCK))
+        if end := ended(trace, time):
+            states.append(end)
+        elif hits[k]:
+            states.append(hits[k])
+        elif words:
+            colour = style.INK if sticks.any() else style.MUTED
+            states.append(State(", ".join(words), colour))
         else:
-            sticks = dry and not sliding[:, k].all()
-            states.append(State(", ".join(words), STUCK if sticks else CALM) if words else None)
+            states.append(None)
     return states
+
+
+def ended(trace: Trace, time: float) -> State | None:
+    """Return how a run has failed by a time, s; None if it has not."""
+    if trace.diverged_at is None or time < trace.diverged_at:
+        return None
+    return State(style.ending(trace), style.MUTED)
+
+
+def contacts(trace: Trace, shown: Array) -> list[State | None]:
+    """Return what is said of contact at each sample, whose times in the film are `shown`, s: "hit,
+    280 N·m", with the largest force of the hit, which fades; "contact" of one that lasts.
+    """
+    touch = in_contact(trace)
+    on = touch.any(axis=1)
+    said: list[State | None] = [None] * len(on)
+    held = extended(on, shown, MIN_STATE_TIME)
+    edges = np.flatnonzero(np.diff(held.astype(int), prepend=0, append=0))
+    for first, stop in edges.reshape(-1, 2).tolist():
+        during = np.flatnonzero(on[first:stop]) + first
+        words = "contact"
+        if trace.t[during[-1]] - trace.t[during[0]] <= HIT_TIME:
+            words = f"hit, {hit_size(trace, touch, during)}"
+        last = during[0]
+        for k in range(first, stop):
+            last = k if on[k] else last
+            fade = 1.0 - (shown[k] - shown[last]) / MIN_STATE_TIME
+            said[k] = State(words, style.REACTION, min(1.0, max(0.0, float(fade))))
+    return said
+
+
+def hit_size(trace: Trace, touch: Array, during: Array) -> str:
+    """Return the largest reaction at samples of a hit, of the channels that touch, with its
+    unit.
+    """
+    sizes = np.abs(np.nan_to_num(trace.reaction[during])).max(axis=0)
+    sizes = np.where(touch[during].any(axis=0), sizes, 0.0)
+    channel = int(sizes.argmax())
+    for group in conventions.groups(trace.scenario):
+        if channel in group.channels:
+            unit = style.units(group)["force"]
+            return f"{style.short(float(sizes[channel]))} {unit}"
+    raise AssertionError
 
 
 def at_rest(trace: Trace) -> Array:
@@ -199,10 +257,13 @@ def backlash_side(flank: Array, t: Array, hold: float) -> Array:
     return np.where(extended(rattles, t, hold), 2, sides).astype(int)
 
 
-def stick_words(sticks: Array) -> str:
-    """Return words for channels (n,) that stick or slide."""
-    if sticks.all() or not sticks.any():
-        return "sticks" if sticks.all() else "slides"
+def stick_words(sticks: Array, names: Sequence[str] = ()) -> str:
+    """Return words for channels (n,) of which some stick; joints of a robot have names."""
+    if sticks.all():
+        return "sticks"
+    if names:
+        who = [name for name, stuck in zip(names, sticks, strict=True) if stuck]
+        return f"{joined(who)} {'sticks' if len(who) == 1 else 'stick'}"
     return f"{sticks.sum()} of {len(sticks)} stick"
 
 

@@ -17,7 +17,7 @@ import re
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -441,30 +441,50 @@ def ending(trace: Trace) -> str:
     return f"{'diverged' if trace.plant_diverged else 'failed'} at {trace.diverged_at:.3g} s"
 
 
-def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> dict[float, str]:
-    """Return the changes of plants, and the `blows` on bodies, time in s -> "mass × 2", "blow of
-    400 N for 20 ms".
+class Event(NamedTuple):
+    """A change of a plant, for good, or a blow, from `time` to `stop`, s, in words."""
+
+    time: float
+    stop: float
+    words: str
+
+
+def events(traces: Sequence[Trace], names: Sequence[str]) -> list[Event]:
+    """Return the changes of plants, and the blows on bodies, such as "mass × 2" and "blow of 400
+    N", in the order of their times.
 
     The labels of the runs precede what only some of them have, where these do not say so.
     """
-    who_at: dict[tuple[float, str], list[str]] = {}
+    who_at: dict[Event, list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
-        events = set()
+        found = set()
         if jump := trace.scenario.jump:
-            events.add((jump.time, trace.scenario.plant.change(jump.factors)))
+            words = trace.scenario.plant.change(jump.factors)
+            found.add(Event(jump.time, math.inf, words))
         if fault := trace.scenario.fault:
-            events.add((fault.at, fault.words))
-        for push in pushes([trace]) if blows else ():
+            found.add(Event(fault.at, math.inf, fault.words))
+        for push in pushes([trace]):
             size = short(math.hypot(push.x, push.y, push.z))
-            events.add((push.time, f"blow of {size} N for {1e3 * push.width:.4g} ms"))
-        for event in events:
+            found.add(Event(push.time, push.time + push.width, f"blow of {size} N"))
+        for event in found:
             who_at.setdefault(event, []).append(name)
+    told = []
+    for event, who in sorted(who_at.items()):
+        if len(who) < len(traces) and not all(event.words in name for name in who):
+            told.append(event._replace(words=f"{', '.join(who)}: {event.words}"))
+        else:
+            told.append(event)
+    return told
+
+
+def marks(happened: Sequence[Event]) -> dict[float, str]:
+    """Return what happened by its time, s, in words: "mass × 2", "blow of 400 N for 20 ms"."""
     words: dict[float, str] = {}
-    for (time, what), who in sorted(who_at.items()):
-        change = what
-        if len(who) < len(traces) and not all(what in name for name in who):
-            change = f"{', '.join(who)}: {what}"
-        words[time] = f"{words[time]}; {change}" if time in words else change
+    for event in happened:
+        said = event.words
+        if math.isfinite(event.stop):
+            said += f" for {1e3 * (event.stop - event.time):.4g} ms"
+        words[event.time] = f"{words[event.time]}; {said}" if event.time in words else said
     return words
 
 

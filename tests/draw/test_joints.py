@@ -3,6 +3,7 @@ happens.
 """
 
 import dataclasses
+import math
 
 import pytest
 from helpers import arms
@@ -56,8 +57,9 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
         duration=0.002,
     )
     (run,) = smc.run([picked])
-    assert style.marks([run], ["none"]) == {0.001: "blow of 50 N for 20 ms; payload + 2 kg"}
-    assert style.marks([run], ["none"], blows=False) == {0.001: "payload + 2 kg"}
+    events = style.events([run], ["none"])
+    assert style.marks(events) == {0.001: "blow of 50 N for 20 ms; payload + 2 kg"}
+    assert [event.stop for event in events] == [pytest.approx(0.021), math.inf]
 
 
 def test_panels_below_a_film_of_an_arm_tell_what_the_tip_does(trace):

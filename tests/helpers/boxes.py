@@ -13,42 +13,44 @@ TOUCH = 1.5  # px by which boxes of letters may overlap: letters fill less
 
 
 def recorded(monkeypatch):
-    """Return lists that grow while pictures are drawn: boxes of the words that were drawn, by
-    their picture, (words, left, low, right, high) px; and the shares of tiles that machines reach.
+    """Return what grows while pictures are drawn: boxes of the words that were drawn last, by their
+    picture and text, (words, left, low, right, high) px; and the shares of tiles that machines
+    reach.
     """
-    boxes = defaultdict(list)
+    boxes = defaultdict(dict)
     shares = []
     draw = Text.draw
     write = ImageDraw.ImageDraw.text
-    tiles = camera.tiles
+    layout = camera.layout
 
     def noted(text, renderer, *given, **named):
         draw(text, renderer, *given, **named)
         if text.get_visible() and text.get_text().strip() and text.get_color() != "none":
             box = text.get_window_extent(renderer).extents
             figure = text.get_figure(root=True)
-            boxes[figure, tuple(figure.bbox.size)].append((text.get_text(), *box))
+            boxes[figure, tuple(figure.bbox.size)][text] = (text.get_text(), *box)
 
     def written(canvas, place, words, fill=None, font=None, anchor=None, **named):
         box = canvas.textbbox(place, words, font, anchor, named.get("spacing", 4))
-        boxes[canvas, canvas.im.size].append((words, *box))
+        boxes[canvas, canvas.im.size][words, place] = (words, *box)
         write(canvas, place, words, fill, font, anchor=anchor, **named)
 
-    def placed(count, size, top, strip, points, turn):
-        found, view = tiles(count, size, top, strip, points, turn)
+    def placed(count, room, sizes, points, turn):
+        tiles, labels, view = layout(count, room, sizes, points, turn)
         seen = np.ptp(camera.project(points, turn, view.place, view.size), axis=0)
         shares.append(float((seen / view.size).max()))
-        return found, view
+        return tiles, labels, view
 
     monkeypatch.setattr(Text, "draw", noted)
     monkeypatch.setattr(ImageDraw.ImageDraw, "text", written)
-    monkeypatch.setattr(camera, "tiles", placed)
+    monkeypatch.setattr(camera, "layout", placed)
     return boxes, shares
 
 
 def check(boxes, whole=True):
     """No two words overlap and all are in their picture; if `whole`, none is cut."""
-    for (_, size), words in boxes.items():
+    for (_, size), texts in boxes.items():
+        words = texts.values()
         for text, left, low, right, high in words:
             assert not (whole and "…" in text)
             assert min(left, low, size[0] - right, size[1] - high) > -TOUCH, text
@@ -62,4 +64,4 @@ def words_of(page, monkeypatch, whole=False):
     boxes, _ = recorded(monkeypatch)
     page.draw_without_rendering()
     check(boxes, whole)
-    return [text for words in boxes.values() for text, *_ in words]
+    return [text for words in boxes.values() for text, *_ in words.values()]

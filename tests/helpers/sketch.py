@@ -1,11 +1,9 @@
-"""Traces of made-up data, the same on all processors, and a pen that notes what a film draws."""
+"""Traces of made-up data, the same on all processors."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
 import numpy as np
-from PIL import ImageDraw
 
 import smc_mujoco as smc
 from helpers.reference import PLANT_DIVERGED
@@ -47,59 +45,3 @@ def failed(trace: smc.Trace, at: int, failure: str = "") -> smc.Trace:
     for array in arrays.values():
         array[at:] = np.nan
     return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure=failure)
-
-
-class Pen(ImageDraw.ImageDraw):
-    """A pen of Pillow that also notes what it draws, in `notes`; in the place of
-    `ImageDraw.Draw`.
-    """
-
-    notes: ClassVar[list[str]] = []
-    busy: ClassVar[bool] = False  # within a shape, which is made of others
-
-
-def _noted(name: str) -> Callable:
-    """Return a method of the pen that notes its call."""
-    draw = getattr(ImageDraw.ImageDraw, name)
-
-    def method(self, *given, **options):
-        first, Pen.busy = not Pen.busy, True
-        if first:
-            named = []
-            for key, value in options.items():
-                named.append(f"{key}={_plain(value)}")
-            many = name == "polygon" or (name == "line" and len(given[0]) > 4)
-            if many:
-                shape = [_outline(given[0]), *given[1:]]
-            else:
-                shape = given
-            Pen.notes.append(" ".join([name, *map(_plain, shape), *named]))
-        try:
-            return draw(self, *given, **options)
-        finally:
-            Pen.busy = not first
-
-    return method
-
-
-def _outline(points: Sequence) -> np.ndarray:
-    """Return the number of the points of an outline, the first, the middle one, their means and
-    spreads.
-    """
-    line = np.array(points, float)
-    return np.array(
-        [len(line), *line[0], *line[len(line) // 2], *line.mean(axis=0), *line.std(axis=0)]
-    )
-
-
-def _plain(part: object) -> str:
-    """Return an argument of a drawing as text: places to a tenth of a px."""
-    if hasattr(part, "getname"):
-        return f"{part.getname()[1]} {number(part.size)}"
-    if isinstance(part, str | type(None)):
-        return repr(part)
-    return numbers(np.round(np.asarray(part, float), 1))
-
-
-for _name in ("text", "line", "rectangle", "rounded_rectangle", "ellipse", "polygon"):
-    setattr(Pen, _name, _noted(_name))

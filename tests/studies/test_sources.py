@@ -103,7 +103,7 @@ def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
 
 
 def test_figures_and_films_say_whose_gains_are_drawn():
-    from smc_mujoco.draw.film import caption
+    from smc_mujoco.draw.figure import DrawnRuns
 
     laws = [FAST, at_default(SLOW)]
     mixed = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.1) for law in laws])
@@ -113,5 +113,4 @@ def test_figures_and_films_say_whose_gains_are_drawn():
         drawn.append(label.get_text())
     assert {"fast, gains: yours", "slow, gains: default"} <= set(drawn)
     assert [note.get_text() for note in smc.figure(alike).artists] == ["gains: yours"]
-    made = caption.Caption(mixed, ["fast", "slow"], ["#000000"] * 2, None, (1280, 460), 1.0, {})
-    assert made.source == "gains: yours for fast, default for slow"
+    assert DrawnRuns.of(mixed, ["fast", "slow"]).gains == "gains: yours for fast, default for slow"

@@ -14,8 +14,6 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows
-from smc_mujoco.draw.film.caption import LETTERS
-from smc_mujoco.draw.film.flight import blows
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.metrics import tip
 
@@ -71,11 +69,12 @@ class Overlay:
             size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
                 at = self.stage.find(self.trace.scenario.plant.tip)
-                self.arrow(image, at, at - self.newton * self.forces[frame], size, style.REACTION)
-        for body, peak in blows(self.trace, self.edges[frame], time):
+                self.arrow(image, at, at - self.newton * self.forces[frame], size, "")
+        start = self.edges[frame] - self.stage.track.holds[frame]
+        for body, peak in arrows.blows(self.trace, start, time):
             size = float(np.linalg.norm(peak))
             place = self.stage.find(body) - BLOW_DISTANCE * peak / size
-            self.arrow(image, place - self.newton * peak, place, size, style.DISTURBANCE)
+            self.arrow(image, place - self.newton * peak, place, size, body)
         return np.asarray(image)
 
     def trail(
@@ -98,33 +97,24 @@ class Overlay:
         ImageDraw.Draw(mask).line(places, round(255 * opacity), thick, joint="curve")
         image.paste(style.rgb(colour), (0, 0), mask.reduce(fine))
 
-    def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, colour: str) -> None:
-        """Draw an arrow with smooth edges between two points, (3,) m, and its force, N, beyond it
-        or, for a blow, before it, within the picture, at whose edge a longer one ends.
+    def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, hits: str) -> None:
+        """Draw the arrow of a force, N, between two points, (3,) m: of a contact, or of a blow that
+        `hits` a body. It is cut at the edge of the picture.
         """
-        s = self.scale
-        after = colour == style.REACTION
-        start, end = self.stage.project(np.array([tail, tip]))
-        near, far = (start, end) if after else (end, start)
-        way = far - near
-        edge = np.where(way > 0.0, np.array(image.size) - RIM * s, RIM * s)
-        shares = np.divide(edge - near, way, out=np.ones(2), where=way != 0.0)
-        far += way * (shares.clip(0.0, 1.0).min() - 1.0)
-        if np.linalg.norm(end - start) > 1.0:
-            outline = arrows.outline(np.linspace(start, end, 40), SHAFT_WIDTH * s)
-            arrows.paint(image, outline, arrows.rgba(colour))
+        line = self.stage.project(np.array([tail, tip]))
+        free, fixed = (line[0], line[1]) if hits else (line[1], line[0])
+        way = free - fixed
+        rim = RIM * self.scale
+        edge = np.where(way > 0.0, np.array(image.size) - rim, rim)
+        shares = np.divide(edge - fixed, way, out=np.ones(2), where=way != 0.0)
+        share = float(shares.clip(0.0, 1.0).min())
+        free += (share - 1.0) * way  # in the line
+        colour = style.DISTURBANCE if hits else style.REACTION
         words = f"{force:.0f} N"
-        wide = style.width(words, LETTERS * s, bold=True)
-        x, y = (end if after else start).tolist()
-        x += 6 * s if (end[0] >= start[0]) == after else -6 * s - wide
-        beyond = x
-        x = min(max(x, 2 * s), image.width - wide - 2 * s)
-        if x != beyond:
-            y -= LETTERS * s  # over the arrow
-        y = min(max(y, LETTERS * s), image.height - LETTERS * s)
-        letters = style.font(LETTERS * s, bold=True)
-        rim = {"stroke_width": round(2 * s), "stroke_fill": style.PAPER}
-        ImageDraw.Draw(image).text((x, y), words, colour, letters, anchor="lm", **rim)
+        arrow = arrows.Arrow(0.0, share, arrows.rgba(colour), body=hits, words=words)
+        if np.linalg.norm(way) > 1.0:
+            points = np.linspace(*line, 40)
+            arrows.stamp(image, points, SHAFT_WIDTH * self.scale, arrow, self.scale, 0, share < 1.0)
 
 
 def overlays(stages: Sequence[Stage]) -> list[Overlay]:

@@ -20,8 +20,8 @@ from PIL import Image, ImageDraw, ImageFilter
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
-from smc_mujoco.draw.film.flight import straight
-from smc_mujoco.mechanisms.plant import EFFORT, catalogue
+from smc_mujoco.draw.film import world
+from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import Group, groups
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
@@ -59,9 +59,17 @@ MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
 FLIGHT_LENGTH = 1.3  # at a free body, in radii of its largest part
 FLIGHT_THICKNESS = 0.07
+FLIGHT_DISTANCE = 0.6  # of an arrow, from the middle of a free body to it
+BLOW_DISTANCE = 1.1  # of an arrow, from the foot of that of a blow to the middle of its body
 MAX_BLOW = 3.0  # of the longest arrow: a stronger blow's is no longer
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
+CUT = 1.02  # of the longest arrow: a longer one is cut, and has its number
+BREAK = 0.45  # of a cut arrow, where its break mark is
+LETTERS = 36.0  # px of a film of full size, of the number at an arrow, as of all its letters
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
+
+
+WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
 class Arrow(NamedTuple):
@@ -75,6 +83,14 @@ class Arrow(NamedTuple):
     head: bool = True
     way: Array | None = None  # of a force on a body, (3,), in the axes of the world
     body: str = ""  # which a blow hits
+    words: str = ""  # its value, of one that is cut
+
+
+class Drawn(NamedTuple):
+    """The arrows of a machine at a time, s: each with its channel."""
+
+    time: float
+    arrows: Sequence[tuple[int, Arrow]]
 
 
 class Mount(NamedTuple):
@@ -149,6 +165,7 @@ class Scale(NamedTuple):
     drive: bool = False  # whether a drive's force is shown, such as a motor's
     longest: float = 0.0
     full: float = 0.0
+    units: tuple[str, str] = ("", "")  # of u, and of a force
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
@@ -172,18 +189,22 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        control = _usual(parts, "applied")
+        control = panels.usual(parts, "applied")
         if drive:
-            control = max(control, _usual(parts, "force"))
+            control = max(control, panels.usual(parts, "force"))
         push = max(map(abs, panels.span(parts, "d")))
         brief.append(push)
         if same:
-            lasting += [control, _usual(parts, "d")]
+            lasting += [control, panels.usual(parts, "d")]
         found[group] = Scale(control, push, reaction, drive, full=0.0 if same else control)
     longest = max(lasting) or max(brief)
     scaled = {}
     for group, scale in found.items():
-        scaled[group] = scale._replace(longest=longest, full=scale.full or longest)
+        units = style.units(group)
+        full = scale.full or longest
+        scaled[group] = scale._replace(
+            longest=longest, full=full, units=(units["u"], units["force"])
+        )
     return scaled
 
 
@@ -193,8 +214,15 @@ def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale) -> list[tupl
     size = float(np.linalg.norm(push))
     if size <= MIN_LENGTH * scale.longest:
         return []
+    return [(0, along(push, scale, ""))]
+
+
+def along(force: Array, scale: Scale, body: str) -> Arrow:
+    """Return the arrow of a force in space, (3,) N, on a body; "" for a free body."""
+    size = float(np.linalg.norm(force))
     length = size / scale.longest
-    return [(0, Arrow(0.0, length, rgba(style.DISTURBANCE), way=push / size))]
+    words = f"{style.short(size)} N" if length > MAX_BLOW else ""
+    return Arrow(0.0, length, rgba(style.DISTURBANCE), way=force / size, body=body, words=words)
 
 
 def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
@@ -202,17 +230,31 @@ def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
     return (*(np.array(style.rgb(colour)) / 255).tolist(), opacity)
 
 
-def _usual(traces: Sequence[Trace], name: str) -> float:
-    """Return the largest magnitude of a quantity in runs that last, without brief values of over
-    twice it.
+def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
+    """Return what the longest arrow of a picture is, such as "→ u 6 N", and how much of a network
+    is shown.
 
-    A brief value takes at most 1 - LASTING_QUANTILE of the time.
+    Arms have no arrows but those with their numbers beside them.
     """
-    peak = max(map(abs, panels.span(traces, name)))
-    usual = 0.0
-    for y in panels.lasting(traces, name):
-        usual = max(usual, float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()))
-    return usual if peak > 2.0 * usual else peak
+    plant = traces[0].scenario.plant
+    if plant.tip:
+        return []
+    words = []
+    drive = any(scale.drive for scale in scales.values())
+    names = {"control": "drive" if drive else "u", "disturbance": "d", "reaction": "reaction"}
+    for kind, name in names.items():
+        sizes = []
+        for scale in scales.values():
+            if size := getattr(scale, kind):
+                sizes.append(f"{style.short(size)} {scale.units[kind != 'control']}")
+        if sizes:
+            mean = "mean " if is_network(plant) else ""
+            words.append(f"→ {mean}{name} {', '.join(sizes)}")
+            break
+    count = max(trace.scenario.plant.n for trace in traces)
+    if count > world.MAX_CHANNELS and is_network(plant):
+        words.append(f"{world.MAX_CHANNELS} of {count} pendulums")
+    return words
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
@@ -242,10 +284,74 @@ def arrows(
     drawn = []
     for layer, (name, longest, shade, size) in enumerate(layers):
         low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
-        drawn.append(Arrow(0.0, mean, shade, layer, size))
+        words = ""
+        if abs(mean) > CUT:
+            unit = scale.units[name in ("disturbance", "reaction", "force")]
+            words = f"{style.short(abs(mean) * longest)} {unit}"
+        drawn.append(Arrow(0.0, mean, shade, layer, size, words=words))
         if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
+
+
+def frames(
+    trace: Trace, edges: Array, holds: Array, sizes: Sequence[Scale], colour: str
+) -> list[Drawn]:
+    """Return the arrows of a machine in each frame between `edges`, s, for what acts on its
+    channels, of these scales. Blows are shown for `holds`, s, after their end.
+
+    The pendulums of a network have one arrow, of the mean of each force.
+    """
+    acting = loads(trace, edges)
+    plant = trace.scenario.plant
+    if is_network(plant) and sizes:
+        acting = {name: mean_of(one) for name, one in acting.items()}
+        shown = [(len(sizes) // 2, sizes[0])]
+    else:
+        shown = list(enumerate(sizes))
+    found = []
+    for k, time in enumerate(edges[1:].tolist()):
+        drawn = []
+        if plant.pose and sizes:
+            drawn = flying(acting, k, sizes[0])
+        else:
+            for i, size in shown:
+                drawn += [(i, arrow) for arrow in arrows(acting, k, i, size, colour)]
+            for body, peak in blows(trace, edges[k] - holds[k], time) if sizes else ():
+                drawn.append((0, along(peak, sizes[0], body)))
+        found.append(Drawn(time, drawn))
+    return found
+
+
+def is_network(plant: Plant) -> bool:
+    """Return whether a plant is made of many alike, such as pendulums; a robot is not."""
+    return plant.network and not plant.direct
+
+
+def mean_of(acting: Envelope) -> Envelope:
+    """Return what acts on the mean channel, for each of them."""
+    parts = [np.repeat(part.mean(axis=1, keepdims=True), part.shape[1], 1) for part in acting[1:]]
+    return Envelope(acting.t, *parts)
+
+
+def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
+    """Return the bodies that blows hit between two times, s, with the peak of each, (3,) N."""
+    found = []
+    for push in style.pushes([trace]):
+        if start <= push.time + push.width and stop >= push.time:
+            found.append((push.body, np.array([push.x, push.y, push.z])))
+    return found
+
+
+def straight(model: mujoco.MjModel, data: mujoco.MjData, body: str | int, force: Array) -> Array:
+    """Return the line of a force's arrow, (40, 3) m: out of a free body, whose number is given; or,
+    of a blow on a body of a name, to its middle.
+    """
+    along = np.linspace(0.0, 1.0, 40)[:, None] * force
+    if isinstance(body, str):
+        names = [model.body(i).name.removeprefix("m/") for i in range(model.nbody)]
+        return data.xipos[names.index(body)] + along - BLOW_DISTANCE * force
+    return data.xpos[body] + along + FLIGHT_DISTANCE * force
 
 
 def path(
@@ -321,6 +427,50 @@ def outline(line: Array, width: float, head: bool = True) -> Array:
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
     tip = [shaft[-1] + wing, line[-1], shaft[-1] - wing]
     return np.concatenate([shaft + across, tip, (shaft - across)[::-1]])
+
+
+def stamp(
+    image: Image.Image,
+    line: Array,
+    width: float,
+    arrow: Arrow,
+    scale: float,
+    rim: int = 0,
+    cut: bool = True,
+) -> None:
+    """Draw an arrow along a line, (m, 2) px, of a film `scale` times as large as a full one, with
+    its number at its free end, and a break mark if it is cut.
+    """
+    paint(image, outline(line, width, arrow.head), arrow.rgba, rim)
+    if not arrow.words:
+        return
+    if cut:
+        k = round(BREAK * len(line))
+        way = line[k] - line[k - 1]
+        way = width * way / max(np.linalg.norm(way), 1e-9)
+        across = way[::-1] * (-0.9, 0.9) + 0.3 * way
+        corners = [across + 0.3 * way, across - 0.3 * way, -across - 0.3 * way, 0.3 * way - across]
+        paint(image, line[k] + np.array(corners), WHITE)
+    end, other = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
+    write(image, arrow.words, end, end - other, arrow.rgba, scale)
+
+
+def write(
+    image: Image.Image, words: str, end: Array, way: Array, rgba: Sequence[float], scale: float
+) -> None:
+    """Write a number beyond the end of an arrow, px, in its way, within the picture."""
+    high = LETTERS * scale
+    wide = style.width(words, high, bold=True)
+    x, y = end.tolist()
+    x += 6 * scale if way[0] >= 0.0 else -6 * scale - wide
+    beyond = x
+    x = min(max(x, 2 * scale), image.width - wide - 2 * scale)
+    if x != beyond:
+        y -= high  # over the arrow
+    y = min(max(y, high), image.height - high)
+    rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
+    fill = tuple(round(255 * part) for part in rgba[:3])
+    ImageDraw.Draw(image).text((x, y), words, fill, style.font(high, True), anchor="lm", **rim)
 
 
 def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:

@@ -4,6 +4,7 @@ and the tiles of a film, one a machine.
 A `turn` is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right, up and backwards.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen
 HEAD_ROOM = 0.02  # of the picture's width: room above the machine in a tile, for arrowheads; chosen
 TILE_GAP = 2  # px between tiles
 MIN_HEIGHT = 0.25  # of a tile's, for a machine whose words have no room; chosen
+MAX_BESIDE = 0.3  # of a row's width, for a label beside its machine; chosen
 Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees
 
 
@@ -108,42 +110,54 @@ def pixel(size: tuple[int, int]) -> float:
     return float(np.tan(np.radians(FOVY) / 2) / (size[1] / 2))
 
 
-def tiles(
+def layout(
     count: int,
-    size: tuple[int, int],
-    top: float,
-    strip: Callable[[float], float],
+    room: Room,
+    sizes: Callable[[float], Array],
     points: Array,
     turn: Array,
-) -> tuple[Array, View]:
-    """Return the tiles of so many machines below `top` px of a picture, (count, 4) px, and the view
-    of points (m, 3) m in each.
+) -> tuple[Array, Array, View]:
+    """Return the tiles of so many machines in a room of the film and those of their labels, (count,
+    4) px each, and the view of points (m, 3) m in each tile.
 
-    They are in as many rows as make the machines largest. `strip` returns the height of the words
-    at the foot of a tile of a width, px; inf if they are wider.
+    They are in as many rows, with labels below or beside them, as make the machines largest.
+    `sizes` returns the widths and heights of the labels, (count, 2) px, for an allowed width, px.
     """
     layouts = []
-    for rows in range(1, count + 1):
+    for rows, beside in itertools.product(range(1, count + 1), (False, True)):
         columns = -(-count // rows)
         if columns * (rows - 1) >= count:  # a row would be empty
             continue
-        wide = int(size[0] / columns) - TILE_GAP
-        tall = int((size[1] - top) / rows) - TILE_GAP
-        edge = TILE_EDGE * tall
-        head = HEAD_ROOM * size[0]
-        least = head + MIN_HEIGHT * tall
-        foot = tall - edge - strip(wide)
-        fits = foot >= least
-        foot = max(foot, least)
-        place = fit(points, turn, (wide, tall), Room(edge, head, wide - edge, foot))
+        pitch = np.array([(room.right - room.left) / columns, (room.bottom - room.top) / rows])
+        wide, tall = (pitch - TILE_GAP).astype(int).tolist()
+        across, down = sizes(MAX_BESIDE * wide if beside else wide).max(axis=0).tolist()
+        fits = down <= tall if beside else across <= wide
+        if beside:
+            fits &= across <= MAX_BESIDE * wide
+            left, foot = round(min(across, MAX_BESIDE * wide)), 0
+        else:
+            left, foot = 0, round(min(down, (1.0 - MIN_HEIGHT) * tall))
+        size = (wide - left, tall - foot)
+        edge = TILE_EDGE * size[1]
+        head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])
+        inside = Room(edge, max(edge, head), size[0] - edge, size[1] - edge)
+        place = fit(points, turn, size, inside)
         distance = float((place - points.mean(axis=0)) @ turn[:, 2])
-        scale = 1.0 / (pixel((wide, tall)) * distance)
-        layouts.append(((fits, scale), columns, View((wide, tall), turn, place)))
-    _, columns, view = max(layouts, key=lambda one: one[0])
+        layouts.append(
+            ((fits, 1.0 / (pixel(size) * distance)), columns, pitch, View(size, turn, place))
+        )
+    _, columns, pitch, view = max(layouts, key=lambda one: one[0])
     wide, tall = view.size
-    found = []
+    left, foot = (pitch - TILE_GAP - view.size).astype(int).tolist()
+    tiles = []
+    labels = []
     for k in range(count):
-        left = (k % columns) * (wide + TILE_GAP)
-        upper = round(top) + (k // columns) * (tall + TILE_GAP)
-        found.append((left, upper, left + wide, upper + tall))
-    return np.array(found), view
+        x, y = (
+            (np.array([room.left, room.top]) + pitch * (k % columns, k // columns)).round().tolist()
+        )
+        tiles.append((x + left, y, x + left + wide, y + tall))
+        if left > foot:
+            labels.append((x, y, x + left, y + tall))
+        else:
+            labels.append((x, y + tall, x + wide, y + tall + foot))
+    return np.array(tiles, int), np.array(labels), view

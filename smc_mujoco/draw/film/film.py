@@ -1,19 +1,20 @@
 """Films: the machines of all traces in MuJoCo, each in its tile, above charts that grow with the
 clock.
 
-In order: pace.py sets the speed; track.py says what each run does at each frame; caption.py has the
-text, charts.py the charts; camera.py lays out the tiles; world.py composes a machine's model,
-puppet.py poses it, stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over
-arms and what flies; video.py writes. Frames are made and written one by one, so that memory does
-not grow with a film's length.
+In order: pace.py sets the speed; track.py says what each run does at each frame; camera.py lays out
+the tiles; world.py composes a machine's model, puppet.py poses it, stage.py adds the arrows of
+arrows.py, and canvas.py renders; arm.py draws over arms and what flies; sheet.py is the page with
+the text and the charts, made as figures are; video.py writes. Frames are made and written one by
+one, so that memory does not grow with a film's length.
 """
 
 import contextlib
 import dataclasses
+import functools
 import itertools
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 from PIL import Image
@@ -24,16 +25,17 @@ from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import panels, style
-from smc_mujoco.draw.decimate import end, finite
+from smc_mujoco.draw.decimate import end
+from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import arrows, camera, pace, world
 from smc_mujoco.draw.film.camera import Camera, checked
-from smc_mujoco.draw.film.caption import Caption
-from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.pace import FilmClock
-from smc_mujoco.draw.film.puppet import Puppet
+from smc_mujoco.draw.film.puppet import Course, Puppet
+from smc_mujoco.draw.film.sheet import Moment, Sheet, label_sizes, room_of
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.film.video import encoder, mediapy
+from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -49,7 +51,6 @@ MIN_SIZE = (320, 180)  # px
 MAX_SIZE = (1920, 1080)
 FULL_SIZE = (1280, 720)  # for which sizes of letters are stated
 SMALL_SIZE = (800, 450)
-CHARTS_SHARE = 0.36  # of the film's height
 MAX_GRID = 120  # times of a run that set the place of all; chosen
 LAST_FRAME_TIME = 1200  # ms for which a clip's last picture stays before the clip repeats
 
@@ -276,87 +277,86 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
 
 def pictures(frames: Frames) -> Generator[Array]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
-    traces = style.same_plant(frames.traces)
-    names = style.labels(traces, frames.labels)
-    colours = style.trace_colours(traces)
-    if len(traces) > MAX_MACHINES:
-        raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
-    width, height = _checked_size(frames.size)
+    runs = DrawnRuns.of(frames.traces, frames.labels)
+    size = _checked_size(frames.size)
+    if len(runs.traces) > MAX_MACHINES:
+        raise ScenarioError(f"{len(runs.traces)} machines in one film: show at most {MAX_MACHINES}")
     if why := gl.missing():
         raise ScenarioError(why)
-    scale = width / FULL_SIZE[0]
-    low = 2 * round(CHARTS_SHARE * height / 2)
-    above = (width, height - low)
-    traces = list(map(finite, traces))
-    scenario = traces[0].scenario
     clock = frames.clock
-    tracks = tracks_at(clock.times, traces, colours)
-    grid_states = [track.grid_states for track in tracks]
-    factor = clock.close.factor if clock.close else 1.0
-    given = (frames.title, above, scale, arrows.scales(traces), grid_states, factor)
-    caption = Caption(traces, names, colours, *given)
-    charts = Charts(traces, names, colours, (width, low), scale)
+    scales = arrows.scales(runs.traces)
+    tracks = tracks_at(clock, runs, scales)
+    placed = placement(tracks, frames.camera, runs.names, size)
+    key = arrows.key(runs.traces, scales)
+    sheet = Sheet(runs, size, placed.tiles, placed.labels, frames.title, key)
     with contextlib.ExitStack() as opened:
-        stages = []
-        for stage in staged(tracks, frames.camera, caption, clock.times):
-            stages.append(opened.enter_context(stage))
+        stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
         overlays = []
-        if scenario.plant.has_path:
+        if runs.traces[0].scenario.plant.has_path:
             from smc_mujoco.draw.film import arm
 
             overlays = arm.overlays(stages)
-        yield from drawn(clock, stages, overlays, caption, charts)
-        if clock.close:
-            close = clock.close
+        yield from drawn(clock, stages, overlays, sheet)
+        if close := clock.close:
             start = float(close.times[0])
-            last = [panels.since(trace, start) for trace in traces]
-            charts = Charts(last, names, colours, (width, low), scale, start)
-            again = tracks_at(close.times, traces, colours)
-            for stage, track in zip(stages, again, strict=True):
+            last = runs._replace(traces=[panels.since(trace, start) for trace in runs.traces])
+            last = last._replace(span=(end(last.traces), end(last.traces)))
+            said = [f"last periods, deflections × {close.factor:g}"]
+            sheet = Sheet(last, size, placed.tiles, placed.labels, frames.title, said, start)
+            for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
                 middle = track.x.mean(axis=0)
-                track.x = middle + factor * (track.x - middle)
+                track.x = middle + close.factor * (track.x - middle)
                 stage.track = track
-            yield from drawn(close, stages, overlays, caption, charts)
+            yield from drawn(close, stages, overlays, sheet)
 
 
-def tracks_at(times: Array, traces: Sequence[Trace], colours: Sequence[str]) -> list[MachineTrack]:
-    """Return what the runs do at the times of frames, s."""
-    step = times[1] - times[0] if len(times) > 1 else 1 / FPS
-    edges = np.append(times[0] - step, times)
-    count = min(MAX_GRID, max(1, round(FPS * end(traces))))
-    grid = np.linspace(0.0, end(traces), count + 1)  # also for a still
-    scales = arrows.scales(traces)
+def tracks_at(
+    clock: FilmClock, runs: DrawnRuns, scales: Mapping[Group, arrows.Scale]
+) -> list[MachineTrack]:
+    """Return what the runs do at the frames of a clock."""
+    stop = runs.span[1]
+    grid = np.linspace(0.0, stop, 1 + min(MAX_GRID, max(1, round(FPS * stop))))  # also for a still
     found = []
-    for trace, colour in zip(traces, colours, strict=True):
-        found.append(MachineTrack(trace, colour, edges, grid, scales))
+    for trace, colour in zip(runs.traces, runs.colours, strict=True):
+        found.append(MachineTrack(trace, colour, clock, grid, scales))
     return found
 
 
 def drawn(
-    clock: FilmClock,
-    stages: Sequence[Stage],
-    overlays: Sequence["arm.Overlay"],
-    caption: Caption,
-    charts: Charts,
+    clock: FilmClock, stages: Sequence[Stage], overlays: Sequence["arm.Overlay"], sheet: Sheet
 ) -> Generator[Array]:
     """Yield the pictures at the times of a clock."""
-    width, height = caption.size
     for frame, time in enumerate(clock.times.tolist()):
-        picture = np.full((height, width, 3), 255, np.uint8)
-        for k, (left, top, right, bottom) in enumerate(caption.tiles.tolist()):
-            over = overlays[k] if overlays else None
-            picture[top:bottom, left:right] = shot(stages[k], over, frame, time)
-        speed = float(clock.speeds[frame])
-        failed = [stage.track.failed(time) for stage in stages]
+        machines = [stage.shot(frame, time) for stage in stages]
+        if overlays:
+            machines = [
+                over.over(shown, frame) for over, shown in zip(overlays, machines, strict=True)
+            ]
         states = [stage.track.states[frame] for stage in stages]
-        picture = caption.over(picture, time, failed, states, speed, clock.factor)
-        yield np.concatenate([picture, charts.at(time)])
+        yield sheet.picture(Moment(time, float(clock.speeds[frame]), states), machines)
 
 
-def staged(
-    tracks: Sequence[MachineTrack], chosen: Camera | None, caption: Caption, times: Array
-) -> Iterator[Stage]:
-    """Yield the stages of machines, whose tiles the caption learns."""
+class Placement(NamedTuple):
+    """Where the machines of a film stand: the puppets, their tiles and labels, (machines, 4) px,
+    the view of each, the points that it shows, and their courses if the camera follows them.
+    """
+
+    puppets: Sequence[Puppet]
+    tiles: Array
+    labels: Array
+    view: camera.View
+    points: Array
+    scale: float
+    followed: Sequence[Course] = ()
+
+
+def placement(
+    tracks: Sequence[MachineTrack],
+    chosen: Camera | None,
+    names: Sequence[str],
+    size: tuple[int, int],
+) -> Placement:
+    """Return where machines stand in a film of some size, px, before the chosen camera."""
     turn = world.turn(tracks[0].trace.scenario, chosen)
     puppets = [Puppet.of(track.trace.scenario, turn[:, 2]) for track in tracks]
     courses = [puppet.course(track) for track, puppet in zip(tracks, puppets, strict=True)]
@@ -372,33 +372,18 @@ def staged(
             reach, puppets[i] = puppet.surrounded(points, courses)
             reaches.append(reach)
         points = np.concatenate(reaches)
-    tiles, view = camera.tiles(len(tracks), caption.size, caption.top, caption.strip, points, turn)
-    caption.place(tiles)
-    for track, puppet, course in zip(tracks, puppets, courses, strict=True):
+    sizes = functools.partial(label_sizes, names, size)
+    tiles, labels, view = camera.layout(len(tracks), room_of(size), sizes, points, turn)
+    scale = size[0] / FULL_SIZE[0]
+    return Placement(puppets, tiles, labels, view, points, scale, courses if followed else ())
+
+
+def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> Iterator[Stage]:
+    """Yield the stages of machines, one after the other."""
+    for k, track in enumerate(tracks):
+        puppet = placed.puppets[k]
         path = None
-        if followed:
-            path = course.followed(times) + np.array([0.0, 0.0, puppet.height])
-        yield Stage(track, puppet, view, points, caption.scale, len(tracks) == 1, path)
-
-
-def shot(stage: Stage, over: "arm.Overlay | None", frame: int, time: float) -> Array:
-    """Return the picture of a machine at a frame.
-
-    A machine that has failed is grey, without a ghost or arrows.
-    """
-    track = stage.track
-    stage.look(frame)
-    stage.set_shape(time)
-    stage.arrange(track.x[frame], track.ahead[frame], time)
-    drawn = []
-    if track.failed(time):
-        stage.set_colour(style.FAILED)
-        stage.aim(None)
-    else:
-        stage.set_colour(track.colour)
-        stage.aim(track.r[frame], time)
-        drawn = track.drawn[frame].arrows
-    picture = stage.render(drawn)
-    if over:
-        picture = over.over(picture, frame)
-    return picture
+        if placed.followed:
+            path = placed.followed[k].followed(times) + np.array([0.0, 0.0, puppet.height])
+        alone = len(tracks) == 1
+        yield Stage(track, puppet, placed.view, placed.points, placed.scale, alone, path)

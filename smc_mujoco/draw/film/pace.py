@@ -38,6 +38,7 @@ CLOSE_TIME = 4.0  # s of the film for a close-up, at most; chosen, as what follo
 MIN_FACTOR = 10.0  # of its deflections; smaller ones are seen without it
 SEEN_TURN = 0.25  # rad: a turn of a hinge that is seen well
 SEEN_SLIDE = 0.08  # extents of its machine: the same of a slide
+STILL = 1 / 30  # s, of the run in a still
 LITTLE = 0.2  # of these: a film of less motion shows nothing moving
 MAX_LENGTH = (
     1.85,
@@ -58,6 +59,20 @@ class FilmClock(NamedTuple):
     speeds: Array  # of playback, (frames,), 1 for real time
     close: "FilmClock | None" = None
     factor: float = 1.0
+
+    @property
+    def edges(self) -> Array:
+        """The start of the first frame and the ends of all, (frames + 1,) s of the run."""
+        step = STILL if len(self.times) < 2 else self.times[1] - self.times[0]
+        return np.append(self.times[0] - step, self.times)
+
+    def played(self, t: Array) -> Array:
+        """Return when the film shows times t of the run, s: before its start and after its end in
+        real time.
+        """
+        shown = np.append(0.0, np.cumsum(np.diff(self.times) / self.speeds[1:]))
+        inside = np.interp(t, self.times, shown)
+        return inside + np.minimum(t - self.times[0], 0.0) + np.maximum(t - self.times[-1], 0.0)
 
     def part(self, start: float, stop: float) -> "FilmClock":
         """Return the frames from `start` to `stop` of the run, s."""

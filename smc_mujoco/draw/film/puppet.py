@@ -164,6 +164,10 @@ class Puppet:
         world.forward(model, data)
         return model, data
 
+    def corners(self, track: MachineTrack, x: Array, time: float) -> Array:
+        """Return the corners of the boxes of all geoms with the channels at x, (geoms, 8, 3) m."""
+        return world.boxes(*self.posed(track, x, time))
+
     def course(self, track: MachineTrack) -> Course:
         """Return where a trace takes the machine, at POSES times."""
         trace = track.trace
@@ -185,9 +189,9 @@ class Puppet:
             time = float(trace.t[sample])
             goal = trace.r[sample, : self.shown]
             if np.isfinite(goal).all():
-                corners = world.boxes(*self.posed(track, goal, time))
+                corners = self.corners(track, goal, time)
                 course.goals.append(corners[links].reshape(-1, 3))
-            corners = world.boxes(*self.posed(track, trace.x[sample, : self.shown], time))
+            corners = self.corners(track, trace.x[sample, : self.shown], time)
             course.times.append(time)
             course.places.append(corners[body].reshape(-1, 3))
             course.others.append(corners[loose])

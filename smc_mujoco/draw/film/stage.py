@@ -18,8 +18,6 @@ from smc_mujoco.draw.film import arrows, camera, world
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.track import MachineTrack
-from smc_mujoco.mechanisms.layout import joints
-from smc_mujoco.simulation import model as models
 
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
@@ -68,12 +66,11 @@ class Stage:
         self.find_joints(visible, arrows.MAX_BENT_SHARE * tall)
         self.shape = -1
         self.colour = ""
-        self.set_shape(0.0)
-        self.set_colour(track.colour)
-        self.arrange(track.trace.x[0, : puppet.shown])
         film = self.model.camera("film")
         self.camera = film.id
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], self.turn.ravel())
+        self.arrange(track.trace.x[0, : puppet.shown])
+        self.set_colour(track.colour)
         self.look(0)
         world.forward(self.model, self.data)
         world.set_floor(self.model, view, points, self.place - self.start)
@@ -98,9 +95,8 @@ class Stage:
         """
         ids = []
         self.mounts = []
-        found = joints(models.spec(self.puppet.scenario))
-        for joint, mount in zip(found, self.puppet.mounts, strict=True):
-            ids.append(self.model.joint(f"m/{joint.name}").id)
+        for joint, mount in zip(self.puppet.ids.tolist(), self.puppet.mounts, strict=True):
+            ids.append(self.model.joint(f"m/{self.puppet.model.joint(joint).name}").id)
             bent = min(mount.radius, radius)
             self.mounts.append(mount._replace(joint=ids[-1], radius=bent))
         moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
@@ -114,13 +110,31 @@ class Stage:
             self.place = self.start + self.followed[frame]
         self.model.cam_pos[self.camera] = self.place
 
-    def set_shape(self, time: float) -> None:
-        """Give the machine its shape at a time, s: its rod may be longer than the plant's, and may
+    def arrange(
+        self,
+        x: Array,
+        ahead: Array | float = 0.0,
+        time: float = 0.0,
+        goal: Array | None = None,
+    ) -> None:
+        """Put the channels at x, (shown,) rad or m, at a time, s; `ahead` is the lead of the rotors
+        over their joints. A ghost shows where the machine is at `goal`, (shown,).
+
+        Joints without a channel are where they were at that time.
+        """
+        rest = self.track.rest(time)
+        now = self.puppet.shape(time)
+        self.data.qpos[:] = self.puppet.qpos(x, ahead, rest)
+        self.aimed = goal is not None
+        if goal is not None:
+            self.goal.qpos[:] = self.puppet.qpos(goal, rest=rest)
+        if now != self.shape:
+            self.set_shape(now)
+
+    def set_shape(self, now: int) -> None:
+        """Give the machine one of its shapes: its rod may be longer than the plant's, and may
         change in a jump.
         """
-        now = self.puppet.shape(time)
-        if now == self.shape:
-            return
         self.shape = now
         single = self.puppet.shapes[now].model
         for geom in range(single.ngeom):
@@ -152,21 +166,18 @@ class Stage:
         own = (1.0 - LAW_SHARE) * self.paint[links, :3]
         self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + own
 
-    def aim(self, r: Array | None, time: float = 0.0) -> None:
-        """Show where the reference r, (shown,) rad or m, wants the machine, as a ghost; none where
-        r is None.
-        """
-        self.aimed = r is not None
-        if r is not None:
-            self.goal.qpos[:] = self.puppet.qpos(r, rest=self.track.rest(time))
+    def shot(self, frame: int, time: float) -> Array:
+        """Return the picture at a frame, whose time is given, s: (height, width, 3) uint8.
 
-    def arrange(self, x: Array, ahead: Array | float = 0.0, time: float = 0.0) -> None:
-        """Put the channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their
-        joints.
-
-        Joints without a channel are where they were at that time, s.
+        A machine that has failed is grey, without a ghost or arrows.
         """
-        self.data.qpos[:] = self.puppet.qpos(x, ahead, self.track.rest(time))
+        track = self.track
+        failed = track.failed(time)
+        goal = None if failed else track.r[frame]
+        self.arrange(track.x[frame], track.ahead[frame], time, goal)
+        self.look(frame)
+        self.set_colour(style.FAILED if failed else track.colour)
+        return self.render(() if failed else track.drawn[frame].arrows)
 
     def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> Array:
         """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
@@ -199,7 +210,7 @@ class Stage:
             leader = [*anchor.tolist(), *line[0].tolist()]
             ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
             rim = round(arrows.RIM * self.scale)
-        arrows.paint(image, arrows.outline(line, thick, arrow.head), arrow.rgba, rim)
+        arrows.stamp(image, line, thick, arrow, self.scale, rim)
 
     def project(self, points: Array) -> Array:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""

@@ -1,27 +1,21 @@
 """What one run does in a film: at each frame its pose, goal, arrows and state in words."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import states, style
+from smc_mujoco.draw import states
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, world
+from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.mechanisms.layout import ROTOR, joint_ids
 from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
-
-
-class Drawn(NamedTuple):
-    """The arrows of a machine at a time, s: each with its channel."""
-
-    time: float
-    arrows: Sequence[tuple[int, arrows.Arrow]]
 
 
 class Motion(NamedTuple):
@@ -36,40 +30,32 @@ class Motion(NamedTuple):
 
 
 class MachineTrack:
-    """The part of a trace in a film whose frames end at edges[1:], s; an arm has neither arrows nor
-    states.
+    """A trace at the frames of a film's clock; an arm has no arrows but those of its tip.
 
-    `framing` and `grid_states` are its arrows and states at the times `grid`, s, of the whole run,
-    which set the place of all.
+    `framing` are its arrows at the times `grid`, s, of the whole run, which set the place of all.
     """
 
     def __init__(
         self,
         trace: Trace,
         colour: str,
-        edges: Array,
+        clock: FilmClock,
         grid: Array,
         scales: Mapping[Group, arrows.Scale],
     ):
-        arms = bool(trace.scenario.plant.tip)
         self.trace = trace
-        self.edges = edges
         self.colour = colour
-        times = edges[1:]
+        self.edges = edges = clock.edges
+        self.holds = states.MIN_STATE_TIME * clock.speeds
+        times = clock.times
         n = world.first_channels(trace.scenario).plant.n
-        if arms or not scales:
-            sizes = []
-        else:
-            sizes = arrows.scales_by_channel(trace, scales)[:n]
-        self.drawn = drawn(trace, edges, sizes, colour)
-        self.framing = drawn(trace, grid, sizes, colour)
-        self.states = [None] * len(times)
-        self.grid_states = []
-        if not arms:
-            hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
-            self.states = states.timeline(trace, times, hold)
-            self.grid_states = states.timeline(trace, grid, hold)
         self.motion = motion(trace, np.union1d(grid, times))
+        sizes = []
+        if scales and not trace.scenario.plant.tip:
+            sizes = arrows.scales_by_channel(trace, scales)[:n]
+        self.drawn = arrows.frames(trace, edges, self.holds, sizes, colour)
+        self.framing = arrows.frames(trace, grid, np.zeros(len(grid)), sizes, colour)
+        self.states = states.timeline(trace, times, clock.played)
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)
         gap = states.backlash_gap(trace.scenario)  # rotors lead their joints by half of it
@@ -87,30 +73,6 @@ class MachineTrack:
 def sampled(trace: Trace, values: Array, times: Array) -> Array:
     """Return values (K+1, n) at times, s, linear between samples; after a failure the last one."""
     return np.stack([np.interp(times, trace.t, channel) for channel in values.T], axis=1)
-
-
-def drawn(trace: Trace, edges: Array, sizes: Sequence[arrows.Scale], colour: str) -> list[Drawn]:
-    """Return the arrows of a machine in each frame between `edges`, s, for what acts on its
-    channels.
-    """
-    from smc_mujoco.draw.film.flight import blows
-
-    acting = arrows.loads(trace, edges)
-    frames = []
-    for k, time in enumerate(edges[1:].tolist()):
-        found = []
-        if trace.scenario.plant.pose and sizes:
-            found = arrows.flying(acting, k, sizes[0])
-        else:
-            for i, size in enumerate(sizes):
-                found += [(i, arrow) for arrow in arrows.arrows(acting, k, i, size, colour)]
-            for body, peak in blows(trace, edges[k], time) if sizes else ():
-                size = float(np.linalg.norm(peak))
-                length = size / sizes[0].longest
-                shade = arrows.rgba(style.DISTURBANCE)
-                found.append((0, arrows.Arrow(0.0, length, shade, way=peak / size, body=body)))
-        frames.append(Drawn(time, found))
-    return frames
 
 
 def motion(trace: Trace, times: Array) -> Motion | None:

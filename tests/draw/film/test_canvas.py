@@ -25,11 +25,11 @@ def changed(one, other):
 def test_a_changed_colour_or_shape_is_drawn():
     jump = smc.Jump(0.5, {"l": 1.5})
     with stage("inverted_pendulum", jump=jump) as shown:
-        shown.set_shape(0.0)
+        shown.arrange(np.zeros(1))
         first = shown.render()
         shown.set_colour("#A9AFB6")
         grey = shown.render()
-        shown.set_shape(0.6)
+        shown.arrange(np.zeros(1), time=0.6)
         for other in (first, shown.render()):
             assert (changed(other, grey) > 50).sum() > 50
 
@@ -50,12 +50,12 @@ def test_a_ghost_stands_where_the_reference_is():
     with stage("van_der_pol") as shown:
         shown.arrange(np.array([1.5]))
         alone = shown.render()
-        shown.aim(np.array([-1.0]))
+        shown.arrange(np.array([1.5]), goal=np.array([-1.0]))
         ghost = changed(shown.render(), alone) > 20
         columns = np.flatnonzero(ghost.any(axis=0))
         assert ghost.sum() > 100
         assert columns.max() < 0.6 * SIZE[0]
-        shown.aim(None)
+        shown.arrange(np.array([1.5]))
         assert (changed(shown.render(), alone) > SEEN).mean() < 3e-4
 
 
@@ -66,7 +66,7 @@ def test_a_ghost_near_its_machine_is_not_cut_into_it():
         shown.set_colour("#A9AFB6")
         bob = changed(shown.render(), alone) > 20
         grey = shown.render()
-        shown.aim(np.array([0.33]))
+        shown.arrange(np.array([0.3]), goal=np.array([0.33]))
         ghost = changed(shown.render(), grey) > 10
     assert ghost.sum() > 50
     assert (ghost & bob).sum() < 0.1 * bob.sum()  # at its smoothed edge

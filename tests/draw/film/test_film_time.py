@@ -1,21 +1,21 @@
-"""Charts of films: the time until all rest has most of the width, and settling and agreement are
-said.
+"""Panels of films: they show the time until all rest, as those of figures, and when each run has
+settled; a map shows flights.
 """
 
 import dataclasses
 
 import numpy as np
 import pytest
+from helpers.films import picture, sheet
 from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film.charts import WINDOW_WIDTH, Charts
 from smc_mujoco.draw.panels import horizon
 
 LAWS = ("classical", "pid")
-SIZE = (1280, 260)
+SIZE = (1280, 720)
 
 
 def resting(law, rate):
@@ -39,78 +39,64 @@ def resting(law, rate):
 
 
 @pytest.fixture(scope="module")
-def charts():
+def page():
     traces = []
     for law, rate in zip(LAWS, (8.0, 16.0), strict=True):
         traces.append(resting(law, rate))
-    return Charts(
-        traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0
-    ), traces
+    return sheet(traces, LAWS, SIZE)
 
 
-def test_the_time_until_all_rest_has_most_of_the_width_and_the_rest_is_grey(charts):
-    drawn, traces = charts
-    window = horizon(traces)
+def cursor(page, time):
+    """Where the cursor is in the first panel, as a share of its width; none if it is not there."""
+    left, top, right, _ = page.frames[0]
+    row = picture(page, time).astype(int)[top + 5, left:right]
+    inked = np.flatnonzero(np.abs(row - style.rgb(style.MUTED)).max(axis=1) < 30)
+    return inked.mean() / (right - left) if len(inked) else None
+
+
+def test_panels_show_the_time_until_all_rest_and_then_the_cursor_is_gone(page):
+    window = horizon(page.runs.traces)
     assert window < 1.0
-    assert [float(drawn.share(time)) for time in (0.0, window / 2, window, 4.0)] == pytest.approx(
-        [0.0, WINDOW_WIDTH / 2, WINDOW_WIDTH, 1.0]
-    )
-    left, top, right, _ = drawn.frames[0]
-    picture = drawn.at(0.0)
-    for share, colour in (
-        (0.75, style.PAPER),
-        (0.95, style.BAND),
-    ):
-        column = picture[top + 2 : top + 60, round(left + share * (right - left))]
-        assert (np.abs(column.astype(int) - style.rgb(colour)).max(axis=1) < 3).mean() > 0.8
-    now = drawn.at(window / 2)
-    cursor = np.flatnonzero((now[top + 5, left:right] == style.rgb(style.MUTED)).all(axis=1))
-    assert 0.5 * WINDOW_WIDTH * (right - left) == pytest.approx(cursor.mean(), abs=2.0)
+    for one in page.moving:
+        assert one.axes.get_xlim() == pytest.approx((0.0, window))
+    assert cursor(page, window / 2) == pytest.approx(0.5, abs=0.01)
+    assert cursor(page, 2.0) is None
+    after = picture(page, 2.0)
+    for left, top, right, bottom in page.frames:
+        panel = np.s_[top:bottom, left:right]
+        assert (after[panel] == page.full[panel][..., :3]).all()
 
 
-def test_a_mark_says_when_each_law_has_settled(charts):
+def test_all_panels_have_the_same_ticks(page):
+    first, second = (one.axes for one in page.moving)
+    assert first.get_xticks().tolist() == second.get_xticks().tolist()
+    assert first.get_xticklabels()[-1].get_text().endswith(" s")
+
+
+def test_a_mark_says_when_each_law_has_settled(page):
     """e falls to 2 % of 0.5 after ln 50 / rate."""
-    drawn, traces = charts
-    left, top, right, bottom = drawn.frames[0]
-    picture = drawn.at(4.0)[top:bottom].astype(int)
-    colours = map(style.rgb, drawn.colours)
-    for trace, rate, colour in zip(traces, (8.0, 16.0), colours, strict=True):
-        middle = round(left + (right - left) * float(drawn.share(np.log(50.0) / rate)))
-        alike = np.abs(picture[:, middle - 6 : middle + 7] - colour).max(axis=2) < 12
-        beside = np.abs(picture[:, middle + 20 : middle + 33] - colour).max(axis=2) < 12
-        assert alike.sum() > beside.sum() + 20, trace.scenario.law.name
+    left, top, right, bottom = page.frames[0]
+    seen = picture(page, 4.0).astype(int)[top - 20 : bottom]
+    window = horizon(page.runs.traces)
+    for rate, colour in zip((8.0, 16.0), page.runs.colours, strict=True):
+        middle = round(left + (right - left) * np.log(50.0) / rate / window)
+        alike = np.abs(seen - style.rgb(colour)).max(axis=2) < 12
+        near = alike[:, middle - 6 : middle + 7].sum()
+        assert near > alike[:, middle + 20 : middle + 33].sum() + 20, rate
 
 
 def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():
     reference = [smc.Sine(0.5, 6.0), *[smc.Constant(0.0)] * 5]
-    run = made(
-        smc.Scenario(
-            plant="quadrotor",
-            reference=reference,
-            law="geometric",
-            duration=1.0,
-        )
-    )
+    run = made(smc.Scenario(plant="quadrotor", reference=reference, law="geometric", duration=1.0))
     x = np.stack([part(6.0 * run.t) for part in (np.sin, np.cos, *[np.zeros_like] * 4)], axis=1)
-    shown = Charts(
-        [dataclasses.replace(run, x=0.4 * x)],
-        ["one"],
-        ["#0072B2"],
-        SIZE,
-        1.0,
-    )
-    ((t, line),) = shown.flights
+    shown = sheet([dataclasses.replace(run, x=0.4 * x)], ["one"], SIZE)
+    (one,) = shown.flights
+    transform = one.past.axes.transData
+    line = transform.transform(one.places.T)
     assert np.ptp(line[:, 1]) == pytest.approx(np.ptp(line[:, 0]), rel=0.01)
-    for time, wanted in ((0.2, shown.full), (0.9, shown.faint)):
-        across, down = np.round(line[np.searchsorted(t, time)]).astype(int)
-        near = np.s_[down - 2 : down + 3, across - 2 : across + 3]
-        assert (shown.at(0.5)[near] == wanted[near]).all()
-    still = dataclasses.replace(run, r=0.0 * run.r)
-    fixed = Charts(
-        [still],
-        ["one"],
-        ["#0072B2"],
-        SIZE,
-        1.0,
-    )
-    assert not fixed.flights
+    now = picture(shown, 0.5).astype(int)
+    for time, flown in ((0.2, True), (0.9, False)):
+        across, up = np.round(line[np.searchsorted(one.times, time)]).astype(int)
+        pixel = now[SIZE[1] - 1 - up, across]
+        assert (np.abs(pixel - style.rgb(shown.runs.colours[0])).max() < 20) == flown
+    assert not sheet([dataclasses.replace(run, r=0.0 * run.r)], ["one"], SIZE).flights

@@ -8,29 +8,20 @@ import itertools
 
 import numpy as np
 import pytest
-from helpers.films import staged
+from helpers.films import picture, sheet, staged
 from helpers.runs import at_defaults
-from helpers.sketch import Pen, failed, made
-from PIL import Image, ImageDraw
+from helpers.sketch import failed, made
+from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.decimate import finite
-from smc_mujoco.draw.film import arrows, charts, film
-from smc_mujoco.draw.film.caption import Caption
-from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State
+from smc_mujoco.draw.figure import DrawnRuns
+from smc_mujoco.draw.film import arrows, film
+from smc_mujoco.draw.film.sheet import Moment, Sheet, label_sizes
+from smc_mujoco.draw.states import State
 
-COLOURS = ["#0072B2", "#E69F00"]
 SIZE = (640, 300)
-
-
-@pytest.fixture
-def pen(monkeypatch):
-    """Notes of what is drawn over pictures."""
-    monkeypatch.setattr(ImageDraw, "Draw", Pen)
-    Pen.notes.clear()
-    return Pen.notes
 
 
 def machine(plant: str, law: str = "classical", **fields) -> smc.Trace:
@@ -44,94 +35,86 @@ def paper(size=SIZE) -> np.ndarray:
     return np.full((size[1], size[0], 3), 255, np.uint8)
 
 
-def apart(boxes: np.ndarray) -> bool:
-    """Whether no two boxes (left, top, right, bottom) overlap."""
-    gaps = []
-    for a, b in itertools.combinations(boxes, 2):
-        gaps.append(max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3]))
-    return min(gaps) >= -1e-9
+@pytest.mark.parametrize("wide", [300, 150])
+def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
+    traces = [machine("duffing"), machine("duffing", "adaptive")]
+    names = ["one", "one that has a long name"]
+    size = (640, 360)
+    high = float(label_sizes(names, size, wide)[:, 1].max())
+    tiles = np.array([[0, 60, wide, 160], [wide + 2, 60, 2 * wide + 2, 160]])
+    labels = np.array([[left, 160, right, 160 + high] for left, _, right, _ in tiles])
+    runs = DrawnRuns.of(traces, names)
+    page = Sheet(runs, size, tiles, labels)
+    drawn = [text for text in page.page.texts if text.get_text().replace("\n", " ") in names]
+    assert len(drawn) == 2
+    for text, (left, top, right, bottom) in zip(drawn, labels, strict=True):
+        box = text.get_window_extent()
+        assert left <= box.x0 < box.x1 <= right
+        assert top <= size[1] - box.y1 < size[1] - box.y0 <= bottom + 1.0
+    assert ("\n" in drawn[1].get_text()) == (wide == 150)
 
 
-@pytest.mark.parametrize("wide", [320, 180])
-def test_labels_and_badges_are_apart_at_the_foot_of_their_tiles(wide, pen):
-    jump = smc.Jump(0.2, {"mass": 2.0})
-    parts = {
-        "jump": jump,
-        "friction": smc.Coulomb(0.2),
-        "contact": "stops",
-        "actuator": smc.Lag(0.02),
-    }
-    first = machine("duffing", **parts)
-    traces = [
-        first,
-        failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no"),
-    ]
-    reported = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
-    caption = Caption(
-        traces, ["one", "other"], COLOURS, None, SIZE, 0.5, arrows.scales(traces), reported
-    )
-    tiles = np.array([[0, 60, wide, 300], [wide + 2, 60, 2 * wide + 2, 300]])
-    caption.place(tiles)
-    boxes = np.concatenate([caption.labels, caption.badges])
-    assert apart(boxes)
-    both = np.concatenate([tiles, tiles])
-    assert (boxes[:, 0] >= both[:, 0]).all()
-    assert (boxes[:, 2:] <= both[:, 2:]).all()
-    assert (boxes[:, 1] >= 300.0 - caption.strip(wide)).all()
-    said = []
-    for time, gone, speed in (
-        (0.1, False, 1.0),
-        (0.3, False, 0.125),
-        (1.7, False, 0.2),
-        (1.9, True, 4.0),
+def test_the_clock_the_pace_what_changed_and_what_is_said_are_told_at_their_time():
+    parts = {"friction": smc.Coulomb(0.2), "jump": smc.Jump(0.2, {"mass": 2.0})}
+    traces = [machine("duffing", **parts), machine("duffing", "adaptive", **parts)]
+    tiles = np.array([[0, 60, 320, 160], [320, 60, 640, 160]])
+    page = Sheet(DrawnRuns.of(traces, ["one", "other"]), (640, 360), tiles, 1.0 * tiles)
+    blank = np.zeros((100, 320, 3), np.uint8)
+    hit = State("hit, 5 N", style.REACTION, 0.5)
+    for time, speed, clock, pace, changed in (
+        (0.1, 1.0, "0.10 s", "", False),
+        (0.3, 0.125, "0.300 s", "8× slower", True),
+        (0.9, 4.0, "0.90 s", "4× faster", True),
     ):
-        pen.clear()
-        caption.over(paper(), time, (False, gone), (reported[0][0], reported[1][gone]), speed)
-        said.append("\n".join(pen).replace("\\n", " "))
-    for picture, clock, pace_words, other, fill, state, changed in zip(
-        said,
-        ("0.10 s", "0.300 s", "1.70 s", "1.90 s"),
-        ("real time", "8× slower", "5× slower", "4× faster"),
-        ("'other'", "'other'", "'other'", "other: failed at 0.6 s"),
-        (COLOURS[1], COLOURS[1], COLOURS[1], style.FAILED),
-        ("slides", "slides", "slides", "contact"),
-        (False, True, True, True),
-        strict=True,
-    ):
-        assert clock in picture
-        assert (pace_words in picture) != (pace_words == "real time")
-        for words in ("'one'", other, fill, "'sticks'", f"'{state}'"):
-            assert words in picture
-        assert ("mass × 2 since 0.2 s" in picture) is changed
+        shown = page.picture(Moment(time, speed, (hit, None)), (blank, blank))
+        assert (page.clock.get_text(), page.pace.get_text()) == (clock, pace)
+        assert (page.below.get_text() == "mass × 2 since 0.2 s") is changed
+        assert [text.get_text() for text in page.says] == ["hit, 5 N", ""]
+        assert shown[60:160, :320].any()
+        assert not shown[60:160, 322:638].any()
 
 
-def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
+def test_a_blow_is_told_with_its_times_and_then_no_more():
+    named = HINGES.replace('<body pos="0 0 1">', '<body name="link" pos="0 0 1">')
+    plant = smc.plant_from(named, ["j", "k"], name="own")
+    push = smc.signals.Push("link", x=400.0, time=1.0, width=0.05)
+    trace = machine(plant, "none", duration=3.0, disturbance=push)
+    page = sheet([trace], ["one"])
+    told = []
+    for time in (0.99, 1.02, 1.06, 1.5):
+        picture(page, time, 0.125)
+        told.append(page.below.get_text() == "blow of 400 N, 1.00 to 1.05 s")
+    assert told == [False, True, True, False]
+
+
+def test_panels_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
     parts = {"friction": smc.Coulomb(0.2), "jump": smc.Jump(0.4, {"mass": 2.0})}
     lost = failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no")
-    lost = finite(dataclasses.replace(lost, x=0.5 * lost.x, u=0.3 * lost.u))
-    traces = [machine("duffing", **parts), lost]
-    shown = charts.Charts(traces, ["one", "other"], COLOURS, (640, 130), 0.7)
+    lost = dataclasses.replace(lost, x=0.5 * lost.x, u=0.3 * lost.u)
+    shown = sheet([machine("duffing", **parts), lost], ["one", "other"])
+    runs = shown.runs
+    full, faint = shown.full[..., :3], shown.faint[..., :3]
     found = []
     for time in (0.3, 0.8):
-        image = shown.at(time)
-        for (left, top, right, bottom), paths in zip(shown.frames, shown.paths, strict=True):
-            now = round(left + (right - left) * time)
-            assert (
-                image[top:bottom, left : now - 8] == shown.full[top:bottom, left : now - 8]
-            ).all()
-            assert (image[:, now + 8 : right] == shown.faint[:, now + 8 : right]).all()
-            column = image[:, now].astype(int)
-            for colour, (t, y) in zip(COLOURS, paths, strict=True):
+        image = picture(shown, time)
+        for (left, top, right, bottom), one in zip(shown.frames, shown.moving, strict=True):
+            now = round(left + (right - left) * time / one.axes.get_xlim()[1])
+            past = np.s_[top:bottom, left : now - 14]
+            future = np.s_[top:bottom, now + 14 : right]
+            assert (image[past] == full[past]).all()
+            assert (image[future] == faint[future]).all()
+            column = image[: bottom + 20, now].astype(int)
+            column[: top - 20] = 255
+            for colour, (_, t, y) in zip(runs.colours, reversed(one.dots), strict=True):
                 dot = np.flatnonzero(np.abs(column - style.rgb(colour)).max(axis=1) < 3)
                 assert time <= t[-1] or not len(dot)  # a run that failed has none
                 found += [(colour, time)] * bool(len(dot))
-                assert not len(dot) or dot.mean() == pytest.approx(np.interp(time, t, y), abs=3.0)
-    counts = []
-    for each in itertools.product(COLOURS, (0.3, 0.8)):
-        counts.append(found.count(each))
+                if len(dot):
+                    place = (time, np.interp(time, t, y))
+                    height = 720 - one.axes.transData.transform(place)[1]
+                    assert dot.mean() == pytest.approx(height, abs=3.0)
+    counts = [found.count(each) for each in itertools.product(runs.colours, (0.3, 0.8))]
     assert counts == [2, 2, 1, 0]  # where both are in one place the first is on top
-    ends = [t[-1] for paths in shown.paths for t, _ in paths]
-    assert ends == pytest.approx([1.0, 0.599] * 2)
 
 
 HINGES = """
@@ -163,8 +146,7 @@ def test_a_machine_stays_in_its_tile_with_its_arrows(kind):
     red = (1.0, 0.0, 0.0, 1.0)
     with staged(trace, SIZE, strip=40.0) as stage:
         n = stage.puppet.shown
-        stage.arrange(np.linspace(-0.3, 0.4, n), np.full(n, 0.1), 0.2)
-        stage.aim(np.full(n, 0.1))
+        stage.arrange(np.linspace(-0.3, 0.4, n), np.full(n, 0.1), 0.2, np.full(n, 0.1))
         before = stage.render()
         assert set(stage.links).isdisjoint(np.flatnonzero(stage.model.geom_group > 2))
         drawn = [
@@ -186,18 +168,18 @@ RUB = {"friction": smc.Coulomb(0.2)}
 FLANKS = {"left flank", "right flank"}
 # parts, words while it moves, rests and touches; whether it has dry friction, and contact
 STATES = [
-    (RUB, {"slides"}, {"sticks"}, {"slides"}, True, False),
+    (RUB, {None}, {"sticks"}, {None}, True, False),
     (GEAR, FLANKS, FLANKS, None, False, False),
     (
         RUB | GEAR,
-        {"slides, left flank", "slides, right flank"},
+        FLANKS,
         {"sticks, right flank"},
         None,
         True,
         False,
     ),
-    ({"contact": "stops"}, {None}, {None}, {"contact"}, False, True),
-    ({"contact": "stops"} | GEAR, FLANKS, FLANKS, {"contact"}, False, True),
+    ({"contact": "stops"}, {None}, {None}, {"hit, 1 N"}, False, True),
+    ({"contact": "stops"} | GEAR, FLANKS, FLANKS, {"hit, 1 N"}, False, True),
     ({"friction": smc.Viscous(1.0)} | GEAR, FLANKS, FLANKS, None, False, False),
     ({}, {None}, {None}, {None}, False, False),
 ]
@@ -206,7 +188,7 @@ STATES = [
 @pytest.mark.parametrize(
     ("parts", "moving", "resting", "touching", "dry", "stops"), STATES, ids=range(len(STATES))
 )
-def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
+def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
     parts, moving, resting, touching, dry, stops
 ):
     """It moves in even seconds, rests in odd ones, and touches a stop at the start of each."""
@@ -245,7 +227,7 @@ def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
         assert {
             word for word, t in zip(words, times, strict=True) if 1.02 < t < 1.1
         } <= touching | resting
-    assert ("contact" in words) is stops
+    assert ("hit, 1 N" in words) is stops
     assert states.has_dry_friction(trace.scenario) is dry
 
 
@@ -263,7 +245,7 @@ def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
     force = np.column_stack([two.t, 0.0 * two.t])
     (reported,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
     assert reported
-    assert reported.words == "1 of 2 stick, 1 of 2 in play"
+    assert reported.words == "slide sticks, 1 of 2 in play"
 
 
 def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):

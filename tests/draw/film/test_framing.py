@@ -54,16 +54,17 @@ def two(plant, **fields):
 @contextlib.contextmanager
 def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     """Give the stages of a film of the traces, whose first two pictures were drawn, and its
-    caption.
+    placement.
     """
     seen = []
+    places = []
     made_by = film.staged
 
-    def kept(tracks, chosen, words, times):
-        for stage in made_by(tracks, chosen, words, times):
+    def kept(tracks, placed, times):
+        places.append(placed)
+        for stage in made_by(tracks, placed, times):
             seen.append(stage)
             yield stage
-        seen.append(words)
 
     with without_charts, monkeypatch.context() as patch:
         patch.setattr(film, "staged", kept)
@@ -71,7 +72,7 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
         frames.clock = FilmClock(np.array(times), np.ones(len(times)))
         made_of = iter(frames)
         assert [*itertools.islice(made_of, 2)]
-        yield seen[:-1], seen[-1]
+        yield seen, places[0]
         made_of.close()
 
 
@@ -159,6 +160,24 @@ def test_bent_arrows_are_small_and_stay_in_the_tile(monkeypatch):
 def test_five_machines_keep_room_above_their_words():
     turn = camera.turn(90.0, -12.0)
     cube = world.CORNERS
-    view = camera.tiles(5, (800, 288), 54.0, lambda wide: 33.0, cube, turn)[1]
+    room = camera.Room(0.0, 54.0, 800.0, 342.0)
+    tiles, labels, view = camera.layout(
+        5, room, lambda wide: np.array([[min(wide, 150.0), 33.0]]), cube, turn
+    )
     seen = camera.project(cube, turn, view.place, view.size)
     assert ((seen >= 0.0) & (seen <= view.size)).all()
+    assert len(tiles) == len(labels) == 5
+    assert tiles[:, 1].min() >= 54
+    assert labels[:, 3].max() <= 342
+
+
+def test_labels_are_beside_machines_that_are_far_wider_than_high():
+    turn = camera.turn(90.0, 0.0)
+    sizes = lambda wide: np.array([[120.0, 33.0]])  # noqa: E731
+    rows = {}
+    for name, wide in (("rail", 8.0), ("cube", 1.0)):
+        room = camera.Room(0.0, 54.0, 800.0, 342.0)
+        shape = world.CORNERS * (wide, 1.0, 1.0)
+        tiles, labels, _ = camera.layout(4, room, sizes, shape, turn)
+        rows[name] = len(set(tiles[:, 1].tolist())), bool((labels[:, 2] <= tiles[:, 0]).all())
+    assert rows == {"rail": (4, True), "cube": (1, False)}

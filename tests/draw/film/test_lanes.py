@@ -7,14 +7,14 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.films import picture, sheet
 from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.draw import panels, style
-from smc_mujoco.draw.film import charts
 
-SIZE = (1280, 260)
+SIZE = (1280, 720)
 LAWS = ("observer_free", "classical", "adaptive")
 
 
@@ -28,15 +28,12 @@ def swinging(law, amplitude):
 @pytest.fixture
 def drawn(monkeypatch):
     said = []
-    plain = charts.tell_swing
-    monkeypatch.setattr(charts, "tell_swing", lambda *row: (plain(*row), said.append(row)))
+    plain = panels.tell_swing
+    monkeypatch.setattr(panels, "tell_swing", lambda *row: (plain(*row), said.append(row)))
     traces = []
     for law, amplitude in zip(LAWS, (0.0, 2.0, 6.0), strict=True):
         traces.append(swinging(law, amplitude))
-    made_of = charts.Charts(
-        traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0
-    )
-    return made_of, said
+    return sheet(traces, LAWS, SIZE), said
 
 
 def test_each_law_has_a_lane_that_says_its_swing(drawn):
@@ -60,8 +57,8 @@ def test_a_law_that_switches_in_few_samples_has_a_lane():
     runs = []
     for rate in (90.0, 3.0):
         runs.append(dataclasses.replace(run, u=np.sign(np.sin(rate * run.t))[:, None]))
-    assert charts.in_lanes(panels.Panel("u", group, runs))
-    assert not charts.in_lanes(panels.Panel("u", group, runs[1:] * 2))
+    assert panels.in_lanes(panels.Panel("u", group, runs))
+    assert not panels.in_lanes(panels.Panel("u", group, runs[1:] * 2))
 
 
 def test_two_laws_that_chatter_are_told_apart(drawn):
@@ -69,16 +66,14 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
     colour.
     """
     made_of, rows = drawn
-    picture = made_of.at(1.0).astype(int)
+    shown = picture(made_of, 1.0).astype(int)
     heights = []
     for lane, _, colour in rows:
         box = lane.get_window_extent()
-        column = picture[
-            int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))
-        ]
+        column = shown[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
         paper = np.array([255.0] * 3)
         ink = np.array(style.rgb(colour), float)
-        wanted = paper + charts.LANE_BAND * (ink - paper)
+        wanted = paper + panels.LANE_BAND * (ink - paper)
         heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))
     assert heights[0] <= 2
     assert heights[2] == pytest.approx(3.0 * heights[1], rel=0.25)
@@ -88,15 +83,19 @@ def test_the_cursor_passes_behind_words():
     runs = [
         made(smc.Scenario(plant="duffing", law=at_defaults(law), duration=1.0)) for law in LAWS[:2]
     ]
-    same = charts.Charts(runs, LAWS[:2], ["#0072B2", "#D55E00"], SIZE, 1.0)
-    assert same.words
+    same = sheet(runs, LAWS[:2], SIZE)
     hidden = 0
-    for first, above, last, below in same.words:
-        for left, top, right, bottom in same.frames:
-            if not (left <= first and last <= right and top <= above and below <= bottom):
-                continue
-            now = (first + last) // 2
-            drawn = same.at(float(same.time((now - left) / (right - left))))
-            assert (drawn[above : below + 1, now] == same.full[above : below + 1, now]).all()
+    for moving in same.moving:
+        for text in moving.axes.texts:
+            box = text.get_window_extent()
+            inverted = moving.axes.transData.inverted()
+            time, _ = inverted.transform(((box.x0 + box.x1) / 2, box.y0))
+            shown = picture(same, float(time)).astype(int)
+            rows = np.s_[SIZE[1] - int(box.y1) + 1 : SIZE[1] - int(box.y0) - 1]
+            middle = round((box.x0 + box.x1) / 2)
+            cursor = np.array(style.rgb(style.MUTED))
+            found = np.abs(shown[:, middle - 2 : middle + 3] - cursor).max(axis=2).min(axis=1) < 20
+            assert found.sum() > 20  # beside the words
+            assert found[rows].sum() < 0.5 * (rows.stop - rows.start)
             hidden += 1
     assert hidden

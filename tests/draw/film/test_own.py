@@ -10,9 +10,7 @@ from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film.arrows import MAX_SWEEP, Arrow, Scale, path, scales
-from smc_mujoco.draw.film.caption import key
-from smc_mujoco.draw.film.track import drawn
+from smc_mujoco.draw.film.arrows import MAX_SWEEP, Arrow, Scale, frames, key, path, scales
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SUITE = importlib.util.find_spec("dm_control")
@@ -141,7 +139,8 @@ def test_a_blow_is_an_arrow_to_its_body_that_is_to_the_scale_of_the_others():
             full=8.0,
         )
     ]
-    before, during = drawn(trace, np.array([0.0, 0.04, 0.06]), sizes, "#0072B2")
+    edges = np.array([0.0, 0.04, 0.06])
+    before, during = frames(trace, edges, np.zeros(2), sizes, "#0072B2")
     assert not before.arrows
     ((_, arrow),) = during.arrows
     with staged(trace, (640, 360)) as scene:

@@ -1,0 +1,323 @@
+"""The page of a film: a figure of its runs, with room for the pictures of the machines.
+
+Its title, labels and panels are the artists of figures (page.py, panels.py). They are drawn twice,
+with whole and with faint curves. A frame has the whole ones up to the clock and the faint ones
+after it, and costs a copy. Only what moves is drawn in each frame: the clock, what is said of a
+machine, the cursor, and the dots where the runs are.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
+
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.figure import DrawnRuns
+from smc_mujoco.draw.film import flight
+from smc_mujoco.draw.film.camera import Room
+from smc_mujoco.draw.panels import Row
+from smc_mujoco.draw.states import State
+
+# Numbers of presentation here are chosen. The letters of a page of this width, those of a journal's
+# column, are 11 px high where the film is as wide as a phone, 390 px.
+WIDTH = 3.9  # inches
+ONE_SIZE = dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "axes.titlesize"), 8.0)
+LINE_PITCH = 1.2  # of letters
+EDGE = 0.6  # letters, from the picture's edge to text
+CHARTS_SHARE = 0.355  # of the film's height
+MAX_LINES = 2  # of a label
+SAMPLE = 0.5  # letters, height of the line above a label
+LEAST_TITLE = 0.75  # of the size of letters, of a long title
+TIME_TICKS = 5  # at most
+FUTURE_LINE = 0.4  # opacity of what is still to come
+FUTURE_BAND = 0.12
+EVENT_TIME = 1.0  # s of the film for which what has ended is told
+
+
+class Moment(NamedTuple):
+    """What a frame shows beside the machines: the time of the run, s, the speed of playback, and
+    what is said of each machine.
+    """
+
+    time: float
+    speed: float
+    states: Sequence[State | None]
+
+
+class Moving(NamedTuple):
+    """What moves in a panel over time: its cursor, the words before which it passes, and a dot with
+    the line that it follows for each run.
+    """
+
+    axes: Axes
+    cursor: Line2D
+    dots: Sequence[tuple[Line2D, Array, Array]]  # dot, times in s, values
+
+
+def letters(size: tuple[int, int]) -> float:
+    """Return the height of the letters of a film of this size, px."""
+    return ONE_SIZE["xtick.labelsize"] / 72 * size[0] / WIDTH
+
+
+def room_of(size: tuple[int, int]) -> Room:
+    """Return the room for machines and their labels in a film of this size."""
+    return Room(0.0, 2.1 * LINE_PITCH * letters(size), size[0], (1.0 - CHARTS_SHARE) * size[1])
+
+
+def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> Array:
+    """Return widths and heights of labels, (n, 2) px, for an allowed width, px, which those that do
+    not fit exceed.
+    """
+    high = letters(size)
+    found = []
+    for name in style.distinct(names):
+        lines = style.wrapped(name, room - high, high, MAX_LINES).split("\n")
+        wide = max(style.width(line, high) for line in lines)
+        if any("…" in line for line in lines):
+            wide = style.width(name, high)
+        found.append((wide + high, (LINE_PITCH * len(lines) + SAMPLE) * high))
+    return np.array(found)
+
+
+class Sheet:
+    """The page of a film of some size, px, from the time `start` of the run, s.
+
+    `key` has the words below the title, before the source of the gains. `tiles` and `labels`,
+    (machines, 4) px, are where the machines and their labels are.
+    """
+
+    def __init__(
+        self,
+        runs: DrawnRuns,
+        size: tuple[int, int],
+        tiles: Array,
+        labels: Array,
+        title: str | None = None,
+        key: Sequence[str] = (),
+        start: float = 0.0,
+    ):
+        self.runs = runs
+        self.size = size
+        self.tiles = tiles
+        self.start = start
+        self.letters = letters(size)
+        with style.page(WIDTH), rc_context(ONE_SIZE):
+            inches = (WIDTH, WIDTH * size[1] / size[0])
+            self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
+            self.canvas = FigureCanvasAgg(self.page)
+            self.write_head(title or runs.head, key)
+            self.write_labels(labels)
+            rim = withStroke(linewidth=style.points(3), foreground=style.PAPER)
+            corners = tiles[:, :2] + 0.3 * self.letters
+            look = {"va": "top", "weight": "bold", "path_effects": [rim]}
+            self.says = [self.write(*corner, **look) for corner in corners.tolist()]
+            future, self.moving, self.flights = self.draw_panels()
+        self.full = self.raster()
+        fade(future)
+        self.faint = self.raster()
+        self.frames = [self.box(one.axes) for one in self.moving]
+
+    def raster(self) -> Array:
+        """Return the page without what moves, (height, width, 4) uint8."""
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba()).copy()
+
+    def box(self, ax: Axes) -> tuple[int, int, int, int]:
+        """Return where axes are: left, top, right, bottom px."""
+        box = ax.get_window_extent()
+        sides = (box.x0, self.size[1] - box.y1, box.x1, self.size[1] - box.y0)
+        left, top, right, bottom = map(round, sides)
+        return left, top, right, bottom
+
+    def write(self, x: float, y: float, words: str = "", **look) -> Text:
+        """Write words at a place, px from the top left; without words, those of each frame."""
+        look = {"fontsize": ONE_SIZE["xtick.labelsize"], "color": style.INK} | look
+        place = (x / self.size[0], 1.0 - y / self.size[1])
+        return self.page.text(*place, words, parse_math=False, animated=not words, **look)
+
+    def write_head(self, title: str, key: Sequence[str]) -> None:
+        """Write the title, and below it the key, with the clock at the right."""
+        high = self.letters
+        left = EDGE * high
+        right = self.size[0] - left
+        words = " ".join(title.split())
+        share = max(LEAST_TITLE, min(1.0, (right - left) / style.width(words, high, bold=True)))
+        words = style.cropped(words, right - left, share * high, bold=True)
+        first, second = (np.array([0.62, 1.57]) * LINE_PITCH * high).tolist()
+        title_size = share * ONE_SIZE["axes.titlesize"]
+        self.write(left, first, words, va="center", weight="bold", fontsize=title_size)
+        self.clock = self.write(right, second, ha="right", va="center", weight="bold")
+        right -= style.width("00.000 s", high, bold=True) + high
+        self.pace = self.write(right, second, ha="right", va="center", color=style.MUTED)
+        self.room = right - style.width("4× faster", high) - high - left  # px, for the key
+        gains = self.runs.gains
+        if style.width(gains, high) > self.room:  # in the order of the machines
+            sources = [trace.scenario.law.source.words for trace in self.runs.traces]
+            gains = f"gains: {', '.join(sources)}"
+        said = [*key, gains]
+        while len(said) > 1 and style.width(" · ".join(said), high) > self.room:
+            said.pop()
+        self.key = style.cropped(" · ".join(said), self.room, high)
+        self.below = self.write(left, second, va="center", color=style.MUTED)
+
+    def write_labels(self, labels: Array) -> None:
+        """Write the machines' names, each below its line in the panels."""
+        runs = self.runs
+        names = style.distinct(runs.names)
+        for box, name, colour, look in zip(labels, names, runs.colours, runs.looks, strict=True):
+            left, top, right, bottom = box
+            words = style.wrapped(name, right - left - self.letters, self.letters, MAX_LINES)
+            middle = (left + right) / 2
+            lines = 1 + words.count("\n")
+            high = (LINE_PITCH * lines + SAMPLE) * self.letters
+            start = top + (0.0 if bottom - top < 1.5 * high else (bottom - top - high) / 2)
+            y = start + 0.5 * SAMPLE * self.letters
+            ends = np.array([left + 0.3 * self.letters, right - 0.3 * self.letters])
+            place = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
+            sample = Line2D(*place, color=colour, lw=style.points(2.5), **look)
+            self.page.add_artist(sample)
+            y = start + (SAMPLE + LINE_PITCH * lines - 0.3) * self.letters
+            self.write(middle, y, words, ha="center", va="baseline", linespacing=LINE_PITCH)
+
+    def draw_panels(self) -> tuple[list[Artist], list[Moving], list[flight.Flight]]:
+        """Draw the two panels at the foot of the page, and return the artists of their curves, and
+        what moves in them.
+        """
+        high = self.letters
+        shown = panels.strip(self.runs.traces)
+        wide = self.size[0] / len(shown)
+        left = style.width("−00.00", high) + 0.5 * high
+        top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high
+        foot = 1.15 * LINE_PITCH * high
+        room = wide - left - EDGE * high
+        future: list[Artist] = []
+        moving = []
+        flights = []
+        for k, panel in enumerate(shown):
+            corner = ((k * wide + left) / self.size[0], foot / self.size[1])
+            sides = (room / self.size[0], 1.0 - (top + foot) / self.size[1])
+            ax = self.page.add_axes((*corner, *sides))
+            if panel.quantity == "path":
+                drawn, flights = flight.draw_map(ax, panel, self.runs.colours)
+                ax.tick_params(length=0)
+            else:
+                words = style.cropped(panel.label, room, high)
+                ax.set_title(words, fontweight="normal", parse_math=False)
+                self.set_time(ax)
+                rows, drawn = panels.below_film(
+                    ax, panel, self.runs.colours, self.runs.names, self.runs.marks
+                )
+                moving += list(map(set_moving, rows))
+            future += drawn
+        return future, moving, flights
+
+    def set_time(self, ax: Axes) -> None:
+        """Set the time axis of axes: all have the same ticks, whatever their width."""
+        stop = self.runs.span[0]
+        narrow = 0.5 * self.size[0] - style.width("−00.00smooth", self.letters)
+        count = int(narrow / style.width("0.0000", self.letters))
+        ticks = MaxNLocator(min(max(count, 1), TIME_TICKS), steps=pages.STEPS).tick_values(
+            0.0, stop
+        )
+        ticks = ticks[(ticks >= 0.0) & (ticks <= stop * (1.0 + 1e-9))].tolist()
+        ax.set_xlim(0.0, stop)
+        ax.set_xticks(ticks, [*(f"{tick:g}" for tick in ticks[:-1]), f"{ticks[-1]:g} s"])
+        ax.tick_params(length=0)
+
+    def picture(self, moment: Moment, machines: Sequence[Array]) -> Array:
+        """Return a frame, (height, width, 3) uint8, with the pictures of the machines in their
+        tiles.
+        """
+        time = moment.time - self.start
+        pixels = np.asarray(self.canvas.buffer_rgba())
+        pixels[:] = self.faint
+        room = round(0.3 * self.letters)
+        for one, (left, top, right, bottom) in zip(self.moving, self.frames, strict=True):
+            share = min(1.0, time / one.axes.get_xlim()[1])
+            past = np.s_[
+                top - room : bottom + room, left - room : left + round(share * (right - left))
+            ]
+            pixels[past] = self.full[past]
+        for (left, top, right, bottom), machine in zip(self.tiles, machines, strict=True):
+            pixels[top:bottom, left:right, :3] = machine
+        renderer = self.canvas.get_renderer()
+        for artist in self.moved(moment, time):
+            artist.draw(renderer)
+        return pixels[..., :3].copy()
+
+    def moved(self, moment: Moment, time: float) -> list[Artist]:
+        """Return what moves as it is at a time since the start, s, in the order of drawing."""
+        drawn: list[Artist] = []
+        for ax, cursor, dots in self.moving:
+            if time <= ax.get_xlim()[1]:
+                cursor.set_xdata([time, time])
+                drawn += [cursor, *(words for words in ax.texts if words.get_bbox_patch())]
+            for shown, t, y in dots:
+                if time <= min(t[-1], ax.get_xlim()[1]) + 1e-9 and np.isfinite(y[0]):
+                    shown.set_data([time], [np.interp(time, t, y)])
+                    drawn.append(shown)
+        for one in self.flights:
+            flown = one.places[:, one.times <= time + 1e-9]
+            one.past.set_data(*flown)
+            one.dot.set_data(*flown[:, -1:])
+            drawn += [one.past, one.dot]
+        self.clock.set_text(f"{moment.time:.{3 if moment.speed < 0.2 else 2}f} s")
+        self.pace.set_text(pace_words(moment.speed))
+        self.below.set_text(self.event_words(moment) or self.key)
+        for text, state in zip(self.says, moment.states, strict=True):
+            text.set_text(state.words if state else "")
+            if state:
+                text.set(color=state.colour, alpha=state.opacity)
+        return [*drawn, self.clock, self.pace, self.below, *self.says]
+
+    def event_words(self, moment: Moment) -> str:
+        """Return what has changed the plant last, or hits it now."""
+        words = ""
+        for event in self.runs.events:
+            if event.time <= moment.time <= event.stop + EVENT_TIME * moment.speed:
+                when = f" since {event.time:g} s"
+                if np.isfinite(event.stop):
+                    when = f", {event.time:.2f} to {event.stop:.2f} s"
+                words = event.words + when
+                if style.width(words, self.letters) > self.room:  # the machines' names say how
+                    words = f"changed{when}"
+        return words
+
+
+def set_moving(row: Row) -> Moving:
+    """Add to a row what moves in it."""
+    ax, panel, colours = row
+    cursor = ax.axvline(0.0, color=style.MUTED, lw=style.points(0.8), animated=True)
+    dots = []
+    for trace, colour in reversed(list(zip(panel.traces, colours, strict=True))):
+        t, y = panels.middle(trace, panel.quantity)
+        dots.append((panels.dot(ax, colour), t, np.clip(y, *ax.get_ylim())))  # the first on top
+    return Moving(ax, cursor, dots)
+
+
+def pace_words(speed: float) -> str:
+    """Return a speed of playback in words; "" for real time."""
+    if abs(speed - 1.0) <= 1e-9:
+        return ""
+    return f"{1.0 / speed:.3g}× slower" if speed < 1.0 else f"{speed:.3g}× faster"
+
+
+def fade(artists: Sequence[Artist]) -> None:
+    """Make curves and bands faint, as what is still to come is."""
+    for artist in artists:
+        if isinstance(artist, PolyCollection):
+            artist.set_alpha(FUTURE_BAND)
+        else:
+            artist.set_alpha(FUTURE_LINE * (artist.get_alpha() or 1.0))
