@@ -16,11 +16,13 @@ sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N 
 viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn
 gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
 inexpensive encoder. On a free body and on a user's model, whose size may be any, a disturbance is
-the same share of the largest force as it is of u_max in the study. Under "contact" a joint has
-stops about its goal, and a blow drives it there whatever u does, see `blow`. Under "jitter" samples
-are late by up to half of the suite's control period. Under "missed" one sample in ten does not run.
-Under "stepper" u is the wanted acceleration, so gains for a force do not suit it: tune under it.
-Its rates are those of the firmware of rig stepper_furuta; it is 30 times as strong as other drives,
+the same share of the largest force as it is of u_max in the study. The play, the counts and the
+motor of a user's model are as large beside its joints as those of the study, and its stepper is
+refused where a rig's steps and rates do not suit it. Under "contact" a joint has stops about its
+goal, and a blow drives it there whatever u does, see `blow`. Under "jitter" samples are late by up
+to half of the suite's control period. Under "missed" one sample in ten does not run. Under
+"stepper" u is the wanted acceleration, so gains for a force do not suit it: tune under it. Its
+rates are those of the firmware of rig stepper_furuta; it is 30 times as strong as other drives,
 near that machine's ratio of torque to inertia, as one of their strength loses steps here. Under
 "fault" every actuator loses half of its force at 2 s.
 """
@@ -32,7 +34,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,8 +49,9 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
+from smc_mujoco.mechanisms.custom.scales import BESIDE, at_goal, usual_start
 from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
-from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.backlash import MIN_INERTIA, Backlash
 from smc_mujoco.mechanisms.hardware.contact import Obstacle
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -99,6 +102,10 @@ DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 
 BOUNDS_PER_FRICTION = 60.0  # of u, on each driven joint
 BRISTLE_STIFFNESS = 1e4  # 1/rad (1/m), of bristles over the friction at which a joint breaks away
+# of a user's joint, from the study's pendulum of 0.125 kg m^2: its largest acceleration, rad/s^2,
+# and the share of a rotor; chosen: what a rig's stepper suits, rad/s^2 (m/s^2) and rad (m)
+STUDY_ACCELERATION, ROTOR_SHARE = 48.0, 0.008
+STEPPER_ACCELERATIONS, SHORTEST_WAY_OF_STEPS = (5.0, 500.0), 0.15
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
@@ -430,8 +437,21 @@ def _contact(plant: Plant, duration: float) -> Data:
 
 def _stepper(plant: Plant, duration: float) -> Data:
     """Return a stepper motor, and its largest acceleration as the bound on u."""
-    motor = of_rig(30.0 * default_u_max(plant))
-    return {"actuator": motor, "u_max": motor.ramp}
+    if not plant.is_user_model:
+        motor = of_rig(30.0 * default_u_max(plant))
+        return {"actuator": motor, "u_max": motor.ramp}
+    slowest, fastest = STEPPER_ACCELERATIONS
+    for name, joint in zip(channel_names(plant), _own_joints(plant), strict=False):
+        able = joint.limit / joint.inertia
+        if not slowest <= able <= fastest or joint.way < SHORTEST_WAY_OF_STEPS:
+            raise ScenarioError(
+                f"condition 'stepper' has the steps and rates of a rig, and joint {name!r} of "
+                f"{plant.name} has {able:.2g} rad/s^2 (m/s^2) at its bound and moves by "
+                f"{joint.way:.2g} rad (m): give your own, as pulses: "
+                "actuator=Stepper(torque=2, speed=60, ramp=80), u_max=80"
+            )
+    fields = _each_joint("actuator", lambda limit, plant: of_rig(30.0 * limit))(plant, duration)
+    return fields | {"u_max": of_rig(1.0).ramp}
 
 
 def _fault(plant: Plant, duration: float) -> Data:
@@ -484,11 +504,64 @@ def _bristles(level: float, plant: Plant) -> Friction:
     return LuGre(0.5 * level, level, stribeck=0.05, stiffness=stiffness)
 
 
-def _motor(limit: float, plant: Plant) -> DCMotor:
-    """Return the default motor; on a user's model, as many in parallel as its bound is times the
-    study's.
+class Own(NamedTuple):
+    """The size of a driven joint of a user's model."""
+
+    limit: float  # N m or N, bound on u
+    inertia: float  # kg m^2 or kg, at the goal
+    way: float  # rad or m, from where runs start to the goal
+
+
+def _own_joints(plant: Plant) -> list[Own]:
+    """Return the sizes of the driven joints of a user's model."""
+    at = at_goal(plant)
+    inertias = np.diag(at.M)[at.dofs].tolist()
+    ways = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven].tolist()
+    limits = Scenario.recorded(plant=plant, law="none").limits
+    joints = zip(limits, inertias, ways, strict=True)
+    return [Own(limit, inertia, way or BESIDE) for limit, inertia, way in joints]
+
+
+def _fitted(usual: Actuator, fit: Callable[[Own], Actuator]) -> Recipe:
+    """Return a recipe for an actuator: the usual one, or one that fits each driven joint of a
+    user's model.
     """
-    return DCMotor().side_by_side(limit / U_MAX if plant.is_user_model else 1.0)
+
+    def fields(plant: Plant, duration: float) -> Data:
+        if not plant.is_user_model or plant.pose:
+            return {"actuator": usual}
+        parts = list(map(fit, _own_joints(plant)))
+        if len(set(parts)) == 1:
+            return {"actuator": parts[0]}
+        return {"actuator": dict(zip(channel_names(plant), parts, strict=False))}
+
+    return fields
+
+
+def _backlash(joint: Own) -> Backlash:
+    """Return the study's play and rotor as shares of the way and of the inertia."""
+    rotor = max(ROTOR_SHARE * joint.inertia, MIN_INERTIA)
+    return Backlash(0.01 * min(1.0, joint.way / BESIDE), rotor_inertia=rotor)
+
+
+def _encoder(plant: Plant, duration: float) -> Data:
+    """Return the study's encoder; on a user's model with as many counts on the shortest way as it
+    has on 0.3 rad, or more.
+    """
+    way = BESIDE
+    if plant.is_user_model and not plant.pose:
+        way = min(BESIDE, *(joint.way for joint in _own_joints(plant)))
+    return {"sensor": Encoder(counts=math.ceil(4096 * BESIDE / way))}
+
+
+def _motor(joint: Own) -> DCMotor:
+    """Return as many default motors in parallel as the bound is times the study's; with less gear
+    where the joint accelerates faster than the study's, so that the rotors are no heavier beside
+    it.
+    """
+    gear = min(1.0, STUDY_ACCELERATION * joint.inertia / joint.limit)
+    motor = dataclasses.replace(DCMotor(), gear=gear * DCMotor.gear)
+    return motor.side_by_side(joint.limit / U_MAX / gear)
 
 
 IDEAL: dict[str, Recipe] = {
@@ -513,10 +586,10 @@ REAL: dict[str, Recipe] = {
     "coulomb": _rubbing(lambda level, plant: Coulomb(level)),
     "lugre": _rubbing(_bristles),
     "lag_20ms": {"actuator": Lag(0.02)},
-    "dc_motor": _each_joint("actuator", _motor),
+    "dc_motor": _fitted(DCMotor(), _motor),
     "stepper": _stepper,
-    "backlash": {"actuator": Backlash(0.01)},
-    "encoder": {"sensor": Encoder(counts=4096)},
+    "backlash": _fitted(Backlash(0.01), _backlash),
+    "encoder": _encoder,
     "jitter": {"clock": Clock(jitter=0.5e-3)},
     "missed": {"clock": Clock(missed=0.1)},
     "contact": _contact,

@@ -332,3 +332,37 @@ def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
 
 
 # the command line
+
+
+WHEEL = """<mujoco model="w"><worldbody><body><joint name="j" axis="0 1 0" armature="{inertia}"/>
+<geom size="1e-2" mass="1e-6"/></body></worldbody><actuator><motor joint="j"
+ctrlrange="-{bound} {bound}"/></actuator></mujoco>"""
+GRIP = """<mujoco model="g"><worldbody><body><joint name="j" type="slide" axis="1 0 0"
+range="0 {way}"/><geom size=".01" mass=".1"/></body></worldbody><actuator><motor joint="j"
+ctrlrange="-5 5"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("inertia", "bound"), [(1e-5, 0.05), (0.125, 6.0), (1600.0, 9e3)])
+def test_play_and_motors_are_as_large_beside_a_joint_as_those_of_the_study(inertia, bound):
+    wheel = smc.plant_from(WHEEL.format(inertia=inertia, bound=bound), ["j"])
+    rotor = find_condition("backlash").on(wheel, 1.0)["actuator"].rotor_inertia
+    assert rotor == pytest.approx(0.008 * inertia, rel=1e-3)
+    motor = find_condition("dc_motor").on(wheel, 1.0)["actuator"]
+    assert motor.stall == pytest.approx(smc.DCMotor().stall * bound / 6.0)
+    usual = smc.DCMotor().gear ** 2 * smc.DCMotor().rotor_inertia
+    assert motor.gear**2 * motor.rotor_inertia < 1.01 * usual * inertia / 0.125
+    assert find_condition("encoder").on(wheel, 1.0)["sensor"] == smc.Encoder(4096)
+
+
+@pytest.mark.parametrize("way", [0.02, 0.04, 4.0])
+def test_play_and_counts_suit_how_far_a_slide_goes(way, refused):
+    grip = smc.plant_from(GRIP.format(way=way), ["j"])
+    moved = min(0.3, 0.6 * way)
+    gap = find_condition("backlash").on(grip, 1.0)["actuator"].gap
+    assert gap == pytest.approx(moved / 30.0)
+    counts = find_condition("encoder").on(grip, 1.0)["sensor"].counts
+    assert counts == pytest.approx(4096 * 0.3 / moved, abs=1)
+    if way < 1.0:
+        refused(lambda: find_condition("stepper").on(grip, 1.0), "stepper", "'j' of g", "Stepper(")
+    else:
+        assert find_condition("stepper").on(grip, 1.0)["actuator"].torque == 150.0
