@@ -11,6 +11,7 @@ sample solves (I - A h/2) x = b from below. The law is written out as straight P
 which is compiled and exported like any other law.
 """
 
+import contextlib
 import dataclasses
 import warnings
 from collections.abc import Sequence
@@ -230,6 +231,9 @@ def _system(K: Any) -> System:
     """Return what the user gave as matrices."""
     if isinstance(K, tuple | list) and len(K) in (4, 5):
         return _matrices(*[*K, None][:5])  # pyright: ignore[reportCallIssue] five of them
+    if isinstance(K, tuple | list) and K:
+        with contextlib.suppress(TypeError, ValueError):
+            K = np.asarray(K, float)
     if all(hasattr(K, name) for name in "ABCD"):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     if isinstance(K, np.ndarray) and K.ndim in (1, 2):

@@ -252,3 +252,10 @@ def test_it_is_linearised_where_a_command_holds_it():
         match=r"no command holds cart_pole at rest at x = 0\.5, 0\.5: give another",
     ):
         smc.design.state_space("cart_pole", 0.5)
+
+
+def test_gains_are_taken_as_a_list_as_well_as_an_array(refused):
+    as_list, as_array = (smc.law_from(K) for K in ([[1.0, 2.0]], np.array([[1.0, 2.0]])))
+    runs = [smc.Scenario(plant="duffing", law=law, duration=0.1) for law in (as_list, as_array)]
+    np.testing.assert_array_equal(*(trace.u for trace in smc.run(runs)))
+    refused(lambda: smc.law_from([["a", 2.0]]), "K", "TransferFunction")

@@ -179,8 +179,9 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
             continue
         if kind == FREE:
             raise ScenarioError(
-                f"joint {joint!r} of {label} is a free joint: leave it out, or give it as the only "
-                "channel, without fields of a Channel"
+                f"joint {joint!r} of {label} is a free joint: leave it out, or name it in "
+                "measured=['base'] so that laws read it, or give it as the only channel, without "
+                "fields of a Channel"
             )
         if kind not in UNIT_OF_JOINT:
             raise ScenarioError(
