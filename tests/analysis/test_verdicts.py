@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.tables import table_of
 
-from smc_mujoco.analysis.ranking import Comparison, needed_to_rank, needed_to_win
+from smc_mujoco.analysis.ranking import Comparison, corrected, needed_to_rank, needed_to_win
 from smc_mujoco.studies.leaderboard import leaderboard
 
 SETS = 12
@@ -60,6 +60,26 @@ def test_six_sets_name_a_winner_of_one_block_among_any_number_of_laws():
         assert found.best.sum() == (winner is not None)
 
 
+def test_a_winner_is_corrected_for_all_blocks_of_its_metric_step_by_step():
+    """A p-value of .0215 is enough in one block, and in two if the other has a winner."""
+    ahead = np.linspace(0.5, 0.6, 12)[None]
+    late = np.where(np.arange(12) < 11, ahead, 2.5)
+    even = np.where(np.arange(12) % 2, 0.9, 1.1)[None]
+    one = np.ones((1, 12))
+    assert 0.0125 < Comparison({"a": late, "b": one}).p[0, 0, 1] < 0.025
+    for law, winners in (
+        (late, ["a"]),
+        (np.vstack([late, even]), [None, None]),
+        (np.vstack([late, ahead]), ["a", "a"]),
+    ):
+        assert Comparison({"a": law, "b": np.ones_like(law)}).winners == winners
+    six = Comparison({"a": ahead[:, :6], "b": one[:, :6]})
+    assert six.visible(0, "a", "b") < 0.9
+    two = [Comparison({"a": ahead[:, :6], "b": one[:, :6]}) for _ in range(2)]
+    corrected(two)
+    assert two[0].visible(0, "a", "b") == 1.0  # no six units are enough beside another block
+
+
 def test_the_units_that_are_needed():
     assert [needed_to_win(blocks) for blocks in (1, 4, 12, 102, 103)] == [6, 8, 9, 12, 13]
     assert [needed_to_rank(laws) for laws in (2, 16, 41)] == [9, 9, 10]  # 5 % / 15, 5 % / 40
@@ -104,3 +124,34 @@ def test_a_law_that_is_beaten_changes_no_other_cell(seed):
                 assert new == old or own.strong
                 beaten += not own.strong
     assert beaten > 20
+
+
+def test_the_ratio_of_a_winner_is_its_least_lead_and_not_that_over_the_noisiest_rival():
+    """It was .406 times my_law's, whose p-value was the largest, where it is .846 times another's."""
+    rng = np.random.default_rng(5)
+    scores = {
+        "first": np.exp(0.01 * rng.normal(size=(1, SETS))),
+        "near": 1.18 * np.exp(0.01 * rng.normal(size=(1, SETS))),
+        "noisy": 2.5 * np.exp(0.6 * rng.normal(size=(1, SETS))),
+    }
+    p = Comparison(scores).p[0, 0]
+    assert p[1] <= p[2]  # as closest was told by these
+    (board,) = leaderboard(table_of(scores), ["itae"])
+    (block,) = board.blocks
+    assert block.lead
+    assert (block.winner, block.lead.rival) == ("first", "near")
+    assert 0.83 < block.lead.effect.low < block.lead.effect.high < 0.87
+
+
+def test_beside_a_law_below_the_floor_none_above_it_is_starred():
+    """Duffing's pid, 8.7e-4 m, had the star of a column with 1e-9 m in it."""
+    low = np.full(SETS, 0.5)
+    straddling = np.where(np.arange(SETS) < 5, 0.9, 1.4)
+    found = Comparison({"low": low, "above": straddling, "far": 9.0 * low}, 1.0)
+    assert found.winners == [None]
+    assert dict(zip(found.laws, found.best[:, 0].tolist(), strict=True)) == {
+        "above": False,
+        "far": False,
+        "low": True,
+    }
+    assert not found.worse[found.laws.index("above"), 0]

@@ -94,3 +94,14 @@ def test_pieces_of_work_are_reported_as_their_sum():
     add(2.0)
     add(0.25)
     assert reports == [(3.5, 9.0), (3.75, 9.0)]
+
+
+def test_no_time_is_estimated_before_a_tenth_is_done(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    shown = progress.Bar("tuning", 100.0)
+    now[0] = 9.0
+    shown.advance(9.0)
+    assert str(shown) == "tuning, 9 %"
+    shown.advance(1.0)
+    assert str(shown) == "tuning, 10 %, 81 s left"

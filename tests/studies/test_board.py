@@ -310,3 +310,14 @@ def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     assert (
         lead.words == "0.850 times b's (0.800 to 0.900), and it is ahead with 5 of 8 sets of gains"
     )
+
+
+def test_a_law_that_is_not_ranked_is_named_with_the_cure_beside_the_winner_of_the_others(pair):
+    blocks = []
+    for block in pair.blocks:
+        blocks.append(dataclasses.replace(block, few={"second": 3}, sets=3))
+    result = dataclasses.replace(pair, blocks=tuple(blocks)).result
+    assert result.startswith("third wins in both conditions")
+    assert result.endswith(
+        "; second (3 sets of gains) is not ranked, which needs 7 (searches=7 in compare)"
+    )
