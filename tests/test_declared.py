@@ -21,7 +21,17 @@ from helpers.words import recorded
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import Available
 from smc_mujoco.common import constraints
-from smc_mujoco.common.constraints import Each, FilePath, Flag, Number, OneOf, OrNone, Range, Whole
+from smc_mujoco.common.constraints import (
+    Called,
+    Each,
+    FilePath,
+    Flag,
+    Number,
+    OneOf,
+    OrNone,
+    Range,
+    Whole,
+)
 from smc_mujoco.common.errors import shown
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import catalogue as laws
@@ -113,6 +123,7 @@ BAD = {  # of another kind, and just beyond each end
     Range: bad_ranges,
     FilePath: lambda one: [None, 3, b"x", ["x"]],
     Where: lambda one: [None, 3, "ray", "dask://host", "dask://host:port"],
+    Called: lambda one: [None, 3, "x", ()],
 }
 BAD[Available] = BAD[OneOf]
 GOOD = {  # a plain value, and the ends themselves
@@ -125,6 +136,7 @@ GOOD = {  # a plain value, and the ends themselves
     Each: lambda one: [*good(one.one), (good(one.one)[0],) * 2],
     Range: lambda one: [(max(1.0, one.low),) * 2, (max(one.low, beyond(one.above), -9.0), 1e300)],
     FilePath: lambda one: [Path("a"), Path("b/c")],
+    Called: lambda one: [print],
     Available: lambda one: ["cpu"],
 }
 TOLD = {
@@ -137,6 +149,7 @@ TOLD = {
     Range: lambda one: f"range of {reported(Number(above=one.above, low=one.low))}",
     FilePath: lambda one: "path",
     Where: lambda one: "an executor, a dask client, or an address",
+    Called: lambda one: "function",
     Available: lambda one: f"{', '.join(one.names)} if this machine has it",
 }
 

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.analysis.differ import MAX_CHANGE, relative_range
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, items_of
 from smc_mujoco.common.text import number
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.limit_cycle import channel_cycle, largest_cycle
@@ -130,6 +130,7 @@ def step_halving(
       channel: the one whose s is compared. Default: that with the largest limit cycle.
       threads: as in `run`.
     """
+    traces = items_of("traces", traces)
     scenarios = [repetitions(trace) for trace in traces]
     again = iter(run(list(itertools.chain(*scenarios)), threads=threads))
     changes = []

@@ -13,7 +13,7 @@ import functools
 import inspect
 import math
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec, TypeVar
 
@@ -129,6 +129,16 @@ class Range(Constraint):
 
 
 @named_data
+class Called(Constraint):
+    """A function."""
+
+    def __call__(self, what: str, value: Any) -> Any:
+        if not callable(value):
+            raise ScenarioError(f"{what} is {shown(value)}: give a function")
+        return value
+
+
+@named_data
 class FilePath(Constraint):
     """The path of a file or folder, as a Path."""
 
@@ -210,20 +220,28 @@ def suggesting(kind: type[T]) -> type[T]:
     """Make the TypeError for a field that a class of data does not have say which may be meant."""
     make = kind.__init__
     names = [field.name for field in dataclasses.fields(kind) if field.init]  # pyright: ignore[reportArgumentType] a class of data
+    by_name = all(field.kw_only for field in dataclasses.fields(kind))  # pyright: ignore[reportArgumentType]
 
     def made(self: T, *args: Any, **fields: Any) -> None:
         for name in fields:
             if name not in names:
                 meant = getattr(kind, "synonyms", {}).get(name, name)
-                hint = str(unknown("field", meant, names)).partition(": ")[2]
-                raise TypeError(
-                    f"{kind.__name__}() got an unexpected keyword argument {name!r}: {hint}"
-                )
+                raise TypeError(_unexpected(kind.__name__, name, meant, names))
+        if args and by_name:
+            raise TypeError(
+                f"{kind.__name__} takes its fields by name: write {kind.__name__}({names[0]}=...)"
+            )
         make(self, *args, **fields)
 
     vars(made)["__signature__"] = inspect.signature(make)
     kind.__init__ = made
     return kind
+
+
+def _unexpected(what: str, name: str, meant: str, known: Iterable[str]) -> str:
+    """Return the words of a TypeError for an unknown argument, with those that may be meant."""
+    hint = str(unknown("argument", meant, known)).partition(": ")[2]
+    return f"{what}() got an unexpected keyword argument {name!r}: {hint}"
 
 
 def constrained(function: Callable[P, T]) -> Callable[P, T]:
@@ -239,8 +257,13 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
     def checked(*args: P.args, **kwargs: P.kwargs) -> T:
         try:
             given = signature.bind(*args, **kwargs)
-        except TypeError:
-            return function(*args, **kwargs)  # raises it in the function's own words
+        except TypeError as error:
+            unexpected = [name for name in kwargs if name not in signature.parameters]
+            if not unexpected:
+                return function(*args, **kwargs)  # raises it in the function's own words
+            name = unexpected[0]
+            words = _unexpected(function.__name__, name, name, signature.parameters)
+            raise TypeError(words) from error
         for name, constraint in constraints.items():
             if name in given.arguments:
                 given.arguments[name] = constraint(name, given.arguments[name])

@@ -23,6 +23,7 @@ MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: 
 MAX_LISTED = 1100
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path: chosen
 END_OF_MESSAGE = 500  # characters of a longer message that are kept at its end, with the cure
+MAX_MEANT = 3  # names that a word of them may mean: chosen
 MAX_SHOWN = 60  # characters of a value in a message: chosen
 
 
@@ -105,7 +106,12 @@ def _nearest(name: str, names: list[str]) -> list[str]:
         abbreviated = [known for known in names if _abbreviates(wanted, known.split("_"))]
         if abbreviated:
             return abbreviated
+    words = [known for known in plain if wanted in known.split("_")]
+    if len(words) > 1:
+        return [plain[known] for known in words[:MAX_MEANT]]
     close = difflib.get_close_matches(wanted, list(plain), n=1)
+    if len(wanted) <= 3:  # most short words are near each other
+        close = [known for known in close if known[0] == wanted[0]]
     if not close and len(wanted) > 1:
         close = [known for known in plain if wanted in known]
     return [plain[close[0]]] if close else []
@@ -179,6 +185,8 @@ def _real(value: Any) -> Any:
     """Return a real number, also from an array without axes; None for anything else, such as flags
     and durations.
     """
+    if np.ma.is_masked(value):
+        return None
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, bool | np.bool_ | np.timedelta64) or not isinstance(value, numbers.Real):
@@ -190,6 +198,8 @@ def items_of(what: str, values: Iterable[T]) -> list[T]:
     """Return the items of a user's list, or raise ScenarioError naming `what` if there are more
     than MAX_ITEMS.
     """
+    if isinstance(values, str):
+        raise ScenarioError(f"{what} is {shown(values)}: give a list, [{shown(values)}]")
     try:
         items = iter(values)
     except Exception:  # an array without axes, or a user's object that fails

@@ -47,6 +47,8 @@ mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), mujoco.mjtFontSca
 """
 
 _LOCK = threading.Lock()  # one renderer is made at a time
+_begun = False  # whether this process has made a renderer
+_forked = False  # whether it was forked from one that had
 _RENDERERS: "weakref.WeakSet[mujoco.Renderer]" = weakref.WeakSet()  # to be closed at exit
 
 
@@ -172,6 +174,13 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
 
     if why := missing():
         raise ScenarioError(why)
+    global _begun  # noqa: PLW0603
+    if _forked:
+        raise ScenarioError(
+            "no film in a process that was forked from one that had filmed, where OpenGL would "
+            "wait for ever: film in the first process, or start others by spawn"
+        )
+    _begun = True
 
     if sys.platform != "linux":
         return mujoco.Renderer(model, height, width)
@@ -196,6 +205,17 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
         _close_all
     )  # registered after MuJoCo's function that ends EGL, so that it runs before that one
     return made
+
+
+def _after_fork() -> None:
+    """Note in a child process whether its parent had begun OpenGL."""
+    global _LOCK, _forked  # noqa: PLW0603
+    _LOCK = threading.Lock()
+    _forked = _forked or _begun
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def _close_all() -> None:

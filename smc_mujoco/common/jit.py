@@ -40,6 +40,11 @@ from smc_mujoco.common.rebuild import helpers, names_in, rebuild, values_in
 inlined = njit(
     error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )
+if numba.config.DISABLE_JIT:
+    raise ScenarioError(
+        "NUMBA_DISABLE_JIT is set, and MuJoCo can call only compiled laws: unset it"
+    )
+
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 UNREAD = 30 * 86400.0  # s after which a compiled function is deleted
 SEAL_SIZE = hashlib.sha256().digest_size

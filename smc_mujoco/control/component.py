@@ -203,6 +203,12 @@ class Component:
             found += [gain_at(value, i) for i in range(count)]
         return found
 
+    def __call__(self, /, **gains: GainValue) -> "Component":
+        """Return it with some gains changed, as `smc.law(law, **gains)` does."""
+        if self.template is None:
+            raise ScenarioError(f"{self.kind} {self.name!r} takes no gains: leave the brackets out")
+        return self.template.bind({**self.gains, **gains}, warn=True)
+
     def __str__(self):
         gains = ", ".join(f"{name}={gain_text(value)}" for name, value in self.gains.items())
         return f"{self.name}({gains})"

@@ -24,7 +24,7 @@ from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.constraints import OneOf
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.source import NONE, Source, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.simulation.trace import Trace
@@ -247,7 +247,7 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
         if format is not None:
             raise ScenarioError(f"format is {shown(format)} without a file: give path too")
         return []
-    base = Path(path)
+    base = as_path(path)
     if not base.name or "\0" in base.name:
         raise ScenarioError(
             f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg"

@@ -553,6 +553,10 @@ def folded(label: str, room: float = 120.0) -> str:
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
+    if isinstance(traces, str):
+        raise ScenarioError(
+            f"traces is {shown(traces)}, no trace: give what smc.run or smc.load returns"
+        )
     traces = [traces] if isinstance(traces, Trace | Scenario) else items_of("traces", traces)
     for given in traces:
         if not isinstance(given, Trace):

@@ -332,6 +332,13 @@ class Plant:
             for name, factor in factors.items()
         )
 
+    def __getattr__(self, name: str) -> Any:
+        """Say where a parameter is."""
+        words = f"plant has no attribute {name!r}"
+        if name in vars(self).get("parameters", {}):
+            words += f": its parameter is plant.parameters[{name!r}]"
+        raise AttributeError(words)
+
     def values(self, factors: Numbers) -> Values:
         """Return the parameters, each times its factor, or with it added; `mass` stands for the
         plant's mass.

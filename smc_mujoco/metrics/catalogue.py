@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from smc_mujoco.common.errors import ScenarioError, unknown
 from smc_mujoco.metrics import conventions, limit_cycle
 from smc_mujoco.metrics.conventions import (
     ARRIVAL_BAND,
@@ -49,6 +50,19 @@ def metrics() -> tuple[Metric, ...]:
     return tuple(CATALOGUE.values())
 
 
+class UnknownMetric(ScenarioError, KeyError):
+    """An error: a trace has no metric of this name."""
+
+    __str__ = ScenarioError.__str__
+
+
+class MetricValues(dict[str, float]):
+    """Metrics of a trace by name."""
+
+    def __missing__(self, name: object) -> float:
+        raise UnknownMetric(str(unknown("metric", name, self)))
+
+
 def score(trace: Trace) -> dict[str, float]:
     """Return name -> value of every metric that has a single value for the plant.
 
@@ -61,7 +75,11 @@ def score(trace: Trace) -> dict[str, float]:
     """
     refuse(trace)
     traces = conventions.by_group(trace)
-    return {m.name: m.worst(traces) for m in metrics() if not m.refusal(trace.scenario.plant)}
+    found = MetricValues()
+    for m in metrics():
+        if not m.refusal(trace.scenario.plant):
+            found[m.name] = m.worst(traces)
+    return found
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:

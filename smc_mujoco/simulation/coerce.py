@@ -169,10 +169,10 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> Floats | 
 
     Beyond MAX_STATE a run would have diverged.
     """
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
     if value is None:
         return None
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     values: list[Any] = [value]
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         values = items_of(name, value)

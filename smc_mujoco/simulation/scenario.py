@@ -779,7 +779,7 @@ def check_clock(s: Resolved) -> None:
     fits into memory.
     """
     delay = s.input_delay / s.physics_step
-    if abs(delay - round(delay)) > 1e-6:
+    if abs(delay - round(delay)) > 1e-6 or (delay > 0.0 and round(delay) == 0):
         raise ScenarioError(
             f"input_delay {s.input_delay:g} s is not a whole number of physics steps of "
             f"{s.physics_step:g} s: give a physics_step that divides it"
@@ -1132,6 +1132,13 @@ def _doubts(s: Resolved) -> Iterator[str]:
                     "a step late, and joints rest at wrong places. Give a physics_step of "
                     f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
                 )
+    lasts = s.samples * s.control_period
+    if abs(lasts - s.duration) > 1e-3 * s.control_period:
+        yield (
+            f"duration {s.duration:g} s is not a whole number of control periods of "
+            f"{s.control_period:g} s, so the run lasts {lasts:g} s: give a duration of "
+            f"{lasts:g} or {lasts + s.control_period:g} s"
+        )
     yield from _doubtful_units(s)
     yield from _unreachable_goals(s)
     # ramps may have many turns

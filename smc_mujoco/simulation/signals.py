@@ -24,9 +24,9 @@ from numba import njit
 from numba.extending import register_jitable
 
 from smc_mujoco.common.aliases import Numbers, Pair
-from smc_mujoco.common.constraints import Boolean, Natural, Number, Positive, constrain
+from smc_mujoco.common.constraints import Boolean, Natural, Number, Positive, constrain, suggesting
 from smc_mujoco.common.data import frozen_data
-from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation import philox
 
@@ -96,6 +96,7 @@ class PerChannel(Signal):
         return {}  # each signal has its own
 
 
+@suggesting
 @frozen_data
 class Constant(Signal):
     """r(t) = amplitude."""
@@ -107,6 +108,7 @@ class Constant(Signal):
         return p.amplitude, 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Sine(Signal):
     """r(t) = amplitude sin(omega t + phase); omega in rad/s.
@@ -132,6 +134,7 @@ class Sine(Signal):
         return r, p.amplitude * p.omega * math.cos(angle), -p.omega * p.omega * r
 
 
+@suggesting
 @frozen_data
 class Step(Signal):
     """0 before `time`, amplitude from then on."""
@@ -144,6 +147,7 @@ class Step(Signal):
         return (p.amplitude if t >= p.time * EARLY else 0.0), 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Ramp(Signal):
     """0 before `time`, slope (t - time) from then on; slope in the signal's unit per second."""
@@ -158,6 +162,7 @@ class Ramp(Signal):
         return p.slope * (t - p.time), p.slope, 0.0
 
 
+@suggesting
 @frozen_data
 class MinimumJerk(Signal):
     """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration clipped to 0 .. 1: from rest to
@@ -185,6 +190,7 @@ class MinimumJerk(Signal):
         )
 
 
+@suggesting
 @frozen_data
 class Pulse(Signal):
     """amplitude for time <= t < time + width, else 0."""
@@ -199,6 +205,7 @@ class Pulse(Signal):
         return (p.amplitude if on else 0.0), 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Impulse(Signal):
     """impulse / width for time <= t < time + width, else 0: a blow with the time integral
@@ -221,6 +228,7 @@ class Impulse(Signal):
         return (p.impulse / p.width if on else 0.0), 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Gust(Signal):
     """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a
@@ -246,6 +254,7 @@ class Gust(Signal):
         return p.amplitude / 2.0 * (1.0 - math.cos(2.0 * math.pi * part)), 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Push(Signal):
     """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on
@@ -282,6 +291,7 @@ class Push(Signal):
         return math.sin(math.pi * part), 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Wind(Signal):
     """Air that moves past a body with drag, such as the `quadrotor`; a trace's d has the force that
@@ -314,6 +324,7 @@ class Wind(Signal):
         return (0.5 - 0.5 * math.cos(2.0 * math.pi * part) if part < 1.0 else 0.0), 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class Dryden(Signal):
     """Turbulence of MIL-F-8785C at low altitude: wind past a body with drag, of its own spectrum
@@ -412,6 +423,7 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
     return memory[4] + (memory[0] - knot) * (memory[3] - memory[4])
 
 
+@suggesting
 @frozen_data
 class Relay(Signal):
     """A disturbance that sees the loop: it goes to `amplitude` if s sigma + rate e' + error e > 0,
@@ -454,6 +466,7 @@ class Relay(Signal):
         return memory[0], 0.0, 0.0
 
 
+@suggesting
 @frozen_data
 class OrnsteinUhlenbeck(Signal):
     """Process noise with standard deviation sigma and correlation time tau, independent in every
@@ -506,6 +519,7 @@ def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
 
 
+@suggesting
 @frozen_data
 class BandLimited(Signal):
     """Process noise of standard deviation sigma between the frequencies low and high, Hz,
@@ -577,6 +591,7 @@ def bounds_of(signal: Signal) -> Pair | None:
     return None
 
 
+@suggesting
 @frozen_data
 class Noise:
     """Measurement noise:
@@ -610,6 +625,7 @@ class Noise:
         return self.position_error, self.velocity_error
 
 
+@suggesting
 @frozen_data
 class Jump:
     """A change of the plant's parameters at `time`, s, for the rest of the run.
@@ -631,6 +647,7 @@ class Jump:
         return f"jump at {self.time:g} s"
 
 
+@suggesting
 @frozen_data
 class Fault:
     """A fault of the actuators that begins at time `at`, s, and stays.
@@ -700,6 +717,7 @@ def after_pauses(k, steps, length, samples, phase):
     return steps - 1 - (within - sample * steps)
 
 
+@suggesting
 @frozen_data
 class Clock:
     """The timer of the controller.
@@ -784,6 +802,7 @@ class Clock:
             )
 
 
+@suggesting
 @frozen_data
 class Sum(Signal):
     """The sum of constants, sines, steps, ramps and moves of minimum jerk."""
@@ -794,6 +813,7 @@ class Sum(Signal):
     rows = 4  # the number of the kind in KINDS, and up to three parameters
 
     def __post_init__(self):
+        object.__setattr__(self, "signals", tuple(items_of("signals of Sum", self.signals)))
         table = np.zeros((self.rows, len(self.signals)))
         for column, signal in zip(table.T, self.signals, strict=True):
             if type(signal) not in KINDS or getattr(signal, "about", ""):

@@ -83,6 +83,7 @@ def test_anything_that_is_a_number_is_taken_as_a_float(number):
 
 
 @pytest.mark.filterwarnings("ignore:control_period is")
+@pytest.mark.filterwarnings("ignore:duration")
 def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
     for period, step, steps in (
         (1e-3, 1e-3, 1),
@@ -98,7 +99,12 @@ def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
         assert made.steps == steps
 
 
-@pytest.mark.filterwarnings("ignore:control_period is")
+def test_a_duration_that_is_no_whole_number_of_periods_is_named_with_what_is_run():
+    with pytest.warns(smc.errors.ScenarioWarning, match="so the run lasts 0.09 s: give .* 0.12"):
+        scenario(duration=0.1, control_period=0.03)
+
+
+@pytest.mark.filterwarnings("ignore:control_period is", "ignore:duration")
 def test_a_run_lasts_the_whole_periods_that_fit():
     for duration, period, samples in (
         (1.0, 1e-3, 1000),

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from smc_mujoco.common.constraints import Called
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
 from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.version import __version__
@@ -92,6 +93,7 @@ def audit(
       ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the
         paper.
     """
+    Called()("report", report)
     if isinstance(paper, Paper):
         audited = paper
     else:

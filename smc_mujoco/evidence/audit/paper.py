@@ -29,7 +29,7 @@ from smc_mujoco.common.aliases import Data, Fields, Names, Numbers, Pair
 from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
-from smc_mujoco.common.files import reading, replacing
+from smc_mujoco.common.files import as_path, reading, replacing
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
@@ -238,7 +238,7 @@ def paper(which: str | Path) -> Paper:
     known = catalogue()
     if isinstance(which, str) and which in known:
         return _read_once(*known[which])
-    folder = Path(which)
+    folder = as_path(which, "the paper")
     if not os.path.isdir(folder):
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)

@@ -28,6 +28,7 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.common.files import as_path
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.component import Template, as_gains, gain_at, gain_text, template_decorator
 from smc_mujoco.control.from_text import parsed_gains
@@ -256,7 +257,7 @@ def _library(
         raise ScenarioError(
             f"cannot take a law from {shown(str(source))} on Windows: run it on Linux, or in WSL"
         )
-    path = Path(source)
+    path = as_path(source, "the law")
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
     if isinstance(flags, str):

@@ -28,6 +28,7 @@ from smc_mujoco.common.aliases import Fields, Floats, Names, Numbers
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
@@ -132,7 +133,7 @@ def friction_function(
     Raises:
       ScenarioError: for a name or a number that cannot be one.
     """
-    return functools.partial(_made, JointForce, numbers or {}, memory, {})
+    return functools.partial(_made, JointForce, numbers, memory, {})
 
 
 def actuator_function(
@@ -149,12 +150,12 @@ def actuator_function(
       ScenarioError: for a name or a number that cannot be one.
     """
     number("delay", delay, low=0.0)
-    return functools.partial(_made, Drive, numbers or {}, memory, {"delay": delay})
+    return functools.partial(_made, Drive, numbers, memory, {"delay": delay})
 
 
 def _made(
     base: type[JointPart],
-    numbers: Numbers,
+    numbers: Numbers | None,
     memory: int,
     space: Fields,
     function: Callable,
@@ -162,7 +163,7 @@ def _made(
     name = function.__name__
     taken = set(dir(base))
     fields = []
-    for key, value in numbers.items():
+    for key, value in frozen({} if numbers is None else numbers).items():
         if not (isinstance(key, str) and key.isidentifier()) or key in taken:
             raise ScenarioError(f"{name} has the number {shown(key)}: give it another name")
         default = number(f"{key} of {name}", value, low=-MAX_PARAMETER, high=MAX_PARAMETER)
