@@ -6,15 +6,13 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Annotated
-
-from smc_mujoco.common.constraints import Called
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 # called with the work done and the whole work, which may be an estimate
-Report = Annotated[Callable[[float, float], None], Called()]
+Report = Callable[[float, float], None]
 MIN_PIECE = 0.1  # s; a piece of work that took less was read from a file: it tells no speed
 MIN_SHARE = 0.1  # of the work, before which no time is estimated; chosen
 LINE_PERIOD = 10.0  # s between two lines of a log

@@ -23,14 +23,14 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.runs import Runs
-from smc_mujoco.common.constraints import Boolean, constrained
+from smc_mujoco.common.constraints import Boolean, Called, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
@@ -345,7 +345,7 @@ def margins(
     gains: str = "tuned",
     quick: Boolean = False,
     threads: int | None = None,
-    report: Report = lambda done, whole: None,
+    report: Annotated[Report, Called()] = lambda done, whole: None,
     condition: str | Condition = "nominal",
     starts: Starts | None = None,
     device: Device = "cpu",

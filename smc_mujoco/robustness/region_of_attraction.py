@@ -33,7 +33,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -42,7 +42,7 @@ from smc_mujoco.analysis.engine.form import SCORES, SETTING
 from smc_mujoco.analysis.engine.group import Group, why_not
 from smc_mujoco.analysis.engine.outcome import NAME, over_trace
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
-from smc_mujoco.common.constraints import constrained
+from smc_mujoco.common.constraints import Called, constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report
@@ -115,7 +115,7 @@ def basin(
     gains: str = "tuned",
     duration: float = DURATION,
     threads: int | None = None,
-    report: Report = lambda done, needed: None,
+    report: Annotated[Report, Called()] = lambda done, needed: None,
     condition: str | Condition = "nominal",
     device: Device = "cpu",
 ) -> Basin:

@@ -20,12 +20,12 @@ exact friction, keeps the scenario's step.
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.common.aliases import Floats
-from smc_mujoco.common.constraints import constrained
+from smc_mujoco.common.constraints import Called, constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -128,7 +128,7 @@ def orders(
     duration: float = DURATION,
     starts: Starts | None = None,
     threads: int | None = None,
-    report: Report = lambda done, whole: None,
+    report: Annotated[Report, Called()] = lambda done, whole: None,
 ) -> AccuracyTable:
     """Measure how the errors of laws fall with the control period: the order of accuracy, beside
     theory's.
