@@ -219,8 +219,9 @@ def constrain(data: Any) -> None:
 def suggesting(kind: type[T]) -> type[T]:
     """Make the TypeError for a field that a class of data does not have say which may be meant."""
     make = kind.__init__
-    names = [field.name for field in dataclasses.fields(kind) if field.init]  # pyright: ignore[reportArgumentType] a class of data
-    by_name = all(field.kw_only for field in dataclasses.fields(kind))  # pyright: ignore[reportArgumentType]
+    _, *parameters = inspect.signature(make).parameters.values()
+    names = [parameter.name for parameter in parameters]
+    by_name = all(parameter.kind is parameter.KEYWORD_ONLY for parameter in parameters)
 
     def made(self: T, *args: Any, **fields: Any) -> None:
         for name in fields:

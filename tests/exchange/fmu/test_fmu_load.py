@@ -236,7 +236,7 @@ def test_inputs_that_are_not_real_may_be_held(folder):
 
 def test_periods_that_do_not_fit_are_said(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
-    trace = smc.run(scenario(law, control_period=3e-3, physics_step=1e-3))
+    trace = smc.run(scenario(law, duration=0.021, control_period=3e-3, physics_step=1e-3))
     assert (
         "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01"
         in str(trace.failure)
