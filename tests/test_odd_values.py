@@ -61,7 +61,7 @@ def test_a_figure_s_path_is_a_text(trace):
     ("call", "words"),
     [
         (lambda: smc.Scenario("duffing", "pid"), "takes its fields by name"),  # pyright: ignore
-        (lambda: smc.Sine(frequenzy=1.0), "'frequenzy': choose from amplitude"),  # pyright: ignore
+        (lambda: smc.Sine(frequenzy=1.0), "'frequenzy': choose from about, amplitude"),  # pyright: ignore
         (lambda: smc.compare(["pid"], metric="itae"), "did you mean 'metrics'"),  # pyright: ignore
     ],
 )
