@@ -5,8 +5,7 @@
 
 Until both are there, a folder of parts keeps the runs of each problem that is done.
 
-The law runs in another process, so that one that crashes, never ends or fills the memory ends in a
-sentence. That process is no sandbox.
+The law runs in this process, which it may crash: read it before you run it.
 """
 
 import functools
@@ -14,13 +13,12 @@ import hashlib
 import os
 import platform
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
 from smc_mujoco.analysis.law_time import law_time
-from smc_mujoco.common import guard
-from smc_mujoco.common.aliases import AnyPath, Data, Fields
+from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import FilePath, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
@@ -30,8 +28,6 @@ from smc_mujoco.problems import entry as entries
 from smc_mujoco.problems import runs, suite
 from smc_mujoco.problems.problem import Problem, problem
 
-START_TIME = 120.0  # s, for imports and compilation; chosen
-RUN_TIME = 1.0  # s a run, thirty times what a compiled law takes; chosen
 FAILURES = 3  # that a result shows
 TABLE = "runs.parquet"
 RESULT = "result.json"
@@ -59,12 +55,12 @@ def enter(
       verify: whether to write nothing, but compare the runs with those of the result that is there.
 
     Raises:
-      ScenarioError: a folder that is no entry; a law that crashes, never ends, or takes too much
-        memory; or, to verify, a result that is not what the entry gives.
+      ScenarioError: a folder that is no entry; or, to verify, a result that is not what the entry
+        gives.
     """
     entry = entries.read(folder)
-    problems = [problem(cell) for cell in suite.suite(name)]
-    count = instances or problems[0].visible
+    problems = suite.suite(name)
+    count = instances or problem(problems[0]).visible
     target = Path(out) / suite.folder(name, seed) / slug(entry.name)
     if (target / RESULT).exists() and not verify:
         other = read_json(target / RESULT)["entry"]
@@ -76,7 +72,7 @@ def enter(
     with scratch() as temporary:
         table = temporary / TABLE
         parts = temporary if verify else target / PARTS
-        report = _isolated(folder, problems, count, seed, table, parts)
+        report = run(folder, problems, count, seed, table, parts)
         content = table.read_bytes()
     if verify:
         with reading(target / TABLE, "table of runs", "enter the law first") as file:
@@ -94,7 +90,7 @@ def enter(
         "seed": seed,
         "instances": count,
         "entry": entry.about,
-        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(suite.suite(name)),
+        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(problems),
         "versions": versions(),
         "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
     }
@@ -109,60 +105,32 @@ def made_under(problems: Sequence[str]) -> dict[str, str]:
     return {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 
-def _isolated(
+def run(
     folder: AnyPath,
-    problems: Sequence[Problem],
-    instances: int,
+    problems: Sequence[str],
+    count: int,
     seed: int,
     table: Path,
     parts: Path,
 ) -> Fields:
-    """Run an entry in another process, which keeps the runs of each problem, and writes the table
-    at the end; return its report.
-    """
-    job = {
-        "folder": os.path.abspath(folder) if os.path.isdir(folder) else str(folder),
-        "problems": [one.id for one in problems],
-        "instances": instances,
-        "seed": seed,
-        "table": str(table),
-        "parts": os.path.abspath(parts),
-    }
-    runs_in_all = instances * sum(one.budget for one in problems)
-    limit = START_TIME + RUN_TIME * runs_in_all
-    try:
-        return guard.run_isolated(__name__, job, limit)
-    except guard.Failed as failed:
-        if failed.fault or failed.code is not None:
-            raise ScenarioError(f"the entry failed while {failed.stage}: {failed}") from failed
-        raise ScenarioError(
-            f"the entry is not done with {failed.stage} within {limit:.0f} s: let its law end"
-        ) from failed
-
-
-def worker(job: Data, report: Callable[[str], None]) -> Fields:
-    """Run an entry in this process as a job says, and write its rows.
+    """Run an entry, keep the runs of each problem in `parts`, and write the table at the end.
 
     Return how runs failed, and the law's time a sample, see `law_time`.
     """
-    report("reading its folder")
-    entry = entries.read(job["folder"])
-    files = sorted(filter(Path.is_file, Path(job["folder"]).glob("*")))
+    entry = entries.read(folder)
+    files = sorted(filter(Path.is_file, Path(folder).glob("*")))
     beside = [hashlib.sha256(path.read_bytes()).hexdigest() for path in files]  # it may import them
-    instances = range(job["instances"])
+    instances = range(count)
     failures = list[str]()
 
     def made(one: Problem) -> tuple[list[runs.Row], list[str]]:
-        report(f"making its law for {one.plant}")
-        law = entry.law(one.plant)
-        report(f"running {one.id}")
-        return runs.rows(one, one.scenarios(law, instances, job["seed"]), instances)
+        return runs.rows(one, one.scenarios(entry.law(one.plant), instances, seed), instances)
 
     def groups() -> Iterator[list[runs.Row]]:
-        for name in job["problems"]:
+        for name in problems:
             rows, failed = cached(
-                Path(job["parts"], f"{slug(name)}.json"),
-                [name, entry.digest, beside, job["instances"], job["seed"]],
+                parts / f"{slug(name)}.json",
+                [name, entry.digest, beside, count, seed],
                 functools.partial(made, problem(name)),
                 lambda part, path: write_json(path, part),
                 read_json,
@@ -170,9 +138,8 @@ def worker(job: Data, report: Callable[[str], None]) -> Fields:
             failures.extend(failed)
             yield rows
 
-    runs.write(Path(job["table"]), groups())
-    report("timing its law")
-    first = problem(job["problems"][0])
+    runs.write(table, groups())
+    first = problem(problems[0])
     (scenario,) = first.scenarios(entry.law(first.plant), [0])
     time = law_time(scenario)
     return {

@@ -21,7 +21,7 @@ from typing import Annotated, Any, overload
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import guard
+from smc_mujoco.common import arithmetic
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Flag, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel
@@ -66,7 +66,7 @@ PLANT_DIVERGED = f"{PLANT_DIVERGED_SHORT} (|x| or |v| above {MAX_STATE:g}, or Na
 
 def check_arithmetic() -> None:
     """Raise ScenarioError if other code has changed how this thread computes."""
-    if not guard.computes_as_usual():
+    if not arithmetic.computes_as_usual():
         raise ScenarioError(
             "other code has changed the arithmetic of this thread (rounding, flush-to-zero): call "
             "C's fesetround(FE_TONEAREST) before the run, and leave it so"

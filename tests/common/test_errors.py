@@ -4,12 +4,11 @@ else.
 
 import math
 import sys
-import types
 
 import numpy as np
 import pytest
 
-from smc_mujoco.common import annexes, errors, extras, guard, libmujoco
+from smc_mujoco.common import annexes, errors, extras, libmujoco
 from smc_mujoco.common.errors import (
     ScenarioError,
     find,
@@ -200,35 +199,3 @@ def test_mujoco_without_its_library_is_named(tmp_path, monkeypatch):
         libmujoco.path()
     (tmp_path / "libmujoco.so.3").write_text("")
     assert libmujoco.path() == tmp_path / "libmujoco.so.3"
-
-
-# what foreign code does in its trial
-
-
-def test_a_trial_reports_what_its_module_returns_or_raises(tmp_path, monkeypatch):
-    """The process of a trial, in this one: its order, its limits and the lines of its report."""
-    limits = []
-    monkeypatch.setattr(guard, "limit", lambda: limits.append("set"))
-    monkeypatch.setattr(sys, "path", sys.path[:])
-    trials = {
-        "passes": (
-            lambda job, report: report("loading") or {"k": job},
-            ["loading", '{"k": 3}', "unloading"],
-        ),
-        "is wrong": (
-            lambda job, report: (_ for _ in ()).throw(guard.Fault("it is\nNaN")),
-            ["Fault it is NaN"],
-        ),
-        "fails": (lambda job, report: {}[job], ["Fault KeyError: 3"]),
-        "is large": (
-            lambda job, report: bytes(2**62),
-            ["Fault takes more than 4 GiB of memory: make it smaller"],
-        ),
-    }
-    for worker, lines in trials.values():
-        monkeypatch.setitem(sys.modules, "trial", types.SimpleNamespace(worker=worker))
-        (tmp_path / "job").write_text('{"module": "trial", "job": 3, "path": ["a"]}')
-        guard.run(tmp_path)
-        assert (tmp_path / "report").read_text().splitlines() == lines
-    assert limits == ["set"] * len(trials)
-    assert sys.path == ["a"]

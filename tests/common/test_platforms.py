@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.common import gl, guard, process
+from smc_mujoco.common import gl, process
 
 PACKAGE = Path(smc.__file__).parent
 POSITION = {"read_text": 0, "write_text": 1}  # of the encoding among the arguments
@@ -90,11 +90,6 @@ def test_other_systems_than_linux_keep_mujoco_s_own_choice_of_opengl(platform, m
     finally:
         gl.choice.cache_clear()
     assert "MUJOCO_GL" not in os.environ
-
-
-def test_without_limits_of_memory_a_model_is_tried_all_the_same(monkeypatch):
-    without_module("resource", monkeypatch)
-    guard.limit()
 
 
 def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):

@@ -48,9 +48,8 @@ def list_(
     shown with its gains and source. The command "smc-mujoco which" compares the laws that suit a
     plant, and recommends one.
 
-    FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong
-    with it (docs/c.md). That process is not a sandbox: the law can open files and connections, like
-    any program that you start.
+    FILE.c (or .so) is compiled and loaded, and one sentence says what is wrong with it (docs/c.md).
+    It is a program: load only what you trust.
 
     Example: smc-mujoco list super_twisting
 

@@ -14,7 +14,7 @@ enum { SMC_EACH = 1 }; /* numbers of each gain, of each slot of memory, of u and
 typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
 #endif
 
-#define SMC_BEYOND (1LL << 40) /* codes of FAULTS in sandbox.py: wrote beyond its memory; one more: beyond out */
+#define SMC_BEYOND (1LL << 40) /* codes of FAULTS in shared_library.py: wrote beyond its memory; one more: beyond out */
 
 extern int smc_mujoco_gains, smc_mujoco_memory; /* set when the library is loaded */
 extern const int smc_mujoco_joints;

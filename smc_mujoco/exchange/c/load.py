@@ -4,8 +4,7 @@
 
 `smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`,
 which calls the law the way the callback does, so a law of another type is a compiler error. A
-shared library is called directly. Loading, smc_setup and, on request, the law itself are tried in a
-separate process first, because they can hang or crash.
+shared library is called directly. It runs in this process, which it may crash.
 """
 
 # pyright: reportCallIssue=false
@@ -30,12 +29,11 @@ from smc_mujoco.common.constraints import Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.common.files import as_path
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
-from smc_mujoco.control.component import Template, as_gains, gain_at, gain_text, template_decorator
+from smc_mujoco.control.component import Template, as_gains, gain_text, template_decorator
 from smc_mujoco.control.from_text import parsed_gains
 from smc_mujoco.control.joint_law import ARRAYS
-from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.units import Gain
-from smc_mujoco.exchange.c import build, sandbox
+from smc_mujoco.exchange.c import build, shared_library
 
 LIBRARY_SUFFIXES = (".so", ".dylib")
 DEFAULT_MEMORY = 8
@@ -52,7 +50,7 @@ class CLaw(AtAddress):
         self.symbol = symbol
         self.code = file.read_bytes()
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
-        self._function, self.library = sandbox.entry(str(file), symbol)
+        self._function, self.library = shared_library.entry(str(file), symbol)
         self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
         self.joints = 0
         if hasattr(self.library, "smc_mujoco_entry"):
@@ -74,13 +72,13 @@ class CLaw(AtAddress):
             u, s = self._out(y, gains, memory, 2)
             return u, s
         n = self.joints
-        requests = sandbox.Requests(
+        requests = shared_library.Requests(
             n,
             lambda w: y.dynamics.coriolis(np.array(w)).tolist(),
             lambda: y.dynamics.jacobian().ravel(),
         )
         arrays = [np.ravel(getattr(y, name)).tolist() for name in ARRAYS]
-        numbers = sandbox.stored(y[:3], requests, arrays)
+        numbers = shared_library.stored(y[:3], requests, arrays)
         each = np.concatenate([np.empty(0), *(np.broadcast_to(gain, n) for gain in gains)])
         out = self._out(numbers, each.tolist(), memory, 2 * n)
         return np.array(out[:n]), np.array(out[n:])
@@ -89,20 +87,20 @@ class CLaw(AtAddress):
         self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int
     ) -> list[float]:
         """Call the C function, and return the numbers of its out[]."""
-        out = sandbox.doubles([math.nan] * count)
-        place = memory.ctypes.data_as(sandbox.DOUBLES)
-        code = self._function(sandbox.doubles(y), sandbox.doubles(gains), place, out)
+        out = shared_library.doubles([math.nan] * count)
+        place = memory.ctypes.data_as(shared_library.DOUBLES)
+        code = self._function(shared_library.doubles(y), shared_library.doubles(gains), place, out)
         if code != 0:
-            what, _ = sandbox.FAULTS.get(code, (f"returned {code}", ""))
+            what = shared_library.FAULTS.get(code, f"returned {code}")
             raise ArithmeticError(f"{self.symbol} {what.format(self.sizes[1])}")
         return out[:]
 
     def set_up(self, gains: int, memory: int, name: str | None) -> None:
         """Call smc_setup, and set the name and the number of gains and of memory slots."""
-        if code := sandbox.set_up(self.library):
+        if code := shared_library.set_up(self.library):
             raise ScenarioError(f"{self.path.name}: smc_setup returned {code}: fix it")
         self.sizes, self.__name__ = (gains, memory), name or self.__name__
-        sandbox.set_sizes(self.library, gains, memory)
+        shared_library.set_sizes(self.library, gains, memory)
 
     def __repr__(self) -> str:
         return f"<C function {self.symbol} of {self.path.name}>"
@@ -158,7 +156,6 @@ def law_from_c(
     name: str | None = None,
     symbol: str = "smc_law",
     flags: Sequence[str] = (),
-    isolate: bool = False,
     timeout: float = 10.0,
     plants: Iterable[str] = (),
 ) -> Template:
@@ -176,10 +173,7 @@ def law_from_c(
       name: of the law. Default: the file's name.
       symbol: the function's name.
       flags: additional compiler flags or files: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
-      isolate: whether to try the law first in a separate process, on short runs of a double
-        integrator. The error is one sentence that says where the law crashes, hangs, returns NaN,
-        writes beyond its memory or keeps state elsewhere.
-      timeout: s, for each of compilation, set-up and trial.
+      timeout: s, for the compilation.
       plants: as in `smc.law_function`.
 
     Returns:
@@ -188,19 +182,16 @@ def law_from_c(
       `law_from_c` again. A pickle contains the machine code.
 
     Raises:
-      ScenarioError: no such file or function, a compiler error, a function of another type, a
-        set-up that fails, crashes or does not end, or with isolate a law that fails its trial.
+      ScenarioError: no such file or function, a compiler error, a function of another type, or a
+        set-up that fails.
 
     Nothing checks C while it runs. A law that accesses other memory crashes the process or changes
-    the numbers of other runs; one that does not return hangs it. Try a new law with isolate=True,
-    or with `smc-mujoco list my_law.c`.
+    the numbers of other runs; one that does not return hangs it. Load only what you trust.
     """
     if name is not None:
         errors.name("name", name)
     library = _library(source, symbol, flags, timeout)
     about = _about(library, gains, memory)
-    if isolate:
-        _try(library, about)
     law = CLaw(library.path, symbol, library.file)
     law.set_up(len(about.gains), about.memory, name)
     return template_decorator(
@@ -214,16 +205,6 @@ def law_from_c(
     )(law)
 
 
-def _try(library: sandbox.Library, about: "About") -> None:
-    """Call a law in a separate process."""
-    gains = []
-    for gain in about.gains.values():
-        gains.extend(gain_at(gain.default, i) for i in range(max(1, about.joints)))
-    fields = ARRAYS if about.joints else Measurement._fields
-    trial = {"fields": fields, "gains": gains, "memory": about.memory}
-    sandbox.load(library, trial | {"joints": about.joints, "modelled": about.modelled})
-
-
 def check(
     source: Path,
     gains: Mapping[str, float] | None,
@@ -232,23 +213,22 @@ def check(
     flags: Sequence[str],
     timeout: float,
 ) -> Iterator[str]:
-    """Try a law without loading it, and yield lines: warnings, gains and memory."""
+    """Compile and load a law, and yield lines: warnings, gains and memory."""
     if source.suffix == ".c":
         flags = (*build.WARNING_FLAGS, *flags)
     library = _library(source, symbol, flags, timeout)
     about = _about(library, gains, memory)
     yield from library.warnings
-    _try(library, about)
     texts = [f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()]
     joints = f"{about.joints} joints; " if about.joints else ""
     given = ", ".join(texts) or "none"
-    yield f"{source.name}: {symbol} passes; {joints}gains {given}; memory {about.memory}"
+    yield f"{source.name}: {symbol} is a law; {joints}gains {given}; memory {about.memory}"
 
 
 @constrained
 def _library(
     source: str | Path, symbol: str, flags: Sequence[str], timeout: Timeout
-) -> sandbox.Library:
+) -> shared_library.Library:
     """Return the library of a law, compiled from a .c file or copied.
 
     Arguments and errors as in `law_from_c`.
@@ -270,7 +250,7 @@ def _library(
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
     if path.suffix == ".c":
         file, warnings = build.library(path, symbol, flags, timeout)
-        return sandbox.Library(file, path, symbol, timeout, warnings)
+        return shared_library.Library(file, path, symbol, warnings)
     try:
         copy = shutil.copy(
             path, build.fresh(path.suffix)
@@ -279,7 +259,7 @@ def _library(
         raise ScenarioError(
             f"{path} cannot be read ({error.strerror}): give one that can"
         ) from None
-    return sandbox.Library(Path(copy), path, symbol, timeout)
+    return shared_library.Library(Path(copy), path, symbol)
 
 
 class About(NamedTuple):
@@ -292,11 +272,26 @@ class About(NamedTuple):
     joints: int
 
 
+def _loaded(library: shared_library.Library) -> ctypes.CDLL:
+    """Load a library into this process."""
+    try:
+        _, loaded = shared_library.entry(str(library.file), library.symbol)
+    except (OSError, AttributeError) as error:
+        why = str(error).replace(str(library.file), library.path.name)
+        if re.search(rf"(undefined symbol|not found).*{library.symbol}", why):
+            raise ScenarioError(build.undefined(library.path, library.symbol)) from None
+        raise ScenarioError(
+            f"{library.path.name} cannot be loaded ({why}): build it for this machine, with all it "
+            "needs"
+        ) from None
+    return loaded
+
+
 def _about(
-    library: sandbox.Library, gains: Mapping[str, float | Gain] | None, memory: int | None
+    library: shared_library.Library, gains: Mapping[str, float | Gain] | None, memory: int | None
 ) -> About:
     """Return the properties of a library's law: the arguments, or else what the file states."""
-    facts = sandbox.load(library)
+    facts = shared_library.facts(_loaded(library))
     file = library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
     if "smc_law_shared" in facts and not facts["glue"]:

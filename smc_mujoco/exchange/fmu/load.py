@@ -4,8 +4,7 @@
 
 An FMU from Simulink, Modelica or `law_to_fmu` keeps its own state. So each channel of each run has
 its own instance, which is made at the first sample and freed with the run. The instance is called
-from Python. The FMU is first tried in a separate process, which may crash or
-hang.
+from Python, in this process, which it may crash.
 """
 
 import dataclasses
@@ -24,17 +23,15 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Names, Numbers, Pair
-from smc_mujoco.common.constraints import Positive, Timeout, constrained
+from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError, number, one_line, unknown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
-from smc_mujoco.common.guard import Failed, run_isolated
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build
-from smc_mujoco.exchange.fmu import slave
 from smc_mujoco.exchange.fmu.contents import MAX_DOUBLE, OUTPUTS
 from smc_mujoco.exchange.fmu.slave import CONSTANT_TYPES, REAL_TYPES, Slave
 
@@ -182,8 +179,6 @@ def law_from_fmu(
     constants: Numbers | None = None,
     period: Positive | None = None,
     name: str | None = None,
-    isolate: bool = True,
-    timeout: Timeout = 30.0,
 ) -> Template:
     """Load a controller in an FMU as a law, such as one that Simulink or a Modelica tool exported.
 
@@ -196,9 +191,6 @@ def law_from_fmu(
       period: s; the FMU steps this often, and u is held in between. Default: its own period if it
         has a fixed one, else the control period.
       name: of the law. Default: the file's name.
-      isolate: whether to try the FMU first in a separate process, for 500 steps on a double
-        integrator.
-      timeout: s, for the trial.
 
     Returns:
       A Template. Its gains are the FMU's real parameters, with _ in place of dots and brackets:
@@ -207,11 +199,10 @@ def law_from_fmu(
     Raises:
       MissingPackageError: FMPy is not installed: pip install 'smc-mujoco[fmu]'.
       ScenarioError: the file is not an FMU, or is of another version, without Co-Simulation or for
-        other machines; a variable is unknown; an input has no meaning; or the trial fails, crashes
-        or does not end.
+        other machines; a variable is unknown; or an input has no meaning.
 
     u is what the FMU returns after a step from the sample's time, on the measurement of that
-    sample. In a run the FMU is part of your process: if it crashes, Python ends.
+    sample. The FMU is part of your process: if it crashes, Python ends. Load only what you trust.
     """
     with extra("fmu", "smc.exchange.law_from_fmu"):
         import fmpy  # noqa: F401
@@ -234,8 +225,6 @@ def law_from_fmu(
         parameters=tuple(theirs for theirs, _ in gains.values()),
         period=_period(about) if period is None else period,
     )
-    if isolate:
-        _try(law, [gain.default for _, gain in gains.values()], timeout)
     return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
 
 
@@ -361,17 +350,3 @@ def _period(about: Any) -> float | None:
         getattr(about.defaultExperiment, "stepSize", None),
     ]
     return next((float(step) for step in steps if step and float(step) > 0.0), None)
-
-
-def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
-    """Try an FMU in a separate process, with these gains."""
-    order = {
-        "folder": str(extracted(law.path, law.digest)),
-        "inputs": dict(law.inputs),
-        "outputs": law.outputs,
-        "step": law.period,
-    }
-    try:
-        run_isolated(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
-    except Failed as failed:
-        raise ScenarioError(f"{Path(law.path).name}: {failed}") from None

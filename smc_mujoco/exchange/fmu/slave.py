@@ -1,14 +1,7 @@
-"""One instance of an FMU, through FMPy, and its trial in another process (`common.guard`), which
-must start quickly.
-"""
+"""One instance of an FMU, through FMPy."""
 
-import math
-import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
-
-from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
-from smc_mujoco.exchange.c.sandbox import double_integrators
 
 REAL_TYPES = ("Real", "Float64", "Float32")  # as in the names of FMPy's functions
 WHOLE_TYPES = ("Integer", "Enumeration", "Int8", "Int16", "Int32", "Int64")
@@ -16,9 +9,11 @@ WHOLE_TYPES += ("UInt8", "UInt16", "UInt32", "UInt64")
 CONSTANT_TYPES = (*REAL_TYPES, *WHOLE_TYPES, "Boolean")  # types of inputs that may keep one value
 # of numbers into values of other types
 CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}
-TRIAL_STEPS = 500
-TRIAL_PERIOD = 1e-3  # s, of a step if the FMU names none
 CURE = "fix the FMU, or its inputs and parameters"
+
+
+class Fault(Exception):
+    """What is wrong with an FMU, in words."""
 
 
 class Group(NamedTuple):
@@ -137,27 +132,3 @@ class Slave:
         if isinstance(text, bytes):
             text = text.decode(errors="replace")
         self.said.append(str(text))
-
-
-def worker(job: Mapping[str, Any], report: Callable) -> None:
-    """Run an FMU on a double integrator x'' = u.
-
-    `job` is from `load`, and `report` reports a stage.
-    """
-    report("instantiation")
-    arithmetic = Arithmetic()
-    slave = Slave(job["folder"], list(job["inputs"].values()), job["outputs"], job["fixed"])
-    length = job["step"] or TRIAL_PERIOD
-    motion = double_integrators(1, length, random.Random(0))
-    (seen,) = next(motion)
-    for k in range(TRIAL_STEPS):
-        report(f"the step from t = {seen['t']:g} s")
-        inputs = [seen.get(name, 0.0) for name in job["inputs"]]
-        outputs = slave.step(inputs, seen["t"], length)
-        if not all(map(math.isfinite, outputs)):
-            raise Fault(f"{job['outputs'][0]} is {outputs[0]:g} after {k + 1} steps: {CURE}")
-        (seen,) = motion.send(outputs[:1])
-    if arithmetic.changed():
-        raise Fault(f"a step {ALTERS}: {CURE}")
-    report("termination")
-    slave.close()

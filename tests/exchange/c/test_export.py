@@ -1,6 +1,5 @@
 """The library's laws written out as C: clean, small, and bit for bit what they are in Python."""
 
-import contextlib
 import ctypes
 import itertools
 import math
@@ -19,7 +18,7 @@ from smc_mujoco.cli import main as cli
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
-from smc_mujoco.exchange.c import build, sandbox
+from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.load import CLaw
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.python_functions import gains_of
@@ -64,10 +63,9 @@ def compiled(folder):
         path.write_text(smc.exchange.law_to_c(name))
         return smc.exchange.law_from_c(path, flags=STRICT, plants=LAWS[name].plants, timeout=60.0)
 
-    with untried():
-        made = dict(zip(LAWS, map(make, LAWS), strict=True))
-        for template in LAWS.values():
-            cfunctions.compile_component(template())  # compiles
+    made = dict(zip(LAWS, map(make, LAWS), strict=True))
+    for template in LAWS.values():
+        cfunctions.compile_component(template())  # compiles
     return made
 
 
@@ -93,16 +91,6 @@ def traces(compiled):
             ]
     found = iter(smc.run([s for pair in pairs.values() for s in pair]))
     return {key: (next(found), next(found)) for key in pairs}
-
-
-@contextlib.contextmanager
-def untried():
-    """Files that are loaded untried: a trial takes a process for each."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
-        )
-        yield
 
 
 def scenario(law, plant="duffing", **more) -> smc.Scenario:
@@ -190,15 +178,14 @@ def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, na
 @pytest.mark.slow
 def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
     paths = [folder / f"{name}-single.c" for name in LAWS]
-    with untried():
-        for path, text in zip(
-            paths, (smc.exchange.law_to_c(name, "float") for name in LAWS), strict=True
-        ):
-            path.write_text(text)
-            assert (
-                re.search(r"(?<![\w.])\d+\.\d+(?![\df])", text[text.index("smc_law_modelled =") :])
-                is None
-            )
+    for path, text in zip(
+        paths, (smc.exchange.law_to_c(name, "float") for name in LAWS), strict=True
+    ):
+        path.write_text(text)
+        assert (
+            re.search(r"(?<![\w.])\d+\.\d+(?![\df])", text[text.index("smc_law_modelled =") :])
+            is None
+        )
     flags = [*STRICT, "-Wdouble-promotion", "-fsyntax-only"]
     done = subprocess.run(
         [*build.compiler(), *flags, *paths], capture_output=True, text=True, check=False

@@ -69,7 +69,7 @@ def scenario(law, plant="duffing", **more) -> smc.Scenario:
 def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more):
     ours = scenario(law, plant, **more)
     path = smc.exchange.law_to_fmu(ours, folder / f"{plant}-{law}.fmu")
-    theirs = smc.exchange.law_from_fmu(path, name="theirs", isolate=False)()
+    theirs = smc.exchange.law_from_fmu(path, name="theirs")()
     first = smc.run(ours)
     second = smc.run(scenario(theirs, plant, **{k: v for k, v in more.items() if k == "model"}))
     assert second.failure is None
@@ -87,16 +87,12 @@ def test_samples_that_are_late_or_missed_are_steps_that_follow_each_other(folder
         "seed": 4,
     }
     ours = scenario("super_twisting", **clock)
-    theirs = smc.exchange.law_from_fmu(
-        smc.exchange.law_to_fmu(ours, folder / "late.fmu"), isolate=False
-    )()
+    theirs = smc.exchange.law_from_fmu(smc.exchange.law_to_fmu(ours, folder / "late.fmu"))()
     first, second = smc.run([ours, scenario(theirs, **clock)])
     assert second.failure is None
     np.testing.assert_array_equal(second.u, first.u)
     slower = smc.run(
-        scenario(
-            smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)(), u_max=100.0, **clock
-        )
+        scenario(smc.exchange.law_from_fmu(foreign, **RENAMED)(), u_max=100.0, **clock)
     )
     changed = np.flatnonzero(np.diff(slower.u[:, 0])) + 1
     assert slower.failure is None
@@ -108,7 +104,7 @@ def test_gains_are_the_fmu_s_parameters(folder):
     path = smc.exchange.law_to_fmu(
         smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0
     )
-    template = smc.exchange.law_from_fmu(path, isolate=False)
+    template = smc.exchange.law_from_fmu(path)
     assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
     with pytest.raises(smc.ScenarioError, match="law_lam"):
         template(law_lam=-1.0)
@@ -125,7 +121,7 @@ def test_gains_are_the_fmu_s_parameters(folder):
 
 def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(folder):
     law = smc.exchange.law_from_fmu(
-        smc.exchange.law_to_fmu("super_twisting", folder / "written_again.fmu"), isolate=False
+        smc.exchange.law_to_fmu("super_twisting", folder / "written_again.fmu")
     )()
     assert law.function is not None
     gc.collect()
@@ -144,7 +140,7 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
 
 def test_another_process_takes_the_law_from_the_file(folder):
     path = smc.exchange.law_to_fmu("pid", folder / "sent.fmu")
-    law = smc.exchange.law_from_fmu(path, isolate=False)()
+    law = smc.exchange.law_from_fmu(path)()
     copy = pickle.loads(pickle.dumps(law))
     assert copy == law
     first, second = smc.run([scenario(law), scenario(copy)])
@@ -192,7 +188,7 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
 
 
 def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
-    law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
+    law = smc.exchange.law_from_fmu(foreign, **RENAMED)()
     trace = smc.run(
         scenario(
             law,
@@ -235,7 +231,7 @@ def test_inputs_that_are_not_real_may_be_held(folder):
 
 
 def test_periods_that_do_not_fit_are_said(foreign):
-    law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
+    law = smc.exchange.law_from_fmu(foreign, **RENAMED)()
     trace = smc.run(scenario(law, duration=0.021, control_period=3e-3, physics_step=1e-3))
     assert (
         "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01"
@@ -243,45 +239,8 @@ def test_periods_that_do_not_fit_are_said(foreign):
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("mode", "said"),
-    [
-        (1.0, r"the step from t = 0 s died of SIGSEGV"),
-        (
-            2.0,
-            (
-                r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give "
-                r"timeout="
-            ),
-        ),
-        (3.0, r"torque is nan after 1 steps: fix the FMU"),
-        (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
-        (5.0, r"a step changes the arithmetic of its thread \(rounding, flush-to-zero, "),
-    ],
-)
-def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
-    with pytest.raises(smc.ScenarioError, match=rf"^controller\.fmu: {said}") as error:
-        smc.exchange.law_from_fmu(
-            foreign,
-            variables=VARIABLES,
-            constants={"mode": mode},
-            timeout=6.0 if mode == 2.0 else 60.0,
-        )
-    assert "\n" not in str(error.value)
-
-
-def test_a_trial_has_the_parameters_of_the_run(foreign, tmp_path):
-    """The value that stands in the description, which the FMU itself does not have."""
-    path = changed(foreign, tmp_path, ('<Real start="8" min="0"/>', '<Real start="200"/>'))
-    with pytest.raises(smc.ScenarioError, match=r"changed\.fmu: the step from t = 0 s fails"):
-        smc.exchange.law_from_fmu(path, **RENAMED)
-
-
 def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
-    law = smc.exchange.law_from_fmu(
-        foreign, variables=VARIABLES, constants={"mode": 4.0}, isolate=False
-    )()
+    law = smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 4.0})()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
     assert fine.failure is None
