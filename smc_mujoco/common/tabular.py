@@ -1,8 +1,9 @@
 """Tables of text, with writers for a terminal, for plain text of 80 columns, for notebooks and for
 LaTeX.
 
-    table = Tabular(headings=["law", "ITAE (m s^2)"], rows=[["pid", Cell("1.2", "1.1–1.3",
-    strong=True)]]) print(table); rich.print(table); table.to_latex()
+    table = Tabular(headings=["law", "ITAE (m s^2)"], rows=[["pid", Cell("1.2", "1.1–1.3")]])
+    print(table)
+    table.to_latex()
 
 A table that is wider than the terminal is shown in several parts, each with the columns at the
 left.

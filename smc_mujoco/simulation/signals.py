@@ -332,8 +332,7 @@ class Dryden(Signal):
 
     The world's x is taken for the direction of the mean wind. With h the height in feet, b = 0.177
     + 0.000823 h, lengths L_z = h and L_x = L_y = h/b^1.2 feet, standard deviations s_z = 0.1 w20
-    and s_x = s_y = s_z/b^0.4, and T =
-    L/speed:
+    and s_x = s_y = s_z/b^0.4, and T = L/speed:
 
         s sqrt(2 T)/(1 + T p) along x,    s sqrt(T) (1 + sqrt(3) T p)/(1 + T p)^2 along y and z
 

@@ -91,7 +91,7 @@ class Evaluator:
                     made = equation.Equations(goal, some, self.names, self.threads, device)
                 else:
                     batch = [prepared[i] for i in indices]
-                    made = _Again(batch, names, self.threads, constraints, slots)
+                    made = _RepeatedBatch(batch, names, self.threads, constraints, slots)
                 self._runs.append((indices, made))
 
     def __call__(self, candidates: Sequence[Floats]) -> list[Evaluation]:
@@ -175,7 +175,7 @@ def _putter(
     return put
 
 
-class _Again(ScenarioBatch):
+class _RepeatedBatch(ScenarioBatch):
     """Cases of one key that run again and again in MuJoCo, with gains of `slots` candidates at
     once.
     """

@@ -362,7 +362,7 @@ def _evolved(
     return logs
 
 
-class _Enough(Exception):
+class _DescentEnded(Exception):
     """A descent has ended."""
 
 
@@ -379,7 +379,7 @@ def _descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
     def cost(z: Array) -> float:
         costs.append(trials.cost(trials.drawn_back(np.clip(z, low, high), logs)))
         if len(costs) > 2 * window and min(costs[:-window]) <= min(costs) * (1.0 + PATIENCE):
-            raise _Enough
+            raise _DescentEnded
         return np.log(costs[-1])
 
     if size <= 1:
@@ -388,7 +388,7 @@ def _descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
         Bounds(low, high),
         {"initial_tr_radius": FIRST_RADIUS, "final_tr_radius": LAST_RADIUS},
     )  # pyright: ignore[reportArgumentType]
-    with contextlib.suppress(_Enough):
+    with contextlib.suppress(_DescentEnded):
         minimize(cost, logs, method="COBYQA", bounds=bounds, options={"maxfev": size - 1, **radii})
 
 

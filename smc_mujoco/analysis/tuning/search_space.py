@@ -29,8 +29,8 @@ exponents, table sizes, a plant's parameters, filters and number formats of a pr
 a law was given as 0 stays 0, which says what terms the law has. A gain of unknown unit is searched
 over as many decades about its default:
 
-    @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0,
-    held=True)})
+    gains = {"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)}
+    @smc.law_function(gains=gains)
 
 Some laws contain a number with a unit, such as the width 1 of tanh(s): their gains have the units
 that leave this number unchanged. A law that takes g as 1 treats forces and accelerations in the

@@ -3,8 +3,10 @@
     def settles(runs):
         scenarios = runs.grid()                        # (plant, law, condition) -> Scenario
         scores = runs.scores(scenarios.values())       # every metric of each, in order
-        return {"settling time, s": {plant: one["settling_time"] for (plant, *_), one in
-        zip(scenarios, scores)}}
+        times = {}
+        for (plant, *_), score in zip(scenarios, scores):
+            times[plant] = score["settling_time"]
+        return {"settling time, s": times}
 
 A run is made once: scores are kept by the scenario's key. Runs in a study's table are taken from
 it.

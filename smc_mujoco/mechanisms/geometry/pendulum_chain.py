@@ -2,10 +2,8 @@
 springs.
 
 Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs
-are fixed
-tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the
-shaft that
-carries the pendulums transmits nothing.
+are fixed tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are
+free; the shaft that carries the pendulums transmits nothing.
 
 Contact `bobs` puts the pivots side by side in the plane of motion: hanging bobs nearly touch, as in
 Newton's cradle. The torsion springs still act, with torques carried from pivot to pivot.
@@ -25,9 +23,8 @@ PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each o
 HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
 HUB = 0.02  # m, half the length of a hub, where a spring's wire ends
 COUPLING = 0.5  # N m/rad: chosen for the paper study
-MAX_DRAWN = (
-    50  # pendulums; springs of longer chains are not drawn, for each has a thousand vertices
-)
+# pendulums; springs of longer chains are not drawn, for each has a thousand vertices
+MAX_DRAWN = 50
 HOOK_ARM = 0.25  # m from pivot to real spring: chosen, half a rod
 
 # m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
