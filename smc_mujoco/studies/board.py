@@ -43,7 +43,8 @@ MARKS = {
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
     "strong=True": "A star or bold type marks the laws of which one is the best, with "
     f"{100 * LEVEL:g} % confidence in each column and condition: no other is better, all their "
-    "runs have arrived, and their samples are enough.",
+    "runs have arrived, and their samples are enough. Unless a law wins, none marks a median whose "
+    "interval spans more than a factor of 4.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
@@ -69,7 +70,7 @@ class Entry:
 
     law: str
     interval: Interval  # of its median, or of the share of its runs that settle, over its samples
-    vague: bool  # whether the interval is too wide for the median to say anything
+    vague: bool  # whether the interval is too wide for the median to say enough
     rank: Rank
     failed: int  # number of its runs that failed, or have no value, such as those that never settle
     runs: int  # number of its runs, equal ones counted once

@@ -25,7 +25,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
-MAX_RATIO = 200.0  # of the ends of a median's interval, above which it says nothing; chosen
+MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
 Sources = Mapping[str, tuple[Source, ...]]  # law -> those of its gains
 
 

@@ -158,13 +158,21 @@ def test_only_what_no_law_beats_is_marked(boards):
     few = leaderboard(made(seeds=3), metrics=["itae"])
     assert not few[0].best
     assert not any(map(any, marked(few)))
-    wide = made()  # twenty runs are enough, but these say nothing of a median
+    wide = made()  # twenty runs are enough, but these say too little of a median
     wide.columns["itae"] = np.exp(20.0 * np.random.default_rng(1).normal(size=60))
     blind = leaderboard(wide, metrics=["itae"])
     assert blind[0].too_few == ""
     assert len(blind[0].best) == 3
     assert not any(map(any, marked(blind)))
     assert "the runs resolve no lead" in repr(blind)
+    some = made()  # the first median is known within a factor of 10, the others within 1.2
+    random = np.random.default_rng(3)
+    some.columns["itae"] = np.exp(np.repeat([2.5, 0.1, 0.1], 20) * random.normal(size=60))
+    board = leaderboard(some, metrics=["itae"])[0]
+    assert board.winner is None
+    assert EVIL in board.best
+    cells = {row[0].text: row[1] for row in Boards([board]).tables[0].rows}
+    assert [cells[law].strong for law in LAWS] == [False, True, True]
 
 
 @pytest.mark.parametrize("conditions", [("nominal",), ("nominal", "noise", "sine")])
