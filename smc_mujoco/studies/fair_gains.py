@@ -314,9 +314,6 @@ class Trial(NamedTuple):
             known.clear()
             with warnings.catch_warnings():  # the remark says so
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
-                warnings.filterwarnings(
-                    "ignore", ".* have no unit and are searched", ScenarioWarning
-                )
                 return search.tune(
                     plant,
                     law,

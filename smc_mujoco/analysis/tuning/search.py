@@ -67,6 +67,7 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.files import writable
 from smc_mujoco.common.progress import Bar, bar
+from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.custom.scales import falls
@@ -686,4 +687,7 @@ def _warn(words: str) -> None:
 def _without_unit_warning(law: Component) -> str:
     names = list(search_space.without_unit(law))
     cure = unit_cure(names[0], law.gains[names[0]])
-    return f"gains of {law.name} have no unit and are searched about their defaults: {cure}"
+    return (
+        f"gains {joined(names)} of {law.name} have no unit and are searched about their defaults: "
+        f"{cure}, or Gain(.., held=True) to keep one, such as an exponent"
+    )

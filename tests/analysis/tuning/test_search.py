@@ -304,7 +304,9 @@ def test_a_gain_over_another_is_searched_as_far_as_a_force():
 
 
 def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
-    with pytest.warns(smc.errors.ScenarioWarning, match=r"gains of failing have no unit.*Gain\("):
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"gains .* of failing have no unit.*Gain\("
+    ):
         tuned = tune(
             "duffing",
             failing(),
