@@ -39,6 +39,9 @@ from smc_mujoco.metrics.fold import Fold
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
+# rows that tuning and problems read, too
+ITAE = Fold("e", "integral", timed=True)
+TV = Fold("u", "sum", change=True)
 RISE_LEVELS = (0.1, 0.9)  # shares of the way from the start of an approach to the reference
 # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 HIGH_FREQUENCY = 50.0
@@ -248,7 +251,7 @@ def iae(trace: Trace) -> float:
     ...
 
 
-@folded("{x} s^2", Fold("e", "integral", timed=True), label="ITAE", need="on-track", error=True)
+@folded("{x} s^2", ITAE, label="ITAE", need="on-track", error=True)
 def itae(trace: Trace) -> float:
     """Integral of (t - t0) |e| dt, summed over the channels (trapezoid)."""
     ...
@@ -279,7 +282,7 @@ def max_step(trace: Trace) -> float:
     ...
 
 
-@folded("{u}", Fold("u", "sum", change=True), label="TV")
+@folded("{u}", TV, label="TV")
 def tv(trace: Trace) -> float:
     """Total variation of u: sum of |u[k+1] - u[k]| over the run, worst channel."""
     ...

@@ -30,6 +30,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law, known_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics.catalogue import ITAE, TV
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import worst_case
 from smc_mujoco.simulation.grid import Starts, case
@@ -228,13 +229,12 @@ class Problem:
         else:
             bounds = np.array(trace.scenario.limits[: plant.driven])
             commands = trace.u
-        steps = np.abs(np.diff(commands[:, : len(bounds)], axis=0))
-        variation = steps.sum(axis=0) / bounds
+        variation = TV.channels(trace.t, commands[:, : len(bounds)]) / bounds
         last = float(worst[conventions.last_part(trace)].max())
         values = {
             "failed": 0.0,
             "accuracy": max(last, self._values["floor"]),
-            "itae": float(np.trapezoid(trace.t * total, trace.t)),
+            "itae": float(ITAE.of(trace.t, total[:, None])),
             "settling": _kept(trace, worst, conventions.SETTLING_BAND),
             "calm": float(variation.max() / self.duration),
         }

@@ -18,7 +18,6 @@ otherwise.
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
-import math
 from collections import namedtuple
 
 from numba import njit
@@ -39,7 +38,7 @@ from smc_mujoco.mechanisms.hardware.moments import (
 from smc_mujoco.simulation import exogenous, parts, philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.state import log_at
-from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order
+from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order, reading_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 OTHER_CALLBACKS = len(slots())
@@ -152,7 +151,7 @@ def _errors(view, t):
 
 
 @inlined
-def _sense(view, i):
+def _sense(view, i, t):
     _, sim, data = view
     channel = channel_at(sim.channels, i)
     sim.seen.i = i
@@ -163,11 +162,10 @@ def _sense(view, i):
 @inlined
 def _reading(view, i, k, t):
     sim = view.sim
-    if sim.readers != 0:
-        reader = reader_at(sim.readers, i)
-        if reader.period != 0.0:
-            return max(0, math.floor((t - reader.delay) / reader.period + 1e-6))
-    return k
+    if sim.readers == 0:
+        return k
+    reader = reader_at(sim.readers, i)
+    return reading_at(k, t, reader.period, reader.delay)
 
 
 @inlined

@@ -57,7 +57,7 @@ class Moments(NamedTuple):
     seen: Any  # (view) -> measured positions, estimated velocities and accelerations
     # a sample
     errors: Any  # (view, t) -> errors of position and velocity
-    sense: Any  # (view, i) -> x and v at the sensor
+    sense: Any  # (view, i, t) -> x and v at the sensor
     estimate: Any  # (view, i, x, v) -> raised, v and a
     feedforward: Any  # (view, t) -> raised, value; before the laws
     ask: Any  # (view, k, t, i) -> failure, u and s of channel i; see `asking`
@@ -161,6 +161,16 @@ def lateness(settings, k, last):
     return int(philox.uniform(settings.seed, 0, philox.JITTER, k) * (settings.jitter + 1))
 
 
+@inlined
+def reading_at(k, t, period, delay):
+    """Return the index of the reading that a sensor gives at sample k, at time t, s: the sample's,
+    or that of the sensor's own clock.
+    """
+    if period == 0.0:
+        return k
+    return max(0, math.floor((t - delay) / period + 1e-6))
+
+
 def _sampling(of: Moments) -> Any:
     """Return a function (view, k, within, late) -> failure: sample k, if it comes in this physics
     step, `within` steps into its period.
@@ -229,7 +239,7 @@ def _measuring(of: Moments) -> Any:
         xs, vs, accelerations = seen(view)
         x_error, v_error = errors(view, t)
         for i in range(n_of(view)):
-            x, v = sense(view, i)
+            x, v = sense(view, i, t)
             x += x_error
             v += v_error
             j = reading(view, i, k, t)

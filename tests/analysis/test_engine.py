@@ -1,6 +1,7 @@
 """The fast engine against MuJoCo: one contract for laws, plants and conditions."""
 
 import dataclasses
+import math
 import random
 
 import numpy as np
@@ -13,12 +14,25 @@ from smc_mujoco.analysis.engine.scores import RESTING, names
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.hardware import RateLimit, Sigmoid
 from smc_mujoco.metrics import catalogue
+from smc_mujoco.metrics.conventions import folded
+from smc_mujoco.metrics.fold import Fold
 from smc_mujoco.signals import BandLimited, Held, MinimumJerk, OrnsteinUhlenbeck, Relay
 from smc_mujoco.simulation import state
 
 AGREES = 1e-9  # of the start
 BESIDE = (-2e-12, -1e-12, 1e-12, 2e-12)  # rad or m
 SINE = smc.Sine(0.2, 5.0)
+
+
+@smc.hardware.friction_function(numbers={"stiffness": 500.0, "level": 0.3}, memory=1)
+def dahl(y, p, memory):
+    """P. R. Dahl's bristle, which bends and slips."""
+    bend = math.copysign(p.level / p.stiffness, y.v)
+    force = -p.stiffness * memory[0]
+    memory[0] = bend + (memory[0] - bend) * math.exp(-abs(y.v) * y.h / abs(bend))
+    return force
+
+
 ALIKE = {  # they differ in numbers alone, and one loop runs them together
     "nominal": {},
     "noise": {"noise": smc.Noise(1e-3, 5e-3), "seed": 7},
@@ -27,6 +41,8 @@ ALIKE = {  # they differ in numbers alone, and one loop runs them together
     "jump": {"jump": smc.Jump(3.0, {"mass": 2.0}), "mismatch": {"mass": 0.8}},
     "relay": {"disturbance": Relay(0.2, rate=1.0), "model": "nominal"},
     "jitter": {"clock": smc.Clock(jitter=5e-4, missed=0.1), "physics_step": 2.5e-4},
+    "fault": {"fault": smc.Fault(1.0, gain=0.6), "input_delay": 2e-3},
+    "stuck": {"fault": smc.Fault(0.5, stuck=True)},
     "pauses": {"clock": smc.Clock(pause=5e-3, pause_every=0.1)},
 }
 APART = {
@@ -42,6 +58,9 @@ APART = {
     "coulomb": {"friction": (smc.Coulomb(0.2), smc.Viscous(0.1)), "disturbance": SINE},
     "formula": {"friction": Sigmoid(0.4, 50.0), "disturbance": SINE, "model": "true"},
     "encoder": {"sensor": smc.Encoder(2048, bias=1e-3, dropout=0.1), "noise": smc.Noise(1e-3)},
+    "late sensor": {"sensor": smc.Encoder(2048, period=4e-3, delay=3e-3, dropout=0.1)},
+    "skew": {"sensor": smc.Encoder(delay=2e-3, skew=1e-3), "noise": smc.Noise(1e-3)},
+    "own friction": {"friction": (dahl(level=0.1), smc.Viscous(0.1)), "disturbance": SINE},
     "lag": {"actuator": smc.Lag(0.01), "friction": smc.Coulomb(0.1), "input_delay": 3e-3},
     "drives": {"actuator": (smc.Lag(0.01), RateLimit(50.0))},
 }
@@ -165,3 +184,21 @@ def test_parts_that_are_drawn_together_run_as_in_mujoco(seed):
 def test_every_law_runs_as_in_mujoco(law):
     conditions = {name: ALIKE[name] for name in ("nominal", "noise", "delay", "jump")}
     check("inverted_pendulum", law, conditions)
+
+
+@pytest.mark.quick
+def test_a_new_row_is_in_the_score_of_a_trace_and_in_the_engine(monkeypatch):
+    monkeypatch.setitem(catalogue.CATALOGUE, "late_speed", None)  # and takes it away again
+
+    @folded("{x}/s", Fold("v", "mean", 2, "late"))
+    def late_speed(trace):
+        """Root mean square of v in the last part, worst channel."""
+        ...
+
+    case = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
+    trace = smc.run(case)
+    expected = np.sqrt(np.mean(trace.v[400:] ** 2))
+    assert late_speed(trace) == smc.score(trace)["late_speed"] == pytest.approx(expected)
+    assert not group.why_not(case, ("late_speed",))
+    found = group.Group([case], ("late_speed",)).scored("cpu", 1)[0][0]
+    assert found == pytest.approx([expected], rel=AGREES)

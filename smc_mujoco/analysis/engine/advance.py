@@ -1,10 +1,12 @@
-"""A physics step of the loop: the plant's equation under RK4, with its drives and its friction."""
+"""A physics step of the loop: the plant's equation with its drives and its friction, under RK4, or
+under the implicitfast of frictions whose force is held over a step.
+"""
 
 # pyright: reportCallIssue=false
 from typing import Any
 
 from smc_mujoco.analysis.engine.calls import Compiler, acting, array_in, reader
-from smc_mujoco.analysis.engine.form import SETTING, STATES, Form, PartAt, layout
+from smc_mujoco.analysis.engine.form import SETTING, STATES, Form, Part, layout
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.mechanisms.hardware.drives import KEPT
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState
@@ -130,7 +132,9 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
     """
     total = always(0.0)
     for at in reversed(layout(form).frictions):
-        total = _and_friction(at, total, compile_user)
+        of_stage = acting(at, compile_user)
+        force = _first_of(of_stage)
+        total = _and_friction(at.part, total, force)
     row_at, work_at = layout(form)[:2]
 
     @inlined
@@ -161,16 +165,123 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
     return friction
 
 
-def _and_friction(at: PartAt, others: Any, compile_user: Compiler) -> Any:
+def _first_of(of_stage: Any) -> Any:
+    """Return a function (view, y, i) -> the force alone of a friction that is of a stage."""
+    return inlined(lambda view, y, i: of_stage(view, y, i)[0])
+
+
+def _and_friction(part: Part, others: Any, force: Any) -> Any:
     """Return a function (view, y, i) -> the force of a friction on channel i, and of the others."""
-    force = acting(at, compile_user)
-    channels = at.part.channels
+    channels = part.channels
 
     @inlined
     def total(view, y, i):
         found = others(view, y, i)
         if i in channels:
-            found += force(view, y, i)[0]
+            found += force(view, y, i)
         return found
 
     return total
+
+
+def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
+    """Return a function (view, k, within, step): a physics step h of MuJoCo's implicitfast, for
+    frictions whose force F is held over it:
+
+        (1 - h df/dv) a = f(x, v) + g (u + d + F),   v += h a,   x += h v
+
+    f is linear in v, so its slopes are differences from rest: what the plant's dampers do is that
+    of the step's end, between joints, too.
+    """
+    n = form.n
+    values = _valuing(form)
+    nominal = compile_user(form.nominal.function)
+    rub = _rubbing_held(form, compile_user)
+    solve = _solving(n, layout(form).work.matrix, layout(form).work.a)
+    row_at, work_at = layout(form)[:2]
+
+    @inlined
+    def advance(view, k, within, step):
+        row, _, work = view
+        h = row[SETTING.step]
+        xs = array_in(work, work_at.x, n)
+        vs = array_in(work, work_at.v, n)
+        unit = array_in(work, work_at.unit, n)
+        p = values(row, step)
+        for i in range(n):
+            f, g = nominal(xs, vs, i, p)
+            at_rest = nominal(xs, array_in(work, work_at.rest, n), i, p)[0]
+            damping = row[row_at.damping + i]
+            for j in range(n):
+                unit[j] = 1.0
+                slope = nominal(xs, unit, i, p)[0] - at_rest
+                unit[j] = 0.0
+                work[work_at.matrix + i * n + j] = -h * slope
+            work[work_at.matrix + i * n + i] += 1.0 + h * damping * g
+            work[work_at.a + i] = f + g * (rub(view, i, step, at_rest / g) - damping * vs[i])
+        solve(work)
+        for i in range(n):
+            vs[i] += h * work[work_at.a + i]
+            xs[i] += h * vs[i]
+
+    return advance
+
+
+def _rubbing_held(form: Form, compile_user: Compiler) -> Any:
+    """Return a function (view, i, step, load) -> the force of the drive, the disturbances and the
+    frictions on channel i, with the plant's `load` on it at rest.
+    """
+    total = always(0.0)
+    for at in reversed(layout(form).frictions):
+        total = _and_friction(at.part, total, acting(at, compile_user))
+    work_at = layout(form).work
+
+    @inlined
+    def rub(view, i, step, load):
+        work = view.work
+        h = view.row[SETTING.step]
+        state = state_in(work, work_at.states + STATES * i)
+        pushed = work[work_at.d + i]
+        y = JointState(
+            t=step * h,
+            h=h,
+            x=work[work_at.x + i],
+            v=work[work_at.v + i],
+            u=state.delayed,
+            motor=state.middle,
+            load=load + pushed,
+            stage=0.0,
+            others=0.0,
+            mean=0.0,
+            level=0.0,
+            mobility=0.0,
+        )
+        force = total(view, y, i)
+        state.reaction += force
+        state.middle = state.delayed  # what the drive's force was, in the next step
+        return force + state.delayed + pushed
+
+    return rub
+
+
+def _solving(n: int, matrix: int, a: int) -> Any:
+    """Return a function (work): solve for n numbers from place `a` on, with the matrix from place
+    `matrix` on. Dampers make it dominated by its diagonal, so that no rows are exchanged.
+    """
+
+    @inlined
+    def solve(work):
+        for i in range(n):
+            for j in range(i + 1, n):
+                share = work[matrix + j * n + i] / work[matrix + i * n + i]
+                if share != 0.0:
+                    for c in range(i, n):
+                        work[matrix + j * n + c] -= share * work[matrix + i * n + c]
+                    work[a + j] -= share * work[a + i]
+        for back in range(n):
+            i = n - 1 - back
+            for c in range(i + 1, n):
+                work[a + i] -= work[matrix + i * n + c] * work[a + c]
+            work[a + i] /= work[matrix + i * n + i]
+
+    return solve

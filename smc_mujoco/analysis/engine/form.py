@@ -83,7 +83,9 @@ class Form(NamedTuple):
     delay: bool
     clock: bool
     fails: bool
+    implicit: bool  # whether a step is implicitfast's, not RK4's
     slots: int  # commands that are under way
+    past: int  # physics steps whose states a sensor may read; 0 if it reads the present one
     metrics: Names
 
 
@@ -118,6 +120,8 @@ class RowPlaces(NamedTuple):
     damping: int  # this and `levels` only with frictions
     levels: int  # of dry friction
     hinges: int  # whether a joint is one; only with a sensor
+    periods: int  # s between readings, and until one arrives; only with a past
+    delays: int
     reach: int  # 4 numbers of an `outcome`
 
 
@@ -132,6 +136,8 @@ class WorkPlaces(NamedTuple):
     sum_v: int
     sum_a: int
     rest: int  # velocities of 0
+    unit: int  # and of 1 in one joint; this and the next only in an implicit step
+    matrix: int  # 1 - h df/dv, n^2
     motor: int  # force of a drive at a stage
     d: int  # the disturbances' force
     seen_x: int
@@ -141,6 +147,7 @@ class WorkPlaces(NamedTuple):
     before: int  # LOG at the sample before
     states: int  # CHANNEL_STATE of each channel
     ring: int  # commands of `slots` samples
+    past: int  # x and v of all channels, in each of `past` steps
     measured: int  # what a law in C reads
     commanded: int  # its u and s, 2 n
 
@@ -226,6 +233,8 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         damping=row.take(n if form.frictions else 0),
         levels=row.take(n if form.frictions else 0),
         hinges=row.take(n if form.sensor else 0),
+        periods=row.take(n if form.past else 0),
+        delays=row.take(n if form.past else 0),
         reach=row.take(4),
     )
 
@@ -242,6 +251,8 @@ def _work_places(form: Form, work: Places) -> WorkPlaces:
         sum_v=work.take(n),
         sum_a=work.take(n),
         rest=work.take(n),
+        unit=work.take(n if form.implicit else 0),
+        matrix=work.take(n * n if form.implicit else 0),
         motor=work.take(n),
         d=work.take(n),
         seen_x=work.take(n),
@@ -251,6 +262,7 @@ def _work_places(form: Form, work: Places) -> WorkPlaces:
         before=work.take(WIDTH * n),
         states=work.take(STATES * n),
         ring=work.take(form.slots * n),
+        past=work.take(form.past * 2 * n),
         measured=work.take(measured_places(form) if in_c else 0),
         commanded=work.take(2 * n if in_c else 0),
     )

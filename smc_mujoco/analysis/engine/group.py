@@ -26,6 +26,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.hardware.drives import advanced
+from smc_mujoco.mechanisms.layout import moves_alone
 from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, settling_band
 from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.cfunctions import compile_component
@@ -35,6 +36,7 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
 
+MAX_IMPLICIT = 8  # joints, chosen: an implicit step solves for all of them
 # fields in which forms of one key may differ, at their least
 VARYING: Fields = {
     "noise": False,
@@ -56,13 +58,13 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
             plant.by_mujoco or plant.unmodelled or plant.direct or plant.measured
         ),
         "it has MuJoCo's friction, contacts or another mechanism": not (
-            s.plain_equation or (s.exact_friction and not plant.free)
+            s.plain_equation or (s.exact_friction and not plant.free) or rubs_by_force(s)
         ),
         "it has an actuator other than lags and rate limits": not all(
             part.in_callback and part.force is None for part in s.actuator
         ),
-        "its sensor reads at its own times": bool(s.readings),
-        f"its integrator is {s.integrator}": s.integrator != "RK4",
+        f"its integrator is {s.integrator}": s.integrator
+        != ("implicitfast" if rubs_by_force(s) else "RK4"),
         "a law of many joints, or in C, is for the processor": device == "cuda"
         and any(_part(law).function is None for law in s.law.of_channels(plant.driven)),
         "a function of its user's may index beyond its memory, which only the processor checks": (
@@ -89,11 +91,24 @@ def _users(s: Resolved) -> list[tuple[Any, int]]:
     found += [(type(one).value, one.memory) for one in signals if one is not None]
     found += [(part.read, part.memory) for part in s.sensors]
     found += [(part.stage_force, part.memory) for part in s.exact_parts]
+    found += [(part.force, part.memory) for part in _held(s)]
     return [(function, memory) for function, memory in found if not fingerprint.ours(function)]
 
 
 def _indexes_within(user: tuple[Any, int]) -> bool:
     return indices.within(*user)
+
+
+def rubs_by_force(s: Resolved) -> bool:
+    """Return whether its friction is functions whose force is held over a step, and dampers, of few
+    joints that move alone.
+    """
+    if s.contact or s.mechanism != "equation" or s.actuator or s.exact_friction:
+        return False
+    held = [part for part in s.friction if not part.smooth]
+    if not held or s.plant.rubs or s.plant.n > MAX_IMPLICIT:
+        return False
+    return all(part.force is not None for part in held) and moves_alone(s.plant)
 
 
 def key(scenario: Scenario) -> Hashable:
@@ -113,10 +128,17 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     for part in s.exact_parts:
         channels = tuple(part.channels(s.plant))
         frictions.append(Part(part.stage_force, part.names, part.memory, channels))
+    for part in _held(s):
+        frictions.append(Part(part.force, part.names, part.memory, tuple(part.channels(s.plant))))
     clock = not s.clock.regular
     slots = 1
     while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled
         slots *= 256
+    past = 0
+    if s.readings:
+        past = 16
+        while past < _oldest(s):
+            past *= 16
     return Form(
         n=s.plant.n,
         driven=s.plant.driven,
@@ -138,7 +160,9 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         delay=bool(s.delay_steps),
         clock=clock,
         fails=s.fault is not None,
+        implicit=rubs_by_force(s),
         slots=slots,
+        past=past,
         metrics=tuple(metrics),
     )
 
@@ -153,6 +177,20 @@ def _part(c: Component) -> Part:
 def _drives(s: Resolved) -> list[Any]:
     """Return the callback's drives; each is of some channels."""
     return [part for part, kind in s.acting if kind == "act"]
+
+
+def _held(s: Resolved) -> list[Any]:
+    """Return the frictions whose force is held over a step."""
+    return [part for part, kind in s.acting if kind == "force" and not part.is_drive]
+
+
+def _oldest(s: Resolved) -> int:
+    """Return how many physics steps the states reach back that its sensors may give."""
+    longest = 0.0
+    for part in s.sensors:
+        late = part.delay + part.skew * max(part.channels(s.plant))
+        longest = max(longest, late + (part.period or 0.0))
+    return math.ceil(longest / s.physics_step) + 2
 
 
 def wider(form: Form, other: Form) -> Form:
@@ -236,12 +274,16 @@ class Group:
         parts: list[tuple[PartAt | None, Any]] = []
         parts += [(self.layout.drive, part) for part in _drives(s)]
         parts += [(self.layout.sensor, part) for part in s.sensors]
-        parts += zip(self.layout.frictions, s.exact_parts, strict=True)
+        parts += zip(self.layout.frictions, (*s.exact_parts, *_held(s)), strict=True)
         for at, part in parts:
             assert at is not None  # one loop's scenarios have the same parts
             names = len(part.names)
             table = row[at.numbers : at.numbers + self.form.n * names].reshape(-1, names)
             table[[*part.channels(s.plant)]] = part.numbers(run_of(s, part))
+        for part in s.sensors if self.form.past else ():
+            for i in part.channels(s.plant):
+                row[self.layout.row.periods + i] = part.period or 0.0
+                row[self.layout.row.delays + i] = part.delay + part.skew * i
         places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction:
             for first, value in zip(places, part.added_to_model, strict=True):

@@ -5,9 +5,10 @@ a run reads its numbers from its row, and keeps its state in `work`, see `form.l
 """
 
 # pyright: reportCallIssue=false
+import math
 from typing import Any, NamedTuple
 
-from smc_mujoco.analysis.engine.advance import advancing
+from smc_mujoco.analysis.engine.advance import advancing, advancing_implicitly
 from smc_mujoco.analysis.engine.calls import (
     Compiler,
     View,
@@ -42,7 +43,7 @@ from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, Sight
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.state import FINE, RAISED
-from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order
+from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order, reading_at
 
 state_in = record_in(CHANNEL_STATE)
 LOGGED_COLUMNS = tuple(COLUMN[name] for name in LOGGED)
@@ -65,7 +66,11 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
     sample, if the row says `logging`.
     """
     begin, between = order(_moments(form, compile_user))
-    advance = advancing(form, between, compile_user)
+    if form.implicit:
+        advance = advancing_implicitly(form, compile_user)
+    else:
+        advance = advancing(form, between, compile_user)
+    remember = _remembering(form)
     record = _recording(form)
     n = form.n
     row_at, work_at = layout(form)[:2]
@@ -86,6 +91,7 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
             for within in range(steps):
                 step = k * steps + within
                 scores[FAILED_STEP] = step
+                remember(view, step)
                 failure = begin(view, k, within, step)
                 if failure != FINE:
                     scores[FAILURE] = failure
@@ -152,6 +158,48 @@ def _records(form: Form) -> Fields:
     }
 
 
+def _remembering(form: Form) -> Any:
+    """Return a function (view, step): keep the state for a sensor that is late."""
+    if not form.past:
+        return always(None)
+    n = form.n
+    past = form.past
+    work_at = layout(form).work
+
+    @inlined
+    def remember(view, step):
+        at = work_at.past + step % past * 2 * n
+        for i in range(n):
+            view.work[at + i] = view.work[work_at.x + i]
+            view.work[at + n + i] = view.work[work_at.v + i]
+
+    return remember
+
+
+def _late_sensing(form: Form) -> Fields:
+    """Return the moments of a sensor that reads at its own times, or gives the past."""
+    n = form.n
+    past = form.past
+    row_at, work_at = layout(form)[:2]
+
+    @inlined
+    def reading(view, i, k, t):
+        return reading_at(k, t, view.row[row_at.periods + i], view.row[row_at.delays + i])
+
+    @inlined
+    def sense(view, i, t):
+        h = view.row[SETTING.step]
+        time = t - view.row[row_at.delays + i]
+        period = view.row[row_at.periods + i]
+        if period != 0.0:
+            time = reading(view, i, 0, t) * period
+        step = max(0, math.floor(time / h + 0.5))
+        at = work_at.past + step % past * 2 * n + i
+        return view.work[at], view.work[at + n]
+
+    return {"reading": reading, "sense": sense}
+
+
 def _sensing(form: Form, compile_user: Compiler) -> Fields:
     """Return the moments of sensors, their errors, and the estimator."""
     at = layout(form)
@@ -165,9 +213,11 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
 
     found: Fields = {
         "errors": always((-0.0, -0.0)),  # which change no bit
-        "sense": inlined(lambda view, i: (view.work[work_at.x + i], view.work[work_at.v + i])),
+        "sense": inlined(lambda view, i, t: (view.work[work_at.x + i], view.work[work_at.v + i])),
         "estimate": estimate,
     }
+    if form.past:
+        found |= _late_sensing(form)
     if any(form.errors):
         of_x, of_v = (signal(error, compile_user) for error in at.errors)
         found["errors"] = inlined(lambda view, t: (of_x(view, t, 0)[0], of_v(view, t, 0)[0]))

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.engine.form import (
+    LOGGED,
     SCORES,
     SETTING,
     WIDTH,
@@ -53,9 +54,13 @@ def names() -> list[str]:
 
 
 def _fold(name: str) -> Fold | None:
-    """Return the row of a metric that is of the driven channels alone."""
+    """Return the row of a metric that is of the driven channels alone, and of a signal that the
+    engine logs: what dampers exert is added to the reactions of a trace when its run is over.
+    """
     entry = CATALOGUE.get(name)
-    return None if entry is None or entry.shared else entry.fold
+    if entry is None or entry.shared or entry.fold is None:
+        return None
+    return entry.fold if entry.fold.signal in ("e", *LOGGED) else None
 
 
 def tallying(form: Form) -> Any:

@@ -12,17 +12,18 @@ for laws that do not compile. J is that of
 """
 
 import dataclasses
-import functools
 import warnings
 from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.engine.scores import over_log
 from smc_mujoco.analysis.tuning import equation
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective
 from smc_mujoco.common.aliases import Array, Floats, Pair
 from smc_mujoco.control.component import Component
+from smc_mujoco.metrics.catalogue import ITAE, TV
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import (
@@ -147,8 +148,7 @@ class Evaluator:
         if case.plant.pose:
             return self.goal.terms_of_pose(case, log["x"], log["r"], log["u"])
         start = sum(np.abs(log["x"][0]).tolist())
-        driven = log[:, : case.plant.driven]
-        itae, tv = sums(driven, case.control_period)
+        itae, tv = over_log((ITAE, TV), log, case.plant.driven, case.control_period)
         return self.goal.terms_of_sums(case, itae, start, tv)
 
 
@@ -234,17 +234,3 @@ class _RepeatedBatch(ScenarioBatch):
             if failure is None:
                 return None
         return step * self.scenarios[i].physics_step
-
-
-def sums(log: np.ndarray, period: float) -> Pair:
-    """Return ITAE and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace
-    do.
-
-    Terms are added in their order, so that the last bit, which a search may magnify, is the same on
-    every machine.
-    """
-    errors = functools.reduce(np.add, np.abs(log["x"] - log["r"]).T)
-    weighted = np.arange(len(log)) * period * errors
-    itae = np.cumsum(0.5 * (weighted[:-1] + weighted[1:]) * period)[-1]
-    tv = np.cumsum(np.abs(np.diff(log["u"], axis=0)), axis=0)[-1].max()
-    return float(itae), float(tv)

@@ -210,9 +210,9 @@ class Objective:
         t = case.control_period * np.arange(len(x))
         turns = [i for i in case.plant.scored_channels if i >= 3]
         parts = e[:, :3].sum(axis=1), e[:, turns].sum(axis=1)
-        tracking = sum(float(np.trapezoid(t * part, t)) / (float(part[0]) or 1.0) for part in parts)
-        variation = np.abs(np.diff(u, axis=0)).sum(axis=0) / (np.array(case.limits) * self.duration)
-        return min(tracking, FAILURE_COST), float(variation.max())
+        tracking = sum(metrics.ITAE.of(t, part[:, None]) / (part[0] or 1.0) for part in parts)
+        variation = metrics.TV.channels(t, u) / (np.array(case.limits) * self.duration)
+        return min(float(tracking), FAILURE_COST), float(variation.max())
 
     def terms_of_failure(self, time: float) -> Pair:
         """Return the terms of a run that fails at a time, s."""
