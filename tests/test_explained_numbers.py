@@ -20,7 +20,14 @@ from smc_mujoco.metrics import catalogue, conventions, fold, limit_cycle, tip
 from smc_mujoco.robustness import region_of_attraction as region
 from smc_mujoco.robustness import uncertainty
 from smc_mujoco.robustness import worst_case_search as attack
-from smc_mujoco.simulation import conditions, controller, scenario, signals, time_series
+from smc_mujoco.simulation import (
+    conditions,
+    controller,
+    integration,
+    scenario,
+    signals,
+    time_series,
+)
 from smc_mujoco.testing import golden, plugin
 
 pytestmark = pytest.mark.quick
@@ -122,10 +129,12 @@ SAID = {
     ],
     smc.Scenario: [
         f"Default: {scenario.U_MAX:g}; of your own model the limit of the",
-        f"else up to {1e3 * scenario.MAX_STEP:g} ms",
-        f"to a {PARTS[scenario.DRIVE_STEPS]} of that period or half of the drive's time constant",
-        f"up to {1e3 * scenario.REALISTIC_STEP:g} ms with friction",
-        f"up to a {PARTS[scenario.MIN_JITTER_STEPS]} of the clock's jitter",
+        f"else up to {1e3 * integration.MAX_STEP:g} ms",
+        f"only friction needs {1e3 * integration.REALISTIC_STEP:g} ms",
+        f"a contact {1e3 * integration.BLOW_STEP:g} ms",
+        f"to a {PARTS[integration.DRIVE_STEPS]} of that period or half of the drive's time constant",
+        f"up to {1e3 * integration.REALISTIC_STEP:g} ms with friction",
+        f"up to a {PARTS[integration.MIN_JITTER_STEPS]} of the clock's jitter",
         f"0 .. 2^{math.log2(constraints.MAX_SEED + 1):g} - 1",
     ],
     conditions: [

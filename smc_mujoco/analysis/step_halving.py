@@ -70,8 +70,13 @@ def repeats_all(scenario: Scenario) -> bool:
 
 
 def first_order(scenario: Scenario) -> bool:
-    """Return whether the integrator of a scenario is of first order: any but RK4."""
-    return scenario.resolved.integrator != "RK4"
+    """Return whether a scenario is simulated to first order: by any integrator but RK4, and of a
+    user's model where constraints may act.
+    """
+    if scenario.resolved.integrator != "RK4":
+        return True
+    exact = scenario.plain_equation or scenario.exact_friction
+    return scenario.plant.is_user_model and not exact
 
 
 def halved(scenario: Scenario) -> Scenario:
@@ -113,7 +118,7 @@ def repetitions(trace: Trace) -> list[Scenario]:
     if chatters(trace):
         with contextlib.suppress(ScenarioError):  # the step is too short for a quarter
             found.append(halved(halved(scenario)))
-    if scenario.contact and first_order(scenario):
+    if scenario.contact and scenario.resolved.integrator != "RK4":
         step = scenario.resolved.physics_step
         with contextlib.suppress(ScenarioError):  # another part needs this integrator
             found.append(dataclasses.replace(scenario, integrator="RK4", physics_step=step))

@@ -287,6 +287,11 @@ def spec(scenario: Scenario) -> mujoco.MjSpec:
         obstacle.edit_on(scenario.plant, spec)
     for part in parts(scenario):
         part.edit(spec)
+    if scenario.plant.is_user_model and not scenario.contact:
+        from smc_mujoco.mechanisms.custom import constraints, poles
+
+        if not poles.may_touch(scenario.plant):
+            constraints.hold(spec)
     for sensor in spec.sensors:
         sensor.nsample = scenario.readings
     return spec

@@ -24,7 +24,7 @@ import numpy as np
 from smc_mujoco.common import arithmetic
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Flag, Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel
+from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, warn_once
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
@@ -123,6 +123,8 @@ def run(
         if " raised " in trace.broken or " instead of " in trace.broken:
             broken.setdefault(trace.scenario.law.name, trace.broken)
     warn_of_broken(broken)
+    for doubt in dict.fromkeys(trace.unresolved for trace in traces.values()):
+        warn_once(doubt)
     if isinstance(scenarios, Scenario):
         return traces[0]
     return [traces[i] for i in range(len(prepared))]

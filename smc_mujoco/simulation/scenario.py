@@ -36,7 +36,7 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive
 from smc_mujoco.mechanisms.hardware.rotors import Rotors, flies
 from smc_mujoco.mechanisms.layout import channel_names, drive_ids, driven_names, loaded, moves_alone
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
-from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation import coerce, integration
 from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import (
@@ -65,17 +65,6 @@ NOT_OF_FREE_BODIES = {
     "clock": "clock with late or missed samples",
     "velocity": "estimated velocity",
 }
-MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
-# s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
-REALISTIC_STEP = 2.5e-4
-MIN_JITTER_STEPS = (
-    4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more
-)
-MIN_RESOLVED_LAG = (
-    0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
-)
-DRIVE_STEPS = 4  # physics steps per control period: enough behind any drive, see `longest_step`
-MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_LATENESS = 0.3  # stiffness times step over damping of bristles; chosen: joints rest 20 % off
@@ -118,9 +107,10 @@ class Scenario:
       physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms
         with friction (without `exact_friction`), contact, a mechanism or a plant that is not
         `smooth`, half of that with a Backlash, else up to 1 ms; always up to a quarter of the
-        clock's jitter. Where 1 ms holds, a drive whose force changes within a control period may
-        lower it, to a quarter of that period or half of the drive's time constant, whichever is
-        longer.
+        clock's jitter. On your own model only friction needs 0.25 ms, a contact 0.5 ms; fast poles
+        and hard constraints need as much, see docs/accuracy.md. Where 1 ms holds, a drive whose
+        force changes within a control period may lower it, to a quarter of that period or half of
+        the drive's time constant, whichever is longer.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6; of your own model the limit of the
         strongest motor, or what a joint without a limit needs: twice its load, (60/s^2 M + 8/s D)
         times its way, and 1.5 times its dry friction. A motor's own limit holds too: see `limits`.
@@ -148,8 +138,8 @@ class Scenario:
         that settling time, overshoot and bounds are of the speed. The law reads the same.
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
-        also behind a Lag, a RateLimit or a DCMotor, with `exact_friction`, and where the noslip
-        pass holds the dry friction of your model's joints; else implicitfast.
+        also behind a Lag, a RateLimit or a DCMotor, with `exact_friction`, and for your own model;
+        else implicitfast, as with LuGre, a Backlash, or poles of your model that make RK4 unstable.
       friction: in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of
         them, on the joints that an actuator drives, with their numbers in the unit of each. By
         name, {"slide": Coulomb(0.1), "hinge": Viscous(1e-4)}, any joint has its own, and "*" is all
@@ -378,20 +368,6 @@ class Scenario:
         Coulomb friction is MuJoCo's, and so is what holds joints with a formula.
         """
         return bool(self.exact_parts)
-
-    @property
-    def held_by_noslip(self) -> bool:
-        """Whether MuJoCo's noslip pass holds a user's dry friction under RK4.
-
-        It is False with contact or other friction, and where damping makes RK4 unstable.
-        """
-        if self.contact or not all(part.exact == DryFriction() for part in self.friction):
-            return False
-        if not self.plant.is_user_model or not all(part.drives for part in self.actuator):
-            return False
-        from smc_mujoco.mechanisms.custom.constraints import held_by_noslip
-
-        return held_by_noslip(self.plant, REALISTIC_STEP)
 
     @cached_property
     def exact_parts(self) -> tuple[Part, ...]:
@@ -651,15 +627,13 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         x0 = tuple(sorted(x0))
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
-        "physics_step": s.control_period / _default_steps(s),
+        "physics_step": s.control_period / integration.default_steps(s),
         "u_max": _default_bound(s),
         "x0": x0,
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
-        "integrator": "RK4"
-        if s.plain_equation or s.exact_friction or s.held_by_noslip
-        else "implicitfast",
+        "integrator": integration.default_integrator(s),
     }
     missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
     return missing | {"law": design.at_plant(s.law, s.plant)}
@@ -674,54 +648,6 @@ def _default_bound(s: Scenario) -> float | tuple[float, ...]:
     for i, motor in enumerate(s.motors):
         bounds[i] = bounds[i] if motor.bound is None else motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
-
-
-def longest_step(s: Scenario) -> float:
-    """Return the largest default physics step, s.
-
-    A drive's force changes within a step. Behind one Lag, RK4 gets its mean and its first moment,
-    so that velocities and positions at the ends of steps are exact. Behind other drives it gets the
-    mean: velocities are exact, and positions err by step^2/12 times the change of the acceleration:
-    in a cycle of frequency omega, by (omega step)^2/12 of its amplitude. With four steps this is 5
-    % in the fastest cycle of a sampled law, which lasts two samples. Cycles behind a long delay are
-    slower: a step of half of it is enough. A force that follows u at once sets no limit.
-    """
-    bounds = [s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP]
-    bounds += [part.longest_step for part in s.actuator]
-    if not (s.plain_equation or s.exact_friction):
-        return min(REALISTIC_STEP, *bounds)
-    longest = min(MAX_STEP, *bounds)
-    alone = all(len(chain) < 2 for chain in s.chains)
-    if alone and all(part.has_moment for part in s.actuator):
-        return longest
-    for part in s.actuator:
-        if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited:
-            longest = min(longest, max(0.5 * part.delay, s.control_period / DRIVE_STEPS))
-    return longest
-
-
-def stepped_by_mujoco(s: Scenario) -> Scenario:
-    """Return the scenario with MuJoCo's Coulomb friction, for what runs without the callback's."""
-    if s.exact_friction:
-        return dataclasses.replace(s, integrator="implicitfast")
-    return s
-
-
-def _default_steps(s: Scenario) -> int:
-    """Return the default number of physics steps per control period.
-
-    Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the
-    input delay is a whole number of steps.
-    """
-    # a scenario that needs less is refused later
-    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)
-    minimum = math.ceil(s.control_period / longest - 1e-9)
-    delay = s.input_delay / s.control_period
-    if s.actuator or s.exact_friction:
-        for steps in range(minimum, 4 * minimum + 1):
-            if abs(math.remainder(delay * steps, 1.0)) < 1e-6:
-                return steps
-    return minimum
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:

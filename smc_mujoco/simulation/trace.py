@@ -117,6 +117,15 @@ class Trace:
         """The reaction without damping, (K + 1, n), N or N m: what can hold a joint at rest."""
         return self.reaction if self.damping is None else self.reaction - self.damping
 
+    @property
+    def unresolved(self) -> str:
+        """What the physics step does not resolve in this run of your own model, in a sentence; ""
+        if nothing is known. `smc.run` warns of it.
+        """
+        from smc_mujoco.simulation.resolution import unresolved
+
+        return unresolved(self)
+
     def __setstate__(self, fields: dict) -> None:  # so that the arrays of a copy are read-only, too
         vars(self).update(fields)
         self.__post_init__()
@@ -145,6 +154,8 @@ class Trace:
         rows["samples"] = f"{len(self.t)}, every {s.control_period:g} s"
         if self.failure:
             rows["failed"] = self.failure
+        if self.unresolved:
+            rows["not resolved"] = self.unresolved
         for name, units in (("x", s.plant.units), ("u", s.efforts[: s.plant.driven])):
             for unit in dict.fromkeys(units):
                 values = getattr(self, name)[

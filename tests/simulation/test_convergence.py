@@ -21,7 +21,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.backlash import PLAY_STEP
 from smc_mujoco.metrics.conventions import scale
-from smc_mujoco.simulation.scenario import MAX_STEP, REALISTIC_STEP
+from smc_mujoco.simulation.integration import MAX_STEP, REALISTIC_STEP
 
 LAWS = ("observer_free", "boundary_layer")
 SCORES = ("settling_time", "ultimate_bound", "tv_rate")

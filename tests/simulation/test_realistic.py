@@ -20,8 +20,8 @@ import smc_mujoco as smc
 from smc_mujoco.control.law import suits
 from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.integration import REALISTIC_STEP
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.scenario import REALISTIC_STEP
 from smc_mujoco.simulation.trace import ARRAYS
 
 PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)

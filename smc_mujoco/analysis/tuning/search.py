@@ -77,10 +77,11 @@ from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.codes import code_hashes
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts
+from smc_mujoco.simulation.integration import stepped_by_mujoco
 from smc_mujoco.simulation.model import with_values
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario, default_u_max, stepped_by_mujoco
+from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers, called, opened
 
@@ -590,10 +591,13 @@ def _coarse(case: Scenario) -> Scenario:
     allows that.
     """
     case = stepped_by_mujoco(case)
-    if case.resolved.integrator == "RK4":
+    integrator = case.resolved.integrator
+    if integrator == "RK4" and case.plain_equation:
         return dataclasses.replace(case, integrator="Euler")
+    if integrator == "RK4":
+        integrator = "implicitfast"
     try:
-        return dataclasses.replace(case, physics_step=case.control_period)
+        return dataclasses.replace(case, integrator=integrator, physics_step=case.control_period)
     except ScenarioError:  # a delay or a clock needs a shorter step
         return case
 

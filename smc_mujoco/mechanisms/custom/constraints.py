@@ -3,14 +3,12 @@ dry friction holds.
 """
 
 import copy
-import functools
 import math
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
 from smc_mujoco.mechanisms.layout import loaded, posed
 from smc_mujoco.mechanisms.plant import Plant
@@ -58,18 +56,6 @@ def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
     )
 
 
-@functools.lru_cache(maxsize=32)
-def held_by_noslip(plant: Plant, step: float) -> bool:
-    """Return whether a plant can run under RK4 at this step, s, with its dry friction left to the
-    noslip pass. Damping so strong that RK4 would be unstable rules it out, as other actuators do.
-    """
-    model = compiled(plant.spec())
-    if (model.opt.noslip_iterations, model.opt.noslip_tolerance) != NOSLIP:
-        return False
-    damped = step * (model.dof_damping @ model.dof_invweight0)  # no mode decays faster than the sum
-    return model.nactuator == plant.driven and damped < 1.0 and not model.tendon_damping.any()
-
-
 def harden(spec: mujoco.MjSpec) -> None:
     """Make dry friction hold, where the file does not say how softly: MuJoCo's default creeps."""
     dry = [part for part in (*spec.joints, *spec.tendons) if part.frictionloss > 0.0]
@@ -77,8 +63,20 @@ def harden(spec: mujoco.MjSpec) -> None:
     for part in hard:
         part.solref_friction = HARD_SOLREF
         part.solimp_friction = HARD_SOLIMP
-    all_hard = 0 < len(hard) == len(dry)
-    if all_hard and not (spec.option.noslip_iterations or touches(spec.copy().compile())):
+    if hard and not touches(spec.copy().compile()):
+        hold(spec)
+
+
+def hold(spec: mujoco.MjSpec) -> None:
+    """Let MuJoCo's noslip pass hold dry friction, if all of it is hard: of the file, and of parts,
+    whose level is not in the model yet.
+    """
+    dry = []
+    for part in (*spec.joints, *spec.tendons):
+        hard = np.array_equal(part.solref_friction, HARD_SOLREF)
+        if hard or part.frictionloss > 0.0:
+            dry.append(hard)
+    if dry and all(dry) and not spec.option.noslip_iterations:
         spec.option.noslip_iterations, spec.option.noslip_tolerance = NOSLIP
 
 

@@ -91,11 +91,13 @@ class Coulomb(Friction):
     def exact(self) -> Part:
         return DryFriction()
 
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        for joint in self.joints(spec):
+            joint.solref_friction = HARD_SOLREF
+            joint.solimp_friction = HARD_SOLIMP
+
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        dofs = self.dofs(model)
-        yield Field("dof_frictionloss", dofs, self.level, adds=True)
-        yield Field("dof_solref", dofs, HARD_SOLREF)
-        yield Field("dof_solimp", dofs, HARD_SOLIMP)
+        yield Field("dof_frictionloss", self.dofs(model), self.level, adds=True)
 
 
 @njit(error_model="numpy")

@@ -1,0 +1,101 @@
+"""What the physics step of a run of a user's model does not resolve, in one sentence.
+
+docs/accuracy.md has how far such runs are off. `smc.fidelity.step_halving` repeats a run, and says
+how far its own numbers are.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smc_mujoco.common.text import number
+from smc_mujoco.mechanisms.custom.poles import coupled
+from smc_mujoco.simulation import integration
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Noise
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
+
+LAST = 0.2  # of the run, in which u is looked at: that of the metrics
+# 1/s, chosen: variation of u a second over its range, from which it chatters: five times up and
+# down
+CHATTER = 10.0
+
+
+def unresolved(trace: "Trace") -> str:
+    """Return what the step of a run does not resolve, in a sentence; "" if nothing is known."""
+    scenario = trace.scenario
+    if not scenario.plant.is_user_model or trace.failure:
+        return ""
+    return next(_of_scenario(scenario), "") or next(_of_motion(trace), "")
+
+
+def _of_scenario(s: Scenario) -> Iterator[str]:
+    """Yield a sentence if the default integrator or step is known to be coarse, or RK4 unstable."""
+    step, name = s.resolved.physics_step, s.plant.name
+    how = f"{name} runs under {s.resolved.integrator} at {1e3 * step:g} ms"
+    if not integration.suits_rk4(s):
+        if s.integrator is None:
+            parts = [*s.friction, *s.actuator]
+            part = next(p for p in parts if not integration.resolves(p))
+            kind = type(part).__name__
+            yield (
+                f"{how}, of first order, as {kind} has a state that moves once a step: numbers may "
+                f"be some percent off. Give physics_step={step / 4:g} for a quarter of the error"
+            )
+        return
+    pole = integration.fastest_pole(s)
+    if step * pole <= integration.MAX_POLE:
+        return
+    fine = s.control_period / math.ceil(s.control_period * pole / integration.MAX_POLE)
+    fast = f"its fastest pole, {number(pole)} 1/s (damping, springs or servos on light bodies)"
+    if s.resolved.integrator == "RK4" and step * pole > integration.MAX_STABLE_POLE:
+        yield f"{how}, which {fast}, may make unstable: give physics_step={fine:.3g} or less"
+    elif s.integrator is None and s.resolved.integrator != "RK4":
+        yield (
+            f"{how}, of first order, for {fast}: numbers may be some percent off. RK4 needs "
+            f"physics_step={fine:.3g} or less"
+        )
+
+
+def _of_motion(trace: "Trace") -> Iterator[str]:
+    """Yield a sentence if u chatters while dry friction or contacts act, or on joints that move
+    together.
+    """
+    if not switches(trace):
+        return
+    cure = "smc.fidelity.step_halving([trace]) repeats it at shorter steps"
+    name = trace.scenario.plant.name
+    if np.any(trace.holding[_last(trace)]):
+        yield (
+            f"u of {name} chatters while dry friction, limits or contacts act on its joints: how "
+            f"far it then is from its goal depends on the physics step, at any step; {cure}"
+        )
+    elif coupled(trace.scenario.plant):
+        yield (
+            f"u of {name} chatters on joints that move together: a change in the last digit may "
+            f"change its ultimate bound by some percent, at any physics step; {cure}"
+        )
+
+
+def switches(trace: "Trace") -> bool:
+    """Return whether u chatters in the last part. With noise, only a law does so whose theorem is
+    of sliding: noise alone makes u of any law vary.
+    """
+    s = trace.scenario
+    orders = [law.template and law.template.order("e", law.gains) for law in s.law.parts]
+    smooth = (s.noise != Noise() or bool(s.sensors)) and not any(orders)
+    u = trace.u[_last(trace), : trace.scenario.plant.driven]
+    if smooth or len(u) < 2:
+        return False
+    variation = np.abs(np.diff(u, axis=0)).sum(axis=0)
+    seconds = len(u) * trace.scenario.control_period
+    return bool(np.any(variation > CHATTER * seconds * np.ptp(u, axis=0)))
+
+
+def _last(trace: "Trace") -> slice:
+    """Return the samples of the last part."""
+    return slice(int((1.0 - LAST) * len(trace.t)), None)
