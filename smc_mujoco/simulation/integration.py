@@ -5,16 +5,15 @@ implicitfast at 0.25 ms. A user's model runs under RK4 whatever it may touch, as
 never reached costs nothing then. Its step is the longest of 1, 0.5 and 0.25 ms that resolves its
 fastest pole and its constraints. It runs under implicitfast where RK4 would be unstable, and where
 a part has a state that moves once a step. docs/accuracy.md has what this costs and what it gives.
+
+Here `s` is a Scenario, which imports this module.
 """
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
-
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.scenario import Scenario
 
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
@@ -37,7 +36,7 @@ MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MIN_MASS = 1e-6  # of the factors on the mass, below which a pole grows no further
 
 
-def default_integrator(s: "Scenario") -> str:
+def default_integrator(s: Any) -> str:
     """Return RK4 where it is stable and no part rules it out, else implicitfast."""
     if not s.plant.is_user_model:
         return "RK4" if s.plain_equation or s.exact_friction else "implicitfast"
@@ -45,7 +44,7 @@ def default_integrator(s: "Scenario") -> str:
     return "RK4" if suits_rk4(s) and step * fastest_pole(s) <= MAX_STABLE_POLE else "implicitfast"
 
 
-def suits_rk4(s: "Scenario") -> bool:
+def suits_rk4(s: Any) -> bool:
     """Return whether no part of a scenario rules RK4 out."""
     return all(map(resolves, s.actuator)) and (s.exact_friction or all(map(resolves, s.friction)))
 
@@ -59,7 +58,7 @@ def resolves(part: Actuator | Friction) -> bool:
     return not part.keeps_state and part.force is None
 
 
-def fastest_pole(s: "Scenario") -> float:
+def fastest_pole(s: Any) -> float:
     """Return the fastest pole of a user's model in a scenario, 1/s, see `poles.fastest_pole`. A
     lighter body has a faster one.
     """
@@ -76,7 +75,7 @@ def fastest_pole(s: "Scenario") -> float:
     return poles.fastest_pole(s.plant, parts) / max(least, MIN_MASS)
 
 
-def longest_step(s: "Scenario") -> float:
+def longest_step(s: Any) -> float:
     """Return the largest default physics step, s.
 
     A drive's force changes within a step. Behind one Lag, RK4 gets its mean and its first moment,
@@ -101,7 +100,7 @@ def longest_step(s: "Scenario") -> float:
     return longest
 
 
-def _step_of_mechanism(s: "Scenario") -> float:
+def _step_of_mechanism(s: Any) -> float:
     """Return the longest step that joints, constraints and friction bear, s."""
     exact = s.plain_equation or s.exact_friction
     if not s.plant.is_user_model:
@@ -123,7 +122,7 @@ def _step_of_mechanism(s: "Scenario") -> float:
     return REALISTIC_STEP
 
 
-def default_steps(s: "Scenario") -> int:
+def default_steps(s: Any) -> int:
     """Return the default number of physics steps per control period.
 
     Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the
@@ -140,7 +139,7 @@ def default_steps(s: "Scenario") -> int:
     return minimum
 
 
-def stepped_by_mujoco(s: "Scenario") -> "Scenario":
+def stepped_by_mujoco(s: Any) -> Any:
     """Return the scenario with MuJoCo's Coulomb friction, for what runs without the callback's."""
     if s.exact_friction:
         return dataclasses.replace(s, integrator="implicitfast")

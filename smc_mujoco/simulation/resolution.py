@@ -1,12 +1,12 @@
 """What the physics step of a run of a user's model does not resolve, in one sentence.
 
 docs/accuracy.md has how far such runs are off. `smc.fidelity.step_halving` repeats a run, and says
-how far its own numbers are.
+how far its own numbers are. Here `trace` is a Trace, which imports this module.
 """
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +16,13 @@ from smc_mujoco.simulation import integration
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.trace import Trace
-
 LAST = 0.2  # of the run, in which u is looked at: that of the metrics
 # 1/s, chosen: variation of u a second over its range, from which it chatters: five times up and
 # down
 CHATTER = 10.0
 
 
-def unresolved(trace: "Trace") -> str:
+def unresolved(trace: Any) -> str:
     """Return what the step of a run does not resolve, in a sentence; "" if nothing is known."""
     scenario = trace.scenario
     if not scenario.plant.is_user_model or trace.failure:
@@ -61,7 +58,7 @@ def _of_scenario(s: Scenario) -> Iterator[str]:
         )
 
 
-def _of_motion(trace: "Trace") -> Iterator[str]:
+def _of_motion(trace: Any) -> Iterator[str]:
     """Yield a sentence if u chatters while dry friction or contacts act, or on joints that move
     together.
     """
@@ -81,7 +78,7 @@ def _of_motion(trace: "Trace") -> Iterator[str]:
         )
 
 
-def switches(trace: "Trace") -> bool:
+def switches(trace: Any) -> bool:
     """Return whether u chatters in the last part. With noise, only a law does so whose theorem is
     of sliding: noise alone makes u of any law vary.
     """
@@ -96,6 +93,6 @@ def switches(trace: "Trace") -> bool:
     return bool(np.any(variation > CHATTER * seconds * np.ptp(u, axis=0)))
 
 
-def _last(trace: "Trace") -> slice:
+def _last(trace: Any) -> slice:
     """Return the samples of the last part."""
     return slice(int((1.0 - LAST) * len(trace.t)), None)
