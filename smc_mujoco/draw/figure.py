@@ -39,6 +39,7 @@ SIDE_PANELS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # panel -> its relati
 PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}
 BLOCK_WIDTHS = (1.4, 1.0, 1.0)  # relative: of panels over time, of single controls, of those beside
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
+MAX_COLUMN = 9.0  # inches, of a figure in a journal's column, which is 9.25 high
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
 LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
 SLIDE_PANELS = "x", "u", "settling", "channels"
@@ -201,9 +202,7 @@ def _composed_page(
         least = 4.0 if beside else 1.0
     space = pages.head_height(width, handles)
     rows = max(*parts.values(), least)
-    tall = height or max(
-        0.5625 * width * (not narrow), space + style.points(ROW_HEIGHT) * rows + 0.5
-    )
+    tall = height or _usual_height(width, space, rows, sum(map(len, blocks)))
     page = pages.blank(width, tall, fig)
     free = 72 * (page.bbox.height / page.dpi - space - 0.4)  # points
     cells = _cells(page, list(parts), blocks)
@@ -216,6 +215,17 @@ def _composed_page(
     page.set_label("; ".join(str(one.get_label()) for one in key))
     pages.space_ticks(page)
     return page
+
+
+def _usual_height(width: float, space: float, rows: float, panels: int) -> float:
+    """Return the height of a page of a width, inches, with so much space above its rows: a column
+    is no higher than a journal's unless its panels need it.
+    """
+    row = style.points(ROW_HEIGHT)
+    tall = space + row * rows + 0.5
+    if width < pages.NARROW:
+        return min(tall, max(MAX_COLUMN, space + row * panels + 0.5))
+    return max(0.5625 * width, tall)
 
 
 def _controls(errors: Sequence[Panel], traces: Sequence[Trace]) -> list[Panel]:

@@ -204,6 +204,12 @@ class Row(NamedTuple):
     colours: Sequence[str]
 
 
+def slides(trace: Trace) -> bool:
+    """Return whether a law has a sliding variable; the s of a baseline such as PID is a force."""
+    template = trace.scenario.law.template
+    return template is None or template.family != "baseline"
+
+
 def slides_on_speed(trace: Trace) -> bool:
     """Return whether s has the unit of a speed: that of twisting is e, and that of PID a force."""
     law = trace.scenario.law
@@ -230,6 +236,8 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     for panel in panels:
         if quantity == "reaction":
             wanted = any(np.nan_to_num(part.reaction).any() for part in panel.traces)
+        elif quantity == "s":
+            wanted = panel.group.driven and any(map(slides, panel.traces))
         elif quantity == "spread":
             wanted = panel.group.driven and len(panel.group.channels) > 1
         else:
@@ -581,40 +589,37 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
 
 
 def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str]) -> None:
-    """Write which traces agree, and until when, above the curves: the range of the axes grows by
-    the height of the words.
+    """Write which traces agree, and until when, above the curves, on up to two lines: the range of
+    the axes grows by the height of the words.
     """
     size = style.points(9.0)
     height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
     room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
-    if not shared or height < MIN_WORDS * size:
-        return
     forever = [one for one in shared if one[1] == np.inf]
-    choices = []
-    for named in (True, False):
-        choices += [agreement_words(which, names, named) for which in (shared, forever)]
-    fitting = [words for words in choices if words and style.width(words, size) <= room]
-    if not fitting:
+    for told in (shared, forever):
+        words = style.wrapped(agreement_words(told, names), room, size, 2)
+        lines = 1 + words.count("\n")
+        if words and "…" not in words and height >= MIN_WORDS * size * lines:
+            break
+    else:
         return
-    free = 1.0 - 1.8 * size / height
+    free = 1.0 - (0.6 + 1.2 * lines) * size / height
     axis = ax.yaxis.get_transform()
     low, high = axis.transform(np.array(ax.get_ylim()))
     ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
     place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
     look: Fields = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
     look["bbox"] = {"fc": style.PAPER, "ec": "none", "pad": 0.1 * size}  # hides lines of times
-    ax.annotate(fitting[0], (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
+    ax.annotate(words, (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
 
 
-def agreement_words(shared: Sequence[Agreement], names: Sequence[str], named: bool) -> str:
-    """Return which traces agree, by their names or numbers, and until when."""
+def agreement_words(shared: Sequence[Agreement], names: Sequence[str]) -> str:
+    """Return which traces agree, by their names, and until when."""
     parts = []
     for who, stop in shared:
-        words = f"{len(who)} of {len(names)}"
+        words = joined([names[i] for i in who])
         if len(who) == len(names):
             words = "all" if len(who) > 2 else "both"
-        elif named:
-            words = joined([names[i] for i in who])
         words += " agree"
         if stop < np.inf:
             words += f" until {stop:.3g} s"

@@ -106,6 +106,8 @@ RC = {
     "font.size": 10.5,
     "text.color": INK,
     "axes.labelcolor": INK,
+    "axes.facecolor": PAPER,
+    "axes.titlecolor": INK,
     "axes.edgecolor": "#9BA2A9",
     "axes.linewidth": 0.8,
     "axes.spines.top": False,

@@ -24,6 +24,7 @@ POSES = 192  # of a trace, at which what must be in the picture is found
 MAX_FIXED_SIZE = 4.0
 NEAR_SHARE = 0.1
 STAND_SHARE = 0.8
+OWN_STAND_SHARE = 0.15  # the same of the library's pendulums, whose picture is of the bob's arc
 # a machine whose foot is higher hangs from it; a floor of the model that is so near is its floor
 FLOOR_SHARE = 0.3
 NO_FLOOR = 20.0  # sizes over a floor that is not seen
@@ -264,7 +265,7 @@ class Puppet:
 
             around = close(around)
             standing = close(standing)
-        stand = STAND_SHARE * size
+        stand = (OWN_STAND_SHARE if on_stage else STAND_SHARE) * size
         if self.scenario.plant.tip or not on_stage:
             near = NEAR_SHARE * size
             standing = standing.clip(low - (near, near, stand), high + near)

@@ -26,6 +26,9 @@ from smc_mujoco.simulation.scenario import Scenario
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
 HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}
+AMBIENT = (0.30, 0.31, 0.33)  # light that models the form: less from everywhere,
+KEY = (0.60, 0.58, 0.55)  # more from one side,
+FILL = (0.10, 0.11, 0.14)  # and little from the other
 SUN = "sun"  # the light whose shadows lie on the floor, see canvas.py
 FLOOR_CELLS = 7  # of the floor's grid, in the width of what is seen
 HAZE = (0.66, 0.725, 0.80, 1.0)  # red, green, blue, opacity
@@ -71,6 +74,9 @@ def compose(scenario: Scenario, height: float, size: tuple[int, int]) -> mujoco.
     else:
         spec.attach(users_machine(machine, spec), frame=frame, prefix="m/")
     spec.material("floor").emission = 0.13  # nearly as white as the page below
+    spec.visual.headlight.ambient = AMBIENT
+    spec.light("key").diffuse = KEY
+    spec.light("fill").diffuse = FILL
     for light in spec.lights:
         if light.castshadow and light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
             light.name = SUN
